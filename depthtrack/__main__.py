@@ -1,0 +1,7 @@
+"""`python -m depthtrack`."""
+
+import sys
+
+from depthtrack.cli import main
+
+sys.exit(main())

@@ -1,0 +1,92 @@
+"""The command line: parse, call, print. One module a command; none is imported before it is asked for."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from depthtrack import __version__
+from depthtrack.errors import DepthtrackError
+
+
+@dataclass(frozen=True)
+class CommandEntry:
+    """Where a command lives: `module` holds a dataclass `Command` with a `run()` that returns nothing."""
+
+    module: str
+    summary: str
+
+
+COMMANDS = {
+    "info": CommandEntry("depthtrack.cli.info", "tell what a recording holds"),
+    "synth": CommandEntry(
+        "depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"
+    ),
+    "segment": CommandEntry(
+        "depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"
+    ),
+    "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
+    "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code: 0 done, 2 the user's mistake or a bad file, 130 interrupted."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(_overview())
+        return 0
+    if arguments[0] in ("-V", "--version"):
+        print(f"depthtrack {__version__}")
+        return 0
+    name, *rest = arguments
+    if name not in COMMANDS:
+        print(f"depthtrack: no command '{name}'; choose one of {', '.join(COMMANDS)}", file=sys.stderr)
+        return 2
+    try:
+        _parse(name, rest).run()
+    except DepthtrackError as error:
+        print(f"depthtrack {name}: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"depthtrack {name}: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output (head, less) went away; what remains cannot be delivered.
+        sys.stderr.close()
+        return 0
+    return 0
+
+
+def _parse(name: str, arguments: list[str]) -> "RunnableCommand":
+    from importlib import import_module
+
+    import tyro
+
+    command = import_module(COMMANDS[name].module).Command
+    parsed: RunnableCommand = tyro.cli(command, args=arguments, prog=f"depthtrack {name}")
+    return parsed
+
+
+class RunnableCommand:
+    """A command's options; `run` does the work and raises DepthtrackError for what the user can mend."""
+
+    def run(self) -> None:
+        raise NotImplementedError
+
+
+def _overview() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {entry.summary}" for name, entry in COMMANDS.items()]
+    return "\n".join(
+        [
+            f"depthtrack {__version__}: hand tracking from RGB-D video on an ordinary CPU",
+            "",
+            "usage: depthtrack COMMAND [OPTIONS]      (depthtrack COMMAND --help tells its options)",
+            "",
+            *lines,
+        ]
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,197 @@
+"""Forward kinematics of the 16 joints, the phalanx endpoints and keypoints, and the Jacobian of any point.
+
+Bodies: 0 is the palm; 1 + 3 f + k is phalanx k (from the palm outward) of finger f. Each phalanx has its origin at
+its own joint, y along the bone, z towards the pad; flexion turns about +x, abduction about z, positive towards the
+thumb (and, for the thumb itself, out of the palm: palmar abduction).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.hand.pose import ANGLES, FINGERS, ORIENTATION, POSITION, TANGENT_SIZE, rotation_matrix
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+
+BODY_COUNT = 16
+JOINT_NAMES = ("wrist", *(f"{finger}_{k}" for finger in FINGERS for k in range(3)))
+_THUMB_POINTS = ("cmc", "mcp", "ip", "tip")
+_FINGER_POINTS = ("mcp", "pip", "dip", "tip")
+ENDPOINT_NAMES = tuple(
+    f"{finger}_{point}"
+    for finger in FINGERS
+    for point in (_THUMB_POINTS if finger == "thumb" else _FINGER_POINTS)
+)
+KEYPOINT_NAMES = ("wrist", *ENDPOINT_NAMES)
+"""The 21 public keypoints, in MediaPipe's order: the wrist, then thumb to little finger, root to tip."""
+
+
+def body_of(finger: int, phalanx: int) -> int:
+    """Index of a phalanx among the 16 bodies."""
+    return 1 + 3 * finger + phalanx
+
+
+def _moves() -> NDArray[np.bool_]:
+    """(16, 20): whether an angle moves a body. Abduction and first flexion move the whole finger."""
+    moves = np.zeros((BODY_COUNT, 20), dtype=np.bool_)
+    for finger in range(5):
+        for phalanx in range(3):
+            moves[body_of(finger, phalanx), 4 * finger : 4 * finger + 2 + phalanx] = True
+    return moves
+
+
+MOVES = _moves()
+
+
+@dataclass(frozen=True)
+class HandModel:
+    """Kinematics of a hand of given sizes. All methods broadcast over leading axes of the pose (..., 27)."""
+
+    shape: HandShape
+
+    def transforms(self, pose: ArrayLike) -> Array:
+        """T_camera_body (..., 16, 4, 4), metres: Eq. (1) of Schroeder et al. 2014."""
+        p = np.asarray(pose, dtype=np.float64)
+        batch = p.shape[:-1]
+        T = np.zeros((*batch, BODY_COUNT, 4, 4))
+        T[..., 3, 3] = 1
+        T[..., 0, :3, :3] = rotation_matrix(p[..., ORIENTATION])
+        T[..., 0, :3, 3] = p[..., POSITION]
+        angles = p[..., ANGLES].reshape(*batch, 5, 4)
+        for finger in range(5):
+            base = self.base_transforms[finger]
+            local = _with_rotation(base, base[:3, :3] @ self._abduction(angles[..., finger, 0]))
+            parent = T[..., 0, :, :] @ local
+            for phalanx in range(3):
+                here = parent @ _homogeneous(_rotation_x(angles[..., finger, 1 + phalanx]))
+                T[..., body_of(finger, phalanx), :, :] = here
+                parent = here @ _translation_y(self.lengths[finger, phalanx])
+        return T
+
+    @property
+    def lengths(self) -> Array:
+        """(5, 3) phalanx lengths, metres, scaled."""
+        return self.shape.lengths * self.shape.scale
+
+    @property
+    def base_transforms(self) -> Array:
+        """T_palm_base (5, 4, 4): base joints with all angles zero."""
+        T = np.tile(np.eye(4), (5, 1, 1))
+        T[:, :3, 3] = self.shape.bases * self.shape.scale
+        y = self.shape.thumb_direction / np.linalg.norm(self.shape.thumb_direction)
+        z = self.shape.thumb_pad - y * (self.shape.thumb_pad @ y)
+        z = z / np.linalg.norm(z)
+        T[0, :3, :3] = np.stack([np.cross(y, z), y, z], axis=-1)
+        flip = np.diag([self.shape.mirror, 1, 1, 1])
+        return flip @ T @ flip
+
+    def joints(self, pose: ArrayLike) -> Array:
+        """The 16 joints (..., 16, 3) in the camera frame, metres: the wrist, then the origin of each phalanx."""
+        T = self.transforms(pose)
+        joints = T[..., :3, 3].copy()
+        joints[..., 0, :] = self._wrist(T)
+        return joints
+
+    def endpoints(self, pose: ArrayLike) -> Array:
+        """The 20 phalanx endpoints (..., 20, 3), metres: per finger the base, two joints and the tip."""
+        return self._endpoints(self.transforms(pose))
+
+    def keypoints(self, pose: ArrayLike) -> Array:
+        """The 21 keypoints (..., 21, 3) in MediaPipe's order, metres: the wrist, then the endpoints."""
+        T = self.transforms(pose)
+        return np.concatenate([self._wrist(T)[..., None, :], self._endpoints(T)], axis=-2)
+
+    def place(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
+        """Camera-frame positions (..., N, 3) of points (N, 3) fixed to `bodies` (N,)."""
+        T = self.transforms(pose)[..., np.asarray(bodies), :, :]
+        return np.einsum("...nij,nj->...ni", T[..., :3, :3], np.asarray(local_points)) + T[..., :3, 3]
+
+    def point_jacobian(self, pose: ArrayLike, bodies: ArrayLike, points: ArrayLike) -> Array:
+        """Derivative (..., N, 3, 26) of camera-frame points (..., N, 3) fixed to `bodies` (N,).
+
+        Columns follow the tangent space of `pose.retract`. A revolute joint moves a point by the cross product of
+        its axis and the lever arm (Schroeder et al. 2014, Eq. 5).
+        """
+        p, bodies = np.asarray(pose, dtype=np.float64), np.asarray(bodies)
+        T = self.transforms(p)
+        points = np.broadcast_to(np.asarray(points, dtype=np.float64), (*p.shape[:-1], len(bodies), 3))
+        J = np.zeros((*points.shape, TANGENT_SIZE))
+        J[..., :, :3] = np.eye(3)
+        lever = points - p[..., None, POSITION]
+        J[..., :, 3:6] = np.swapaxes(_cross_matrix(lever), -1, -2)
+        axes, origins = self._axes(T)
+        for angle in range(20):
+            moved = MOVES[bodies, angle]
+            arm = points[..., moved, :] - origins[..., None, angle, :]
+            J[..., moved, :, 6 + angle] = np.cross(axes[..., None, angle, :], arm)
+        return J
+
+    def _axes(self, T: Array) -> tuple[Array, Array]:
+        """Rotation axes and origins (..., 20, 3) of the angles in the camera frame."""
+        axes = np.empty((*T.shape[:-3], 20, 3))
+        origins = np.empty_like(axes)
+        abduction = self.base_transforms[:, :3, 2] * -self.shape.mirror
+        for finger in range(5):
+            first = T[..., body_of(finger, 0), :, :]
+            axes[..., 4 * finger, :] = np.einsum("...ij,j->...i", T[..., 0, :3, :3], abduction[finger])
+            origins[..., 4 * finger, :] = first[..., :3, 3]
+            for phalanx in range(3):
+                body = T[..., body_of(finger, phalanx), :, :]
+                axes[..., 4 * finger + 1 + phalanx, :] = body[..., :3, 0]
+                origins[..., 4 * finger + 1 + phalanx, :] = body[..., :3, 3]
+        return axes, origins
+
+    def _wrist(self, T: Array) -> Array:
+        return np.einsum("...ij,j->...i", T[..., 0, :3, :3], self.shape.wrist) + T[..., 0, :3, 3]
+
+    def _endpoints(self, T: Array) -> Array:
+        points = np.empty((*T.shape[:-3], 20, 3))
+        for finger in range(5):
+            for phalanx in range(3):
+                points[..., 4 * finger + phalanx, :] = T[..., body_of(finger, phalanx), :3, 3]
+            last = T[..., body_of(finger, 2), :, :]
+            points[..., 4 * finger + 3, :] = last[..., :3, 3] + last[..., :3, 1] * self.lengths[finger, 2]
+        return points
+
+    def _abduction(self, angle: Array) -> Array:
+        return _rotation_z(-self.shape.mirror * angle)
+
+
+def _rotation_x(angle: Array) -> Array:
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return _matrix([[one, zero, zero], [zero, c, -s], [zero, s, c]])
+
+
+def _rotation_z(angle: Array) -> Array:
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    return _matrix([[c, -s, zero], [s, c, zero], [zero, zero, one]])
+
+
+def _matrix(rows: list[list[Array]]) -> Array:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _homogeneous(rotation: Array) -> Array:
+    return _with_rotation(np.eye(4), rotation)
+
+
+def _with_rotation(T: Array, rotation: Array) -> Array:
+    """T (4, 4), or a batch of it, with its rotation replaced."""
+    out = np.broadcast_to(T, (*rotation.shape[:-2], 4, 4)).copy()
+    out[..., :3, :3] = rotation
+    return out
+
+
+def _translation_y(length: float) -> Array:
+    T = np.eye(4)
+    T[1, 3] = length
+    return T
+
+
+def _cross_matrix(v: Array) -> Array:
+    """[v]x (..., 3, 3) with [v]x u = v x u."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    zero = np.zeros_like(x)
+    return _matrix([[zero, -z, y], [z, zero, -x], [-y, x, zero]])

@@ -1,0 +1,146 @@
+"""The sphere and cylinder model of the hand (Oikonomidis et al. 2011, Sec. 2.2): 37 transformed unit primitives.
+
+A palm of one elliptic cylinder and two ellipsoid caps; four fingers of three cones and four spheres; a thumb of an
+ellipsoid, two cones and three spheres. A unit sphere is |u| <= 1; a unit cylinder is ux^2 + uy^2 <= 1, 0 <= uz <= 1.
+The 4x4 matrix that places a primitive is affine for spheres, ellipsoids and cylinders, and projective for cones:
+a cylinder seen through a homography is a cone, so two shapes suffice, as on the GPU (Sec. 2.5).
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import body_of
+from depthtrack.hand.pose import FINGERS
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+SPHERE, CYLINDER = 0, 1
+PRIMITIVE_COUNT = 37
+
+
+@dataclass(frozen=True)
+class Primitives:
+    """Unit primitives with the body each is fixed to.
+
+    `kinds` (N,) of SPHERE or CYLINDER, `bodies` (N,), `T_body_unit` (N, 4, 4) from the unit shape to the body
+    frame in metres, projective for cones; `names` for people.
+    """
+
+    kinds: NDArray[np.int64]
+    bodies: NDArray[np.int64]
+    T_body_unit: Array
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, shape: HandShape) -> Self:
+        """The 37 primitives of a hand."""
+        parts = _palm(shape)
+        for finger in range(5):
+            parts += _thumb(shape) if finger == 0 else _finger(shape, finger)
+        names, kinds, bodies, matrices = zip(*parts, strict=True)
+        flip = np.diag([shape.mirror, 1, 1, 1])
+        scale = np.diag([shape.scale, shape.scale, shape.scale, 1])
+        return cls(np.array(kinds), np.array(bodies), flip @ scale @ np.stack(matrices) @ flip, names)
+
+    def placed(self, transforms: Array) -> Array:
+        """T_camera_unit (..., N, 4, 4) for T_camera_body (..., 16, 4, 4)."""
+        return transforms[..., self.bodies, :, :] @ self.T_body_unit
+
+
+_Part = tuple[str, int, int, Array]
+
+
+def _palm(shape: HandShape) -> list[_Part]:
+    half_breadth, half_thickness = shape.palm_breadth / 2, shape.palm_thickness / 2
+    # The caps reach the wrist and the knuckles' far side; the cylinder spans what lies between their centres.
+    bottom, top = -0.36 * shape.palm_length, 0.42 * shape.palm_length
+    centre = (shape.bases[1:, 0].max() + shape.bases[1:, 0].min()) / 2
+    cylinder = cone((centre, bottom, 0), top - bottom, 1.0, 1.0) @ np.diag(
+        [half_breadth, half_thickness, 1, 1]
+    )
+    return [
+        ("palm_cylinder", CYLINDER, 0, cylinder),
+        (
+            "palm_wrist_cap",
+            SPHERE,
+            0,
+            ellipsoid((centre, bottom, 0), (half_breadth, 0.14 * shape.palm_length, half_thickness)),
+        ),
+        (
+            "palm_knuckle_cap",
+            SPHERE,
+            0,
+            ellipsoid((centre, top, 0), (half_breadth, 0.13 * shape.palm_length, half_thickness)),
+        ),
+    ]
+
+
+def _finger(shape: HandShape, finger: int) -> list[_Part]:
+    name, lengths, radii = FINGERS[finger], _bone_lengths(shape, finger), shape.radii[finger]
+    parts: list[_Part] = []
+    for k in range(3):
+        body = body_of(finger, k)
+        parts.append((f"{name}_sphere_{k}", SPHERE, body, sphere(0.0, radii[k])))
+        parts.append(
+            (f"{name}_cone_{k}", CYLINDER, body, cone((0, 0, 0), lengths[k], radii[k], radii[k + 1]))
+        )
+    parts.append((f"{name}_sphere_3", SPHERE, body_of(finger, 2), sphere(lengths[2], radii[3])))
+    return parts
+
+
+def _thumb(shape: HandShape) -> list[_Part]:
+    lengths, radii = _bone_lengths(shape, 0), shape.radii[0]
+    metacarpal = lengths[0]
+    parts: list[_Part] = [
+        (
+            "thumb_ellipsoid",
+            SPHERE,
+            body_of(0, 0),
+            ellipsoid((0, metacarpal / 2, 0), (radii[0], metacarpal / 2 + 0.5 * radii[1], 0.9 * radii[0])),
+        )
+    ]
+    for k in (1, 2):
+        body = body_of(0, k)
+        parts.append((f"thumb_sphere_{k}", SPHERE, body, sphere(0.0, radii[k])))
+        parts.append((f"thumb_cone_{k}", CYLINDER, body, cone((0, 0, 0), lengths[k], radii[k], radii[k + 1])))
+    parts.append(("thumb_sphere_3", SPHERE, body_of(0, 2), sphere(lengths[2], radii[3])))
+    return parts
+
+
+def _bone_lengths(shape: HandShape, finger: int) -> Array:
+    """Distances between sphere centres: the last one stops short, so that the tip's sphere ends at the fingertip."""
+    lengths = shape.lengths[finger].copy()
+    lengths[2] = max(lengths[2] - shape.radii[finger, 3], 1e-4)
+    return lengths
+
+
+def sphere(y: float, radius: float) -> Array:
+    """Unit sphere to a ball of `radius` at (0, y, 0)."""
+    return ellipsoid((0.0, y, 0.0), (radius, radius, radius))
+
+
+def ellipsoid(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Array:
+    """Unit sphere to an axis-aligned ellipsoid."""
+    T = np.diag([*radii, 1.0])
+    T[:3, 3] = centre
+    return T
+
+
+def cone(start: tuple[float, float, float], length: float, radius_start: float, radius_end: float) -> Array:
+    """Unit cylinder to a cone frustum along +y from `start`, its radius going from `radius_start` to `radius_end`.
+
+    With w = 1 + k uz and k = radius_start / radius_end - 1, the radius radius_start / w is linear in the
+    distance length (1 + k) uz / w along the axis.
+    """
+    k = radius_start / radius_end - 1
+    T = np.zeros((4, 4))
+    T[0, 0] = radius_start
+    T[1, 2] = length * (1 + k)
+    T[2, 1] = -radius_start
+    T[3] = [0, 0, k, 1]
+    shift = np.eye(4)
+    shift[:3, 3] = start
+    return shift @ T

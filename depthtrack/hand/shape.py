@@ -1,0 +1,183 @@
+"""Sizes of one person's hand, in one small JSON that people can read.
+
+Palm frame, for both hands: origin at the palm's centre, y towards the fingers, z out of the palm (palmar), and x
+to the right of somebody who looks at the palm: towards the thumb on a right hand, away from it on a left hand.
+All sizes are stored for a right hand; a left hand is its mirror image in x.
+"""
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, Self, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.pose import FINGERS
+
+Side = Literal["right", "left"]
+
+# Phalanx lengths and soft tissue at the tips: Buryanov and Kotiuk, "Proportions of hand segments", Int. J. Morphol.
+# 28(3), 2010 (means of 66 adults); the last length reaches the skin of the fingertip: distal phalanx + soft tissue.
+_LENGTHS_MM = {
+    "thumb": (46.2, 31.6, 27.3),
+    "index": (39.8, 22.4, 19.7),
+    "middle": (44.6, 26.3, 21.4),
+    "ring": (41.4, 25.7, 21.3),
+    "little": (32.7, 18.1, 19.7),
+}
+# Half the mean of joint breadth and depth, men and women averaged and rounded to half a millimetre, after Greiner,
+# "Hand Anthropometry of U.S. Army Personnel", Natick TR-92/011, 1991, and Garrett, "The adult human hand", Human
+# Factors 13, 1971: at the base joint, the two joints beyond it, and the fingertip's pad.
+_RADII_MM = {
+    "thumb": (15.0, 11.5, 10.0, 8.0),
+    "index": (11.0, 9.5, 8.0, 6.5),
+    "middle": (11.0, 9.5, 8.0, 6.5),
+    "ring": (10.5, 9.0, 7.5, 6.0),
+    "little": (9.5, 8.0, 6.5, 5.5),
+}
+# Knuckles and the thumb's saddle joint in the palm frame: metacarpal lengths of Buryanov and Kotiuk on a carpus
+# 27 mm high (Youm et al., "Kinematics of the wrist", 1978), spread over the hand breadth of Greiner (85 mm).
+_BASES_MM = {
+    "thumb": (20.0, -32.0, 6.0),
+    "index": (24.5, 43.0, 0.0),
+    "middle": (3.0, 46.0, 0.0),
+    "ring": (-16.5, 41.5, 0.0),
+    "little": (-33.5, 33.0, 0.0),
+}
+_SOURCE = "depthtrack default: Buryanov and Kotiuk 2010; Greiner 1991; Garrett 1971; Youm et al. 1978"
+
+
+@dataclass(frozen=True)
+class HandShape:
+    """Every size of a hand: metres in Python, millimetres in the JSON file. `scale` multiplies all of them.
+
+    Arrays are read-only and hold the right hand, unscaled: `lengths` (5, 3) phalanges from the palm outward,
+    `radii` (5, 4) at base, two joints and tip, `bases` (5, 3) base joints in the palm frame, `thumb_direction`
+    and `thumb_pad` (3,) where the resting thumb points and where its pad faces.
+    """
+
+    side: Side = "right"
+    scale: float = 1.0
+    lengths: NDArray[np.float64] = field(default_factory=lambda: _table(_LENGTHS_MM))
+    radii: NDArray[np.float64] = field(default_factory=lambda: _table(_RADII_MM))
+    bases: NDArray[np.float64] = field(default_factory=lambda: _table(_BASES_MM))
+    thumb_direction: NDArray[np.float64] = field(default_factory=lambda: _frozen([0.58, 0.73, 0.36]))
+    thumb_pad: NDArray[np.float64] = field(default_factory=lambda: _frozen([-0.75, 0.20, 0.60]))
+    palm_breadth: float = 0.079
+    palm_length: float = 0.092
+    palm_thickness: float = 0.029
+    wrist_breadth: float = 0.057
+    wrist_thickness: float = 0.039
+    source: str = _SOURCE
+
+    def __post_init__(self) -> None:
+        if self.side not in get_args(Side):
+            raise InputError(f"hand side must be 'right' or 'left', found {self.side!r}")
+        if not 0.2 <= self.scale <= 5:
+            raise InputError(f"hand scale must lie between 0.2 and 5, found {self.scale!r}")
+        for name, shape in _ARRAY_SHAPES.items():
+            array = _frozen(getattr(self, name))
+            object.__setattr__(self, name, array)
+            if array.shape != shape or not np.all(np.isfinite(array)):
+                raise InputError(f"hand {name} must be {shape} finite numbers, found shape {array.shape}")
+        sizes = np.concatenate(
+            [self.lengths.ravel(), self.radii.ravel(), [getattr(self, n) for n in _PALM_SIZES]]
+        )
+        if sizes.min() < 1e-4 or sizes.max() > 0.5 or np.abs(self.bases).max() > 0.5:
+            raise InputError("hand sizes must lie between 0.1 and 500 mm; is the file in millimetres?")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, HandShape) and self.to_json() == other.to_json()
+
+    def __hash__(self) -> int:
+        return hash(self.to_json())
+
+    @property
+    def mirror(self) -> float:
+        """+1 for a right hand, -1 for a left one: the factor on palm-frame x."""
+        return 1.0 if self.side == "right" else -1.0
+
+    @property
+    def wrist(self) -> NDArray[np.float64]:
+        """(3,) wrist joint in the palm frame, metres, scaled."""
+        return np.array([0.0, -self.palm_length / 2 * self.scale, 0.0])
+
+    def with_(self, **changes: Any) -> Self:
+        """A copy with some sizes changed; all of them are checked again."""
+        return replace(self, **changes)
+
+    def to_json(self) -> str:
+        """The text of `hand.json`: millimetres, one line a finger."""
+        fingers = ",\n".join(
+            f'    "{finger}": '
+            + json.dumps(
+                {
+                    "base_mm": _mm(self.bases[f]),
+                    "lengths_mm": _mm(self.lengths[f]),
+                    "radii_mm": _mm(self.radii[f]),
+                }
+            )
+            for f, finger in enumerate(FINGERS)
+        )
+        palm = json.dumps({f"{name}_mm": _mm(getattr(self, name)) for name in _PALM_SIZES})
+        thumb = json.dumps({"direction": self.thumb_direction.tolist(), "pad": self.thumb_pad.tolist()})
+        return (
+            f'{{\n  "side": "{self.side}",\n  "scale": {self.scale},\n  "palm": {palm},\n  "thumb_at_rest": {thumb},\n'
+            f'  "fingers": {{\n{fingers}\n  }},\n  "source": {json.dumps(self.source)}\n}}\n'
+        )
+
+    @classmethod
+    def from_json(cls, path: Path) -> Self:
+        """Read `hand.json`. Raises InputError naming what is missing or out of range."""
+        try:
+            return cls._from_fields(json.loads(path.read_text(encoding="utf-8")))
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        except (OSError, UnicodeDecodeError, ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"cannot read the hand file {path}: {error}") from error
+        except KeyError as error:
+            raise InputError(
+                f"{path}: the entry {error} is missing; write one with `depthtrack synth` to see the form"
+            ) from error
+
+    @classmethod
+    def _from_fields(cls, fields: dict[str, Any]) -> Self:
+        fingers = [fields["fingers"][finger] for finger in FINGERS]
+        return cls(
+            side=cast(Side, fields["side"]),
+            scale=float(fields.get("scale", 1.0)),
+            bases=_frozen([f["base_mm"] for f in fingers]) / 1000,
+            lengths=_frozen([f["lengths_mm"] for f in fingers]) / 1000,
+            radii=_frozen([f["radii_mm"] for f in fingers]) / 1000,
+            thumb_direction=_frozen(fields["thumb_at_rest"]["direction"]),
+            thumb_pad=_frozen(fields["thumb_at_rest"]["pad"]),
+            source=str(fields.get("source", "")),
+            **{name: float(fields["palm"][f"{name}_mm"]) / 1000 for name in _PALM_SIZES},
+        )
+
+
+_ARRAY_SHAPES = {
+    "lengths": (5, 3),
+    "radii": (5, 4),
+    "bases": (5, 3),
+    "thumb_direction": (3,),
+    "thumb_pad": (3,),
+}
+_PALM_SIZES = ("palm_breadth", "palm_length", "palm_thickness", "wrist_breadth", "wrist_thickness")
+
+
+def _frozen(values: Any) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def _table(rows_mm: dict[str, tuple[float, ...]]) -> NDArray[np.float64]:
+    return _frozen([np.array(rows_mm[finger]) / 1000 for finger in FINGERS])
+
+
+def _mm(metres: Any) -> Any:
+    """Millimetres rounded to a nanometre, so that writing and reading again changes nothing."""
+    return np.round(np.asarray(metres) * 1000, 6).tolist()

@@ -1,0 +1,1 @@
+"""From an RGB-D frame to what a tracker sees."""

@@ -1,0 +1,74 @@
+"""What every recording offers, whatever its format: frames one at a time, a camera, ground truth if it has any."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.hand.shape import HandShape
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One RGB-D frame.
+
+    `timestamp` in seconds; `depth` (h, w) float32 metres along the optical axis, 0 where there is no reading;
+    `colour` (h, w, 3) uint8 RGB registered to the depth, or None.
+    """
+
+    index: int
+    timestamp: float
+    depth: NDArray[np.float32]
+    colour: NDArray[np.uint8] | None
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """What is known about a recording beside its images; each part may be absent.
+
+    `timestamps` (T,) of the annotated frames in seconds; `poses` (T, 27); `joints` (T, 21, 3) keypoints in metres,
+    camera frame, MediaPipe order; `hand` the sizes of the recorded hand. An annotated frame may be missing from the
+    images and the other way round: look a frame up by its timestamp with `at`.
+    """
+
+    timestamps: NDArray[np.float64]
+    poses: NDArray[np.float64] | None = None
+    joints: NDArray[np.float64] | None = None
+    hand: HandShape | None = None
+
+    def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
+        """Row of the annotation at `timestamp`, or None when none lies within `tolerance` seconds."""
+        if len(self.timestamps) == 0:
+            return None
+        row = int(np.argmin(np.abs(self.timestamps - timestamp)))
+        return row if abs(self.timestamps[row] - timestamp) <= tolerance else None
+
+
+class Sequence(Protocol):
+    """A recording. Frames stream: each is read when asked for, and memory does not grow with the length."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def camera(self) -> Camera: ...
+
+    @property
+    def timestamps(self) -> NDArray[np.float64]: ...
+
+    @property
+    def ground_truth(self) -> GroundTruth | None: ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int) -> Frame: ...
+
+    def __iter__(self) -> Iterator[Frame]: ...
+
+    def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
+        """True silhouette (h, w) of the hand without its forearm, where the recording knows it."""
+        ...

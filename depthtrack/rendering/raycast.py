@@ -1,0 +1,126 @@
+"""A plain float64 ray caster for transformed unit spheres and cylinders: the truth other renderers are held to.
+
+Every pixel's ray is taken back into the unit frame of each primitive, homogeneously, so that cones (projective
+images of the cylinder) need no special case, and intersected there with ux^2 + uy^2 (+ uz^2) = uw^2.
+"""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.hand.primitives import CYLINDER
+from depthtrack.rendering.surface import NEAR, Surface
+
+Array = NDArray[np.float64]
+
+
+def raycast(
+    camera: Camera,
+    kinds: NDArray[np.int64],
+    T_camera_unit: Array,
+    labels: NDArray[np.int64],
+    onto: Surface | None = None,
+) -> Surface:
+    """Render N unit primitives placed by `T_camera_unit` (N, 4, 4); returns the nearest hit at every pixel centre.
+
+    A hit counts from NEAR onward, inside faces included, so a camera within a primitive sees its far wall. Cylinders
+    are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn over in place.
+    """
+    surface = Surface.empty(camera) if onto is None else onto
+    inverses = np.linalg.inv(T_camera_unit)
+    windows = np.array(
+        [_window(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64
+    )
+    _cast(
+        np.asarray(kinds, dtype=np.int64),
+        inverses,
+        np.asarray(labels, dtype=np.int16),
+        windows.reshape(-1, 4),
+        (camera.fx, camera.fy, camera.cx, camera.cy),
+        surface.depth,
+        surface.label,
+        surface.normal,
+    )
+    return surface
+
+
+def _window(camera: Camera, kind: int, T: Array) -> tuple[int, int, int, int]:
+    """Pixels (u0, u1, v0, v1) that may see a primitive: the projected corners of its bounding box."""
+    low = 0.0 if kind == CYLINDER else -1.0
+    corners = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (low, 1.0)]) @ T.T
+    points = corners[:, :3] / corners[:, 3:]
+    if points[:, 2].max() < NEAR:
+        return 0, 0, 0, 0
+    if points[:, 2].min() < NEAR:  # reaches behind the lens: no bound on its image
+        return 0, camera.width, 0, camera.height
+    uv = camera.project(points)
+    u0, v0 = np.clip(np.floor(uv.min(axis=0)), 0, [camera.width, camera.height])
+    u1, v1 = np.clip(np.ceil(uv.max(axis=0)) + 1, 0, [camera.width, camera.height])
+    return int(u0), int(u1), int(v0), int(v1)
+
+
+@numba.njit(cache=True)
+def _cast(
+    kinds: NDArray[np.int64],
+    inverses: Array,
+    labels: NDArray[np.int16],
+    windows: NDArray[np.int64],
+    intrinsics: tuple[float, float, float, float],
+    depth: Array,
+    label: NDArray[np.int16],
+    normal: Array,
+) -> None:
+    fx, fy, cx, cy = intrinsics
+    near = NEAR
+    for n in range(kinds.shape[0]):
+        M = inverses[n]
+        # Spheres add uz^2 to the quadric; for cylinders uz only bounds the segment.
+        zz = 0.0 if kinds[n] == CYLINDER else 1.0
+        for v in range(windows[n, 2], windows[n, 3]):
+            for u in range(windows[n, 0], windows[n, 1]):
+                dx, dy = (u - cx) / fx, (v - cy) / fy
+                # A point of the ray is (t dx, t dy, t): in the unit frame, t a + b.
+                ax = M[0, 0] * dx + M[0, 1] * dy + M[0, 2]
+                ay = M[1, 0] * dx + M[1, 1] * dy + M[1, 2]
+                az = M[2, 0] * dx + M[2, 1] * dy + M[2, 2]
+                aw = M[3, 0] * dx + M[3, 1] * dy + M[3, 2]
+                bx, by, bz, bw = M[0, 3], M[1, 3], M[2, 3], M[3, 3]
+                A = ax * ax + ay * ay + zz * az * az - aw * aw
+                B = ax * bx + ay * by + zz * az * bz - aw * bw
+                C = bx * bx + by * by + zz * bz * bz - bw * bw
+                D = B * B - A * C
+                if D < 0.0:
+                    continue
+                root = math.sqrt(D)
+                # Stable roots of A t^2 + 2 B t + C = 0.
+                q = -(B + root) if B >= 0.0 else -(B - root)
+                for k in range(2):
+                    if k == 0:
+                        if A == 0.0:
+                            continue
+                        t = q / A
+                    else:
+                        if q == 0.0:
+                            continue
+                        t = C / q
+                    if not t >= near or (depth[v, u] > 0.0 and t >= depth[v, u]):
+                        continue
+                    ux, uy, uz, uw = t * ax + bx, t * ay + by, t * az + bz, t * aw + bw
+                    if zz == 0.0 and not (0.0 <= uz * uw <= uw * uw):
+                        continue
+                    # Gradient of the quadric, brought to the camera frame by the transposed inverse.
+                    gx = M[0, 0] * ux + M[1, 0] * uy + zz * M[2, 0] * uz - M[3, 0] * uw
+                    gy = M[0, 1] * ux + M[1, 1] * uy + zz * M[2, 1] * uz - M[3, 1] * uw
+                    gz = M[0, 2] * ux + M[1, 2] * uy + zz * M[2, 2] * uz - M[3, 2] * uw
+                    length = math.sqrt(gx * gx + gy * gy + gz * gz)
+                    if length == 0.0:
+                        continue
+                    sign = 1.0 if gx * dx + gy * dy + gz <= 0.0 else -1.0
+                    depth[v, u] = t
+                    label[v, u] = labels[n]
+                    normal[v, u, 0] = sign * gx / length
+                    normal[v, u, 1] = sign * gy / length
+                    normal[v, u, 2] = sign * gz / length

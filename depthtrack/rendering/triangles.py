@@ -1,0 +1,90 @@
+"""A float64 z-buffer for triangle meshes: perspective-correct depth, label and interpolated normal."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.rendering.surface import NEAR, Surface
+
+Array = NDArray[np.float64]
+
+
+def rasterise(
+    camera: Camera,
+    vertices: Array,
+    faces: NDArray[np.int64],
+    vertex_normals: Array,
+    labels: NDArray[np.int64],
+    onto: Surface | None = None,
+) -> Surface:
+    """Render triangles; both sides are seen, and triangles that reach in front of the lens (z < NEAR) are dropped.
+
+    `vertices` (V, 3) metres in the camera frame, `faces` (F, 3), `vertex_normals` (V, 3) of any length, `labels`
+    (F,) written where a face is nearest. With `onto`, that surface is drawn over in place.
+    """
+    surface = Surface.empty(camera) if onto is None else onto
+    _rasterise(
+        np.ascontiguousarray(vertices, dtype=np.float64),
+        np.ascontiguousarray(faces, dtype=np.int64),
+        np.ascontiguousarray(vertex_normals, dtype=np.float64),
+        np.asarray(labels, dtype=np.int16),
+        (camera.fx, camera.fy, camera.cx, camera.cy),
+        surface.depth,
+        surface.label,
+        surface.normal,
+    )
+    return surface
+
+
+@numba.njit(cache=True)
+def _rasterise(
+    vertices: Array,
+    faces: NDArray[np.int64],
+    normals: Array,
+    labels: NDArray[np.int16],
+    intrinsics: tuple[float, float, float, float],
+    depth: Array,
+    label: NDArray[np.int16],
+    normal: Array,
+) -> None:
+    fx, fy, cx, cy = intrinsics
+    near = NEAR
+    height, width = depth.shape
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        za, zb, zc = vertices[a, 2], vertices[b, 2], vertices[c, 2]
+        if min(za, zb, zc) < near:
+            continue
+        ua, va = fx * vertices[a, 0] / za + cx, fy * vertices[a, 1] / za + cy
+        ub, vb = fx * vertices[b, 0] / zb + cx, fy * vertices[b, 1] / zb + cy
+        uc, vc = fx * vertices[c, 0] / zc + cx, fy * vertices[c, 1] / zc + cy
+        area = (ub - ua) * (vc - va) - (uc - ua) * (vb - va)
+        if area == 0.0:
+            continue
+        u0, u1 = max(0, math.ceil(min(ua, ub, uc))), min(width - 1, math.floor(max(ua, ub, uc)))
+        v0, v1 = max(0, math.ceil(min(va, vb, vc))), min(height - 1, math.floor(max(va, vb, vc)))
+        for v in range(v0, v1 + 1):
+            for u in range(u0, u1 + 1):
+                # Barycentric coordinates in the image; inverse depth is linear there.
+                wa = ((ub - u) * (vc - v) - (uc - u) * (vb - v)) / area
+                wb = ((uc - u) * (va - v) - (ua - u) * (vc - v)) / area
+                wc = 1.0 - wa - wb
+                if wa < 0.0 or wb < 0.0 or wc < 0.0:
+                    continue
+                pa, pb, pc = wa / za, wb / zb, wc / zc
+                z = 1.0 / (pa + pb + pc)
+                if depth[v, u] > 0.0 and z >= depth[v, u]:
+                    continue
+                nx = pa * normals[a, 0] + pb * normals[b, 0] + pc * normals[c, 0]
+                ny = pa * normals[a, 1] + pb * normals[b, 1] + pc * normals[c, 1]
+                nz = pa * normals[a, 2] + pb * normals[b, 2] + pc * normals[c, 2]
+                length = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-30)
+                sign = 1.0 if nx * (u - cx) / fx + ny * (v - cy) / fy + nz <= 0.0 else -1.0
+                depth[v, u] = z
+                label[v, u] = labels[f]
+                normal[v, u, 0] = sign * nx / length
+                normal[v, u, 1] = sign * ny / length
+                normal[v, u, 2] = sign * nz / length

@@ -1,0 +1,1 @@
+"""Overlays, videos, contact sheets and viewers."""
