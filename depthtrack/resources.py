@@ -16,5 +16,6 @@ def resource_folder(name: str) -> Path:
         if folder.is_dir():
             return folder
     raise InputError(
-        f"the folder '{name}' of depthtrack is missing beside {_PACKAGE}: reinstall with  pip install --force-reinstall depthtrack"
+        f"the folder '{name}' of depthtrack is missing beside {_PACKAGE}: "
+        "reinstall with  pip install --force-reinstall depthtrack"
     )

@@ -18,12 +18,8 @@ class CommandEntry:
 
 COMMANDS = {
     "info": CommandEntry("depthtrack.cli.info", "tell what a recording holds"),
-    "synth": CommandEntry(
-        "depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"
-    ),
-    "segment": CommandEntry(
-        "depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"
-    ),
+    "synth": CommandEntry("depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"),
+    "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
 }

@@ -20,9 +20,7 @@ JOINT_NAMES = ("wrist", *(f"{finger}_{k}" for finger in FINGERS for k in range(3
 _THUMB_POINTS = ("cmc", "mcp", "ip", "tip")
 _FINGER_POINTS = ("mcp", "pip", "dip", "tip")
 ENDPOINT_NAMES = tuple(
-    f"{finger}_{point}"
-    for finger in FINGERS
-    for point in (_THUMB_POINTS if finger == "thumb" else _FINGER_POINTS)
+    f"{finger}_{point}" for finger in FINGERS for point in (_THUMB_POINTS if finger == "thumb" else _FINGER_POINTS)
 )
 KEYPOINT_NAMES = ("wrist", *ENDPOINT_NAMES)
 """The 21 public keypoints, in MediaPipe's order: the wrist, then thumb to little finger, root to tip."""
@@ -125,7 +123,7 @@ class HandModel:
         for angle in range(20):
             moved = MOVES[bodies, angle]
             arm = points[..., moved, :] - origins[..., None, angle, :]
-            J[..., moved, :, 6 + angle] = np.cross(axes[..., None, angle, :], arm)
+            J[..., 6 + angle][..., moved, :] = np.cross(axes[..., None, angle, :], arm)
         return J
 
     def _axes(self, T: Array) -> tuple[Array, Array]:

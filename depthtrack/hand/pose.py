@@ -18,9 +18,7 @@ ANGLES = slice(7, 27)
 _THUMB_JOINTS = ("cmc_abduction", "cmc_flexion", "mcp_flexion", "ip_flexion")
 _FINGER_JOINTS = ("mcp_abduction", "mcp_flexion", "pip_flexion", "dip_flexion")
 ANGLE_NAMES = tuple(
-    f"{finger}_{joint}"
-    for finger in FINGERS
-    for joint in (_THUMB_JOINTS if finger == "thumb" else _FINGER_JOINTS)
+    f"{finger}_{joint}" for finger in FINGERS for joint in (_THUMB_JOINTS if finger == "thumb" else _FINGER_JOINTS)
 )
 POSE_NAMES = ("x", "y", "z", "qw", "qx", "qy", "qz", *ANGLE_NAMES)
 
@@ -102,6 +100,4 @@ def tangent_between(start: ArrayLike, end: ArrayLike) -> Array:
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     conjugate = a[..., ORIENTATION] * np.array([1.0, -1.0, -1.0, -1.0])
     rotation = quaternion_log(quaternion_product(b[..., ORIENTATION], conjugate))
-    return np.concatenate(
-        [b[..., POSITION] - a[..., POSITION], rotation, b[..., ANGLES] - a[..., ANGLES]], axis=-1
-    )
+    return np.concatenate([b[..., POSITION] - a[..., POSITION], rotation, b[..., ANGLES] - a[..., ANGLES]], axis=-1)

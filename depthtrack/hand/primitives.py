@@ -58,9 +58,7 @@ def _palm(shape: HandShape) -> list[_Part]:
     # The caps reach the wrist and the knuckles' far side; the cylinder spans what lies between their centres.
     bottom, top = -0.36 * shape.palm_length, 0.42 * shape.palm_length
     centre = (shape.bases[1:, 0].max() + shape.bases[1:, 0].min()) / 2
-    cylinder = cone((centre, bottom, 0), top - bottom, 1.0, 1.0) @ np.diag(
-        [half_breadth, half_thickness, 1, 1]
-    )
+    cylinder = cone((centre, bottom, 0), top - bottom, 1.0, 1.0) @ np.diag([half_breadth, half_thickness, 1, 1])
     return [
         ("palm_cylinder", CYLINDER, 0, cylinder),
         (
@@ -84,9 +82,7 @@ def _finger(shape: HandShape, finger: int) -> list[_Part]:
     for k in range(3):
         body = body_of(finger, k)
         parts.append((f"{name}_sphere_{k}", SPHERE, body, sphere(0.0, radii[k])))
-        parts.append(
-            (f"{name}_cone_{k}", CYLINDER, body, cone((0, 0, 0), lengths[k], radii[k], radii[k + 1]))
-        )
+        parts.append((f"{name}_cone_{k}", CYLINDER, body, cone((0, 0, 0), lengths[k], radii[k], radii[k + 1])))
     parts.append((f"{name}_sphere_3", SPHERE, body_of(finger, 2), sphere(lengths[2], radii[3])))
     return parts
 

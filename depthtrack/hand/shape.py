@@ -6,6 +6,7 @@ All sizes are stored for a right hand; a left hand is its mirror image in x.
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self, cast, get_args
@@ -82,9 +83,7 @@ class HandShape:
             object.__setattr__(self, name, array)
             if array.shape != shape or not np.all(np.isfinite(array)):
                 raise InputError(f"hand {name} must be {shape} finite numbers, found shape {array.shape}")
-        sizes = np.concatenate(
-            [self.lengths.ravel(), self.radii.ravel(), [getattr(self, n) for n in _PALM_SIZES]]
-        )
+        sizes = np.concatenate([self.lengths.ravel(), self.radii.ravel(), [getattr(self, n) for n in _PALM_SIZES]])
         if sizes.min() < 1e-4 or sizes.max() > 0.5 or np.abs(self.bases).max() > 0.5:
             raise InputError("hand sizes must lie between 0.1 and 500 mm; is the file in millimetres?")
 
@@ -174,7 +173,7 @@ def _frozen(values: Any) -> NDArray[np.float64]:
     return array
 
 
-def _table(rows_mm: dict[str, tuple[float, ...]]) -> NDArray[np.float64]:
+def _table(rows_mm: Mapping[str, tuple[float, ...]]) -> NDArray[np.float64]:
     return _frozen([np.array(rows_mm[finger]) / 1000 for finger in FINGERS])
 
 

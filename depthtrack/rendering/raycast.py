@@ -30,10 +30,8 @@ def raycast(
     are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn over in place.
     """
     surface = Surface.empty(camera) if onto is None else onto
-    inverses = np.linalg.inv(T_camera_unit)
-    windows = np.array(
-        [_window(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64
-    )
+    inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
+    windows = np.array([_window(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64)
     _cast(
         np.asarray(kinds, dtype=np.int64),
         inverses,

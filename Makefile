@@ -1,0 +1,36 @@
+# Everything happens in one virtual environment, .venv, made here. Needs Python 3.11 or newer, git, and pip's index.
+PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
+	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+
+.PHONY: demo test lint clean
+
+demo: .venv/.ready
+	$(BIN)/depthtrack synth everyday out/everyday --model skin --sensor kinect1 --background room --overwrite
+	$(BIN)/depthtrack info out/everyday
+	$(BIN)/depthtrack segment out/everyday -o out/segmented
+	$(BIN)/depthtrack view out/everyday --sheet out/everyday.png
+	@echo "Look at out/everyday.png, and at the hand found in every frame: out/segmented"
+
+test: .venv/.ready-test lint
+	$(BIN)/python -m pytest
+
+lint: .venv/.ready-test
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf .venv build dist out
+
+.venv/bin/python:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed: install it, or name it with  make PYTHON=/path/to/python" >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+
+.venv/.ready: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+.venv/.ready-test: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf]'
+	@touch $@
