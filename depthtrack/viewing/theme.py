@@ -1,0 +1,25 @@
+"""The look of every picture: colours as RGB, chosen to read on a dark ground and to be told apart by most eyes."""
+
+Rgb = tuple[int, int, int]
+
+BACKGROUND: Rgb = (13, 17, 23)
+SURFACE: Rgb = (24, 30, 40)
+TEXT: Rgb = (230, 237, 243)
+FAINT_TEXT: Rgb = (139, 148, 158)
+
+NO_READING: Rgb = (7, 9, 13)
+"""Depth pixels without a reading: darker than any depth."""
+
+TRUE_MASK: Rgb = (34, 211, 238)
+ESTIMATED_MASK: Rgb = (251, 146, 60)
+
+PALM: Rgb = (226, 232, 240)
+FINGER_COLOURS: dict[str, Rgb] = {
+    "thumb": (251, 113, 133),
+    "index": (251, 191, 36),
+    "middle": (74, 222, 128),
+    "ring": (56, 189, 248),
+    "little": (192, 132, 252),
+}
+OUTLINE: Rgb = (10, 12, 18)
+"""Dark rim around lines and joints, so that they show on bright images too."""

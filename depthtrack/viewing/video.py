@@ -1,0 +1,97 @@
+"""Video files through OpenCV's own encoder, complete or absent."""
+
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+
+QUICK_CODECS = ("avc1", "mp4v")
+"""H.264 where OpenCV brings it (macOS, distributions), else MPEG-4 part 2: fast, plays in every video player."""
+
+WEB_CODECS = ("avc1", "vp09")
+"""H.264, else VP9: plays in browsers too, and takes some thirty times as long to encode."""
+
+
+class VideoWriter:
+    """Context manager that writes RGB images (h, w, 3) uint8 as an mp4 film.
+
+    The size is the first image's, made even as encoders want it; later images must have the same. The file appears
+    under its name when the block ends well; after an exception, or without any image, nothing is left behind.
+    """
+
+    def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] = QUICK_CODECS) -> None:
+        if path.suffix.lower() != ".mp4":
+            raise InputError(f"a video file must end in .mp4, found '{path.name}'")
+        if not path.parent.is_dir():
+            raise InputError(f"the folder {path.parent} for the video does not exist: create it first")
+        if not (np.isfinite(rate) and rate > 0):
+            raise InputError(f"the frame rate of a video must be positive, found {rate!r}")
+        self.path = path
+        self.rate = rate
+        self.codecs = codecs
+        self.frame_count = 0
+        self._aside = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
+        self._shape: tuple[int, ...] = ()
+        self._encoder: cv2.VideoWriter | None = None
+
+    def write(self, image: NDArray[np.uint8]) -> None:
+        """Append one image. Raises InputError when no codec works or the size differs from the first image's."""
+        if self._encoder is None:
+            self._shape = image.shape
+            self._encoder = self._open_encoder(image.shape[1] // 2 * 2, image.shape[0] // 2 * 2)
+        if image.shape != self._shape:
+            raise InputError(f"every image of a video must have the shape {self._shape}, found {image.shape}")
+        height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
+        self._encoder.write(np.ascontiguousarray(image[:height, :width, ::-1]))
+        self.frame_count += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._encoder is not None:
+            self._encoder.release()
+        try:
+            if kind is None and self.frame_count > 0:
+                self._check_complete()
+                os.replace(self._aside, self.path)
+        finally:
+            self._aside.unlink(missing_ok=True)
+
+    def _check_complete(self) -> None:
+        """OpenCV does not tell of a full disk: ask the file how many images it holds."""
+        reader = cv2.VideoCapture(str(self._aside))
+        held = round(reader.get(cv2.CAP_PROP_FRAME_COUNT))
+        reader.release()
+        if held != self.frame_count:
+            raise InputError(
+                f"the video {self.path} holds {held} of {self.frame_count} images: check the free space in {self.path.parent}"
+            )
+
+    def _open_encoder(self, width: int, height: int) -> cv2.VideoWriter:
+        """The first codec that this build of OpenCV can encode."""
+        # FFmpeg complains on stderr about each codec tried in vain; it reads this once, at first use.
+        os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+        level = cv2.utils.logging.getLogLevel()
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            for codec in self.codecs:
+                fourcc = cv2.VideoWriter.fourcc(*codec)
+                encoder = cv2.VideoWriter(str(self._aside), fourcc, self.rate, (width, height))
+                if encoder.isOpened():
+                    return encoder
+                self._aside.unlink(missing_ok=True)
+        finally:
+            cv2.utils.logging.setLogLevel(level)
+        raise InputError(
+            f"this OpenCV ({cv2.__version__}) can encode none of {', '.join(self.codecs)} at {width}x{height}: "
+            "install opencv-python-headless from PyPI, or write a contact sheet instead"
+        )
