@@ -1,8 +1,8 @@
 """What every recording offers, whatever its format: frames one at a time, a camera, ground truth if it has any."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +48,26 @@ class GroundTruth:
         return row if abs(self.timestamps[row] - timestamp) <= tolerance else None
 
 
+OnDamage = Literal["refuse", "skip"]
+"""What iterating does at a frame that cannot be read: raise DamagedFrameError, or count it and go on."""
+
+
+@dataclass(frozen=True)
+class DamagedFrame:
+    """A frame that was skipped: its index and time (seconds) in the recording, and one sentence why."""
+
+    index: int
+    timestamp: float
+    reason: str
+
+
 class Sequence(Protocol):
-    """A recording. Frames stream: each is read when asked for, and memory does not grow with the length."""
+    """A recording. Frames stream: each is read when asked for, and memory does not grow with the length.
+
+    The length counts every frame the recording lists. `sequence[i]` raises DamagedFrameError where frame i cannot be
+    read; iteration raises it too, or skips the frame and notes it in `damaged`, as was chosen at opening. A frame's
+    `index` is its place in the list either way.
+    """
 
     @property
     def name(self) -> str: ...
@@ -63,6 +81,16 @@ class Sequence(Protocol):
     @property
     def ground_truth(self) -> GroundTruth | None: ...
 
+    @property
+    def description(self) -> Mapping[str, Any]:
+        """How the recording was made (sensor, motion, seed, ...), as far as it says; may be empty."""
+        ...
+
+    @property
+    def damaged(self) -> list[DamagedFrame]:
+        """The frames skipped so far, in order."""
+        ...
+
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: int) -> Frame: ...
@@ -71,4 +99,8 @@ class Sequence(Protocol):
 
     def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
         """True silhouette (h, w) of the hand without its forearm, where the recording knows it."""
+        ...
+
+    def exact_depth(self, index: int) -> NDArray[np.float32] | None:
+        """Noise-free depth (h, w) of the whole scene in metres, 0 = none, where the recording knows it."""
         ...

@@ -1,0 +1,210 @@
+"""Writes sequence folders frame by frame: complete or absent, and the same bytes for the same input."""
+
+import json
+import os
+import secrets
+import shutil
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self, TextIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.errors import InputError
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
+from depthtrack.hand.pose import POSE_SIZE
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.folder import EXACT_DEPTH_SCALE
+from depthtrack.recording.images import write_jpeg, write_png
+from depthtrack.recording.truth import HAND_FILE, JOINTS_FILE, JOINTS_HEADER, POSES_FILE, POSES_HEADER
+
+ColourFormat = Literal["jpg", "png"]
+
+
+class SequenceWriter:
+    """Context manager that writes a sequence folder; see `folder` for the layout.
+
+        with SequenceWriter(path, camera, hand=shape, description={"motion": "everyday"}) as writer:
+            for ...:
+                writer.append(timestamp, depth, colour=colour, mask=mask, pose=pose, joints=joints)
+
+    Everything goes into a hidden folder beside `path`, which takes its name when the block ends well and vanishes
+    when it does not. A recording that is there already is refused, or with `overwrite` replaced at that last moment.
+    Images are encoded by `threads` workers; at most a few frames wait in memory. Raises InputError.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        camera: Camera,
+        *,
+        hand: HandShape | None = None,
+        description: Mapping[str, Any] | None = None,
+        colour_format: ColourFormat = "jpg",
+        overwrite: bool = False,
+        threads: int = 2,
+    ) -> None:
+        self._path = Path(path).absolute()
+        self._camera = camera
+        self._hand = hand
+        self._description = dict(description or {})
+        self._colour_format = colour_format
+        self._overwrite = overwrite
+        self._threads = threads
+        self._work = self._path.with_name(f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}")
+        self._tables: dict[str, TextIO] = {}
+        self._annotation: frozenset[str] | None = None
+        self._last_stem: str | None = None
+        self._waiting: deque[Future[None]] = deque()
+
+    def __enter__(self) -> Self:
+        self._check_target()
+        try:
+            self._work.mkdir(parents=True)
+        except OSError as error:
+            raise InputError(f"cannot write to {self._path.parent}: {error.strerror}") from error
+        self._pool = ThreadPoolExecutor(self._threads, thread_name_prefix="encode")
+        return self
+
+    def append(
+        self,
+        timestamp: float,
+        depth: NDArray[np.floating[Any]],
+        *,
+        colour: NDArray[np.uint8] | None = None,
+        mask: NDArray[np.bool_] | None = None,
+        exact_depth: NDArray[np.floating[Any]] | None = None,
+        pose: ArrayLike | None = None,
+        joints: ArrayLike | None = None,
+    ) -> None:
+        """Add a frame; arrays are copied.
+
+        `timestamp` in seconds, kept to the microsecond, must increase. `depth` and `exact_depth` (h, w) metres, 0 or
+        not finite = none; rounded to the camera's depth scale (exact: 0.05 mm), beyond 65535 units none. `colour`
+        (h, w, 3) RGB, `mask` (h, w), `pose` (27,), `joints` (21, 3) metres in the camera frame. Ground truth may be
+        missing from frames, but where there is some it has the same parts.
+        """
+        stem = self._stem(timestamp)
+        self._submit("depth", stem, depth, lambda image: _stored(image, self._camera.depth_scale))
+        if colour is not None:
+            self._submit("rgb", stem, colour, lambda image: image, self._colour_format)
+        if mask is not None:
+            self._submit("hand_mask", stem, mask, lambda image: image.astype(np.uint8) * np.uint8(255))
+        if exact_depth is not None:
+            self._description["exact_depth_scale"] = EXACT_DEPTH_SCALE
+            self._submit("exact_depth", stem, exact_depth, lambda image: _stored(image, EXACT_DEPTH_SCALE))
+        self._write_truth(stem, pose, joints)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._finish()
+        finally:
+            self._pool.shutdown(cancel_futures=True)
+            for table in self._tables.values():
+                table.close()
+            shutil.rmtree(self._work, ignore_errors=True)
+
+    def _check_target(self) -> None:
+        if self._path.is_dir() and not any(self._path.iterdir()):
+            return
+        if not self._path.exists() and not self._path.is_symlink():
+            return
+        if not self._overwrite:
+            raise InputError(f"{self._path} exists already: choose another name, or say that it may be overwritten")
+        # Only what looks like a recording is ever deleted, whatever was typed.
+        if self._path.is_symlink() or not (self._path / "depth.txt").is_file():
+            raise InputError(f"{self._path} is not a sequence folder, so it is not overwritten: choose another name")
+
+    def _stem(self, timestamp: float) -> str:
+        """The timestamp as it stands in every file, which also names the frame's images."""
+        if not np.isfinite(timestamp):
+            raise InputError(f"a frame's timestamp must be finite, found {timestamp}")
+        stem = f"{timestamp:.6f}"
+        if self._last_stem is not None and float(stem) <= float(self._last_stem):
+            raise InputError(f"timestamps must increase by a microsecond or more, found {stem} after {self._last_stem}")
+        self._last_stem = stem
+        return stem
+
+    def _submit(
+        self,
+        kind: str,
+        stem: str,
+        image: NDArray[Any],
+        encode: Callable[[NDArray[Any]], NDArray[Any]],
+        suffix: str = "png",
+    ) -> None:
+        """Hand one image to the workers and list it; waits while they are behind, and raises what they raised."""
+        expected = (*self._camera.shape, 3) if kind == "rgb" else self._camera.shape
+        if image.shape != expected:
+            raise InputError(f"a frame's {kind} must have the camera's shape {expected}, found {image.shape}")
+        folder = self._work / kind
+        folder.mkdir(exist_ok=True)
+        path, image, write = folder / f"{stem}.{suffix}", image.copy(), write_png if suffix == "png" else write_jpeg
+        self._waiting.append(self._pool.submit(lambda: write(path, encode(image))))
+        while len(self._waiting) > 8 * self._threads:
+            self._waiting.popleft().result()
+        if kind in ("depth", "rgb"):
+            self._write_line(f"{kind}.txt", "# timestamp[s] filename", f"{stem} {kind}/{path.name}")
+
+    def _write_truth(self, stem: str, pose: ArrayLike | None, joints: ArrayLike | None) -> None:
+        parts = frozenset(name for name, part in (("pose", pose), ("joints", joints)) if part is not None)
+        if not parts:
+            return
+        if self._annotation not in (None, parts):
+            raise InputError("every annotated frame of a recording must have the same of pose and joints")
+        self._annotation = parts
+        for part, shape, name, header in (
+            (pose, (POSE_SIZE,), POSES_FILE, POSES_HEADER),
+            (joints, (len(KEYPOINT_NAMES), 3), JOINTS_FILE, JOINTS_HEADER),
+        ):
+            if part is None:
+                continue
+            values = np.asarray(part, dtype=np.float64)
+            if values.shape != shape or not np.all(np.isfinite(values)):
+                raise InputError(f"a row of {name} must be {shape} finite numbers, found shape {values.shape}")
+            # repr is the shortest text that reads back as the same float64.
+            self._write_line(name, ",".join(header), ",".join([stem, *map(repr, values.ravel().tolist())]))
+
+    def _write_line(self, name: str, header: str, line: str) -> None:
+        if name not in self._tables:
+            self._tables[name] = (self._work / name).open("w", encoding="utf-8", newline="\n")
+            self._tables[name].write(header + "\n")
+        self._tables[name].write(line + "\n")
+
+    def _finish(self) -> None:
+        """Everything to disk, then the name: until the last step nothing is there, or the old recording is."""
+        if self._last_stem is None:
+            raise InputError(f"no frame was written to {self._path}, and an empty recording is of no use")
+        while self._waiting:
+            self._waiting.popleft().result()
+        for table in self._tables.values():
+            table.close()
+        self._write_text("camera.json", self._camera.to_json())
+        self._write_text("sequence.json", json.dumps(self._description, indent=2) + "\n")
+        if self._hand is not None:
+            self._write_text(HAND_FILE, self._hand.to_json())
+        self._check_target()
+        if self._path.exists():
+            replaced = self._work.with_name(self._work.name + "-replaced")
+            self._path.rename(replaced)
+            self._work.rename(self._path)
+            shutil.rmtree(replaced)
+        else:
+            self._work.rename(self._path)
+
+    def _write_text(self, name: str, text: str) -> None:
+        (self._work / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _stored(depth: NDArray[Any], scale: float) -> NDArray[np.uint16]:
+    """Depth in whole units of `scale` metres, 0 where it is no number or does not fit into 16 bits."""
+    units = np.rint(depth / np.float64(scale))
+    return np.where((units >= 0) & (units <= np.iinfo(np.uint16).max), units, 0).astype(np.uint16)
