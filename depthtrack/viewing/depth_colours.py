@@ -10,7 +10,7 @@ NEAR_LIMIT = 0.1
 """Metres; nearer readings are sensor artefacts and must not stretch a range."""
 
 
-def depth_range(depth: NDArray[np.float32], percent: tuple[float, float] = (1.0, 98.0)) -> tuple[float, float]:
+def depth_range(depth: NDArray[np.float32], percent: tuple[float, float] = (0.2, 98.0)) -> tuple[float, float]:
     """Robust (near, far) in metres of the readings in depth maps of any shape.
 
     Percentiles, so that specks do not count. Without any reading the range is (0.3, 1.5) m, where hands are tracked.

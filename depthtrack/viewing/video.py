@@ -72,9 +72,7 @@ class VideoWriter:
         held = round(reader.get(cv2.CAP_PROP_FRAME_COUNT))
         reader.release()
         if held != self.frame_count:
-            raise InputError(
-                f"the video {self.path} holds {held} of {self.frame_count} images: check the free space in {self.path.parent}"
-            )
+            raise InputError(f"the video {self.path} holds {held} of {self.frame_count} images: is the disk full?")
 
     def _open_encoder(self, width: int, height: int) -> cv2.VideoWriter:
         """The first codec that this build of OpenCV can encode."""

@@ -1,0 +1,80 @@
+"""A wide banner: a few moments of a recording, each seen in colour, as depth, segmented and as a skeleton."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.viewing.depth_colours import depth_range
+from depthtrack.viewing.moments import Moment
+from depthtrack.viewing.panels import Layer, beside, blank, paint, stacked
+from depthtrack.viewing.text import put_text, text_width
+from depthtrack.viewing.theme import FAINT_TEXT
+
+Image = NDArray[np.uint8]
+
+ROWS: tuple[tuple[Layer, str], ...] = (
+    ("colour", "colour"),
+    ("depth", "depth"),
+    ("hand", "hand"),
+    ("skeleton", "skeleton"),
+)
+LABEL_WIDTH = 30
+GAP = 4
+
+
+def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
+    """A banner (h, w, 3) of `width` pixels: a column a moment, a row a view, close on the hand.
+
+    Every moment is seen through a window of the same size, so that sizes compare. Rows with nothing to show are
+    left out. Raises InputError without any moment to show.
+    """
+    moments = list(moments)
+    if not moments:
+        raise InputError("a picture strip needs at least one readable frame")
+    close = _close_on_the_hand(moments)
+    near, far = depth_range(np.stack([moment.frame.depth for moment in close]))
+    side = (width - LABEL_WIDTH - GAP * len(close)) // len(close)
+    rows = [
+        beside([_label(name, side), *(_square(paint(moment, layer, side, near, far), side) for moment in close)], GAP)
+        for layer, name in ROWS
+        if _has(close, layer)
+    ]
+    return stacked(rows, GAP)
+
+
+def _has(moments: Sequence[Moment], layer: Layer) -> bool:
+    match layer:
+        case "colour":
+            return any(moment.frame.colour is not None for moment in moments)
+        case "hand":
+            return any(moment.mask is not None for moment in moments)
+        case "skeleton":
+            return any(moment.keypoints is not None for moment in moments)
+    return True
+
+
+def _close_on_the_hand(moments: Sequence[Moment]) -> list[Moment]:
+    """Square windows of one size around the hand, or around the image's middle where no hand is known."""
+    boxes = [moment.hand_box() for moment in moments]
+    extents = [max(right - left, bottom - top) for left, top, right, bottom in filter(None, boxes)]
+    smallest = min(moments[0].camera.shape)
+    side = min(round(1.2 * max(extents)), smallest) if extents else smallest
+    out = []
+    for moment, box in zip(moments, boxes, strict=True):
+        left, top, right, bottom = box or (0, 0, moment.camera.width, moment.camera.height)
+        out.append(moment.cropped((left + right - side) // 2, (top + bottom - side) // 2, side, side))
+    return out
+
+
+def _square(image: Image, side: int) -> Image:
+    """Rounding may leave a pixel more or less than a square."""
+    return image[:side, :side]
+
+
+def _label(name: str, height: int) -> Image:
+    """The name of a row, written upwards."""
+    bar = blank(height, LABEL_WIDTH)
+    put_text(bar, name, ((height - text_width(name, 16)) // 2, LABEL_WIDTH // 2), 16, FAINT_TEXT)
+    return np.ascontiguousarray(np.rot90(bar))
