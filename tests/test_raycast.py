@@ -63,12 +63,12 @@ def test_cone_hits_lie_on_the_cone(seed: int) -> None:
     along = local[:, 1]
     assert np.all((along >= -1e-9) & (along <= length + 1e-9))
     np.testing.assert_allclose(np.hypot(local[:, 0], local[:, 2]), r0 + (r1 - r0) * along / length, atol=1e-9)
-    # Missed rays: sampled densely, no point of them lies within the solid's wall interval crossing.
+    # Missed rays: sampled densely, none enters the solid through its wall.
     missed = directions(CAMERA)[depth == 0]
     samples = (missed[:, None] * np.linspace(0.2, 1.2, 400)[:, None] - T[:3, 3]) @ T[:3, :3]
     y = samples[..., 1]
     inside = (np.hypot(samples[..., 0], samples[..., 2]) < r0 + (r1 - r0) * y / length) & (y > 0) & (y < length)
-    crosses_wall = (inside[:, 1:] != inside[:, :-1]) & (np.minimum(y[:, 1:], y[:, :-1]) > 0.003)
+    crosses_wall = (inside[:, 1:] & ~inside[:, :-1]) & (np.minimum(y[:, 1:], y[:, :-1]) > 0.003)
     crosses_wall &= np.maximum(y[:, 1:], y[:, :-1]) < length - 0.003
     assert not crosses_wall.any()
 
@@ -79,7 +79,7 @@ def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: 
     """Finely tessellated primitives in our z-buffer come within the tessellation's error of the exact surface."""
     shape = HandShape(scale=scale)
     primitives, pose = Primitives.of(shape), random_pose(seed)
-    pose[:3] = [0, 0, 0.45]
+    pose[:3] = [0, 0, 0.3]
     T = primitives.placed(HandModel(shape).transforms(pose))
     exact = raycast(CAMERA, primitives.kinds, T, primitives.bodies)
     ball = trimesh.creation.icosphere(subdivisions=4)
@@ -92,7 +92,7 @@ def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: 
         surface = rasterise(CAMERA, vertices, mesh.faces, vertices, labels, onto=surface)
     assert surface is not None
     both = (exact.depth > 0) & (surface.depth > 0)
-    assert both.sum() > 150
+    assert both.sum() > 60
     assert np.mean((exact.depth > 0) != (surface.depth > 0)) < 0.01
     assert np.median(np.abs(exact.depth - surface.depth)[both]) < 2e-4
 
@@ -120,6 +120,11 @@ def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
     assert np.all(np.isfinite(depth))
     assert np.all((depth == 0) | (depth >= NEAR))
     assert (depth > 0).any() == (z > -0.3)
+
+
+def test_a_primitive_around_the_lens_shows_nothing() -> None:
+    assert not placed(SPHERE, ellipsoid((0, 0, 0), (0.3, 0.3, 0.3))).any()
+    assert placed(SPHERE, ellipsoid((0, 0, 0.4), (0.3, 0.3, 0.3))).any()
 
 
 def test_drawing_onto_a_surface_keeps_what_is_nearer() -> None:

@@ -26,8 +26,9 @@ def raycast(
 ) -> Surface:
     """Render N unit primitives placed by `T_camera_unit` (N, 4, 4); returns the nearest hit at every pixel centre.
 
-    A hit counts from NEAR onward, inside faces included, so a camera within a primitive sees its far wall. Cylinders
-    are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn over in place.
+    Only faces seen from outside are drawn, from NEAR onward: a primitive that holds the lens shows nothing.
+    Cylinders are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn
+    over in place.
     """
     surface = Surface.empty(camera) if onto is None else onto
     inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
@@ -114,11 +115,10 @@ def _cast(
                     gy = M[0, 1] * ux + M[1, 1] * uy + zz * M[2, 1] * uz - M[3, 1] * uw
                     gz = M[0, 2] * ux + M[1, 2] * uy + zz * M[2, 2] * uz - M[3, 2] * uw
                     length = math.sqrt(gx * gx + gy * gy + gz * gz)
-                    if length == 0.0:
-                        continue
-                    sign = 1.0 if gx * dx + gy * dy + gz <= 0.0 else -1.0
+                    if gx * dx + gy * dy + gz >= 0.0 or length == 0.0:
+                        continue  # the ray leaves the solid here
                     depth[v, u] = t
                     label[v, u] = labels[n]
-                    normal[v, u, 0] = sign * gx / length
-                    normal[v, u, 1] = sign * gy / length
-                    normal[v, u, 2] = sign * gz / length
+                    normal[v, u, 0] = gx / length
+                    normal[v, u, 1] = gy / length
+                    normal[v, u, 2] = gz / length

@@ -1,0 +1,89 @@
+"""The objective of Oikonomidis et al. 2011, Eq. (1) and (2), with a plain float64 evaluation of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.pose import ANGLES
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Constants of Eq. (1) and (2), as in Sec. 2.3; metres.
+
+    `match_depth` d_m: closer depths count as matched. `clamp_depth` d_M: larger differences cost no more.
+    `skin_weight` lambda, `kinematic_weight` lambda_k. The depth term is summed in `depth_unit` (metres a unit):
+    in millimetres, its clamp of 40 is of the size of lambda = 20.
+    """
+
+    match_depth: float = 0.01
+    clamp_depth: float = 0.04
+    skin_weight: float = 20.0
+    kinematic_weight: float = 10.0
+    depth_unit: float = 0.001
+    epsilon: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
+            if not 0 < getattr(self, name) <= 10:
+                raise InputError(f"objective {name} must lie between 0 and 10, found {getattr(self, name)!r}")
+
+    def combine(self, depth: Array, skin: Array, kinematic: Array) -> Array:
+        """Energies of Eq. (1) from the separate terms."""
+        return depth + self.skin_weight * skin + self.kinematic_weight * kinematic
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Energies (B,) of Eq. (1) and what they are made of.
+
+    `depth` (B,): first term of Eq. (2), in `Objective.depth_unit`. `skin` (B,): second term of Eq. (2) before
+    lambda, 0 to 1. `kinematic` (B,): kc of Eq. (1) before lambda_k, radians.
+    """
+
+    energy: Array
+    depth: Array
+    skin: Array
+    kinematic: Array
+
+    @classmethod
+    def of_sums(
+        cls, objective: Objective, poses: ArrayLike, clamped: Array, matched_skin: Array, union: Array
+    ) -> "Terms":
+        """From the sums of Eq. (2): of min(|o_d - r_d|, d_M) in metres, of o_s and r_m, and of o_s or r_m."""
+        depth = clamped / objective.depth_unit / (union + objective.epsilon)
+        # Where neither hand is seen, nothing disagrees: 0 / 0 counts as full agreement.
+        total = matched_skin + union
+        skin = 1 - np.divide(2 * matched_skin, total, out=np.ones_like(total), where=total > 0)
+        kinematic = finger_crossing(poses)
+        return cls(objective.combine(depth, skin, kinematic), depth, skin, kinematic)
+
+
+def finger_crossing(poses: ArrayLike) -> Array:
+    """kc of Eq. (1): how far (radians) adjacent fingers, the thumb excluded, lean across each other; (...,)."""
+    abduction = np.asarray(poses, dtype=np.float64)[..., ANGLES][..., 4::4]
+    phi = abduction[..., :-1] - abduction[..., 1:]
+    return -np.minimum(phi, 0).sum(axis=-1)
+
+
+def evaluate(
+    objective: Objective, skin: NDArray[np.bool_], observed: ArrayLike, rendered: ArrayLike
+) -> tuple[float, float, float]:
+    """Sums of Eq. (2) for one rendered depth map: clamped difference (metres), o_s and r_m, o_s or r_m.
+
+    All maps (h, w); depth in metres, 0 where there is no reading or nothing was drawn. A drawn pixel is matched
+    (r_m) when its depth lies within d_m of the observation, or the observation is missing; absent depth counts
+    as 0 in the difference, so what only one of the two shows costs the full clamp.
+    """
+    o, r = np.asarray(observed, dtype=np.float64), np.asarray(rendered, dtype=np.float64)
+    difference = np.abs(o - r)
+    matched = (r > 0) & ((difference < objective.match_depth) | (o == 0))
+    return (
+        float(np.minimum(difference, objective.clamp_depth).sum()),
+        float(np.sum(skin & matched)),
+        float(np.sum(skin | matched)),
+    )

@@ -1,0 +1,41 @@
+"""The slow truth: every hypothesis through the float64 ray caster and the plain evaluation of Eq. (2)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import Objective, Terms, evaluate
+from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.scorer import ScorerBase, as_batch
+from depthtrack.rendering.target import Target
+
+
+class OracleScorer(ScorerBase):
+    """Reference backend: about a thousand times slower than `raster`, and what it is tested against."""
+
+    name = "oracle"
+
+    def __init__(self, shape: HandShape, objective: Objective | None = None) -> None:
+        self._model, self._primitives = HandModel(shape), Primitives.of(shape)
+        self._objective = objective or Objective()
+
+    def observe(self, target: Target) -> None:
+        self._target = target
+
+    def score(self, poses: ArrayLike) -> NDArray[np.float64]:
+        return self.terms(poses).energy
+
+    def terms(self, poses: ArrayLike) -> Terms:
+        target, batch = self.target, as_batch(poses)
+        sums = [evaluate(self._objective, target.skin, target.depth, self._depth(pose)) for pose in batch]
+        clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
+        return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
+
+    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+        return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)
+
+    def _depth(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+        T = self._primitives.placed(self._model.transforms(pose))
+        return raycast(self.target.camera, self._primitives.kinds, T, self._primitives.bodies).depth

@@ -1,0 +1,82 @@
+"""The scorer: one protocol for every backend that renders hypotheses and compares them with an observation."""
+
+from types import TracebackType
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.hand.pose import POSE_SIZE
+from depthtrack.rendering.objective import Terms
+from depthtrack.rendering.target import Target
+
+
+class Scorer(Protocol):
+    """Scores hand hypotheses against one observation at a time (Oikonomidis et al. 2011, Sec. 2.3).
+
+    Poses are (B, 27); depth is metres. Only faces seen from outside are drawn, from `surface.NEAR` onward: a
+    primitive that holds the lens shows nothing. Backends agree with `oracle` and give the same bits for any
+    number of threads. A scorer is used by one thread at a time and closed when done (or used in a `with`).
+    """
+
+    name: str
+
+    def observe(self, target: Target) -> None:
+        """Set what the next calls score against; its camera is the one hypotheses are seen with."""
+        ...
+
+    def score(self, poses: ArrayLike) -> NDArray[np.float64]:
+        """Energies (B,) of Eq. (1)."""
+        ...
+
+    def terms(self, poses: ArrayLike) -> Terms:
+        """Energies with the separate terms of Eq. (1) and (2)."""
+        ...
+
+    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+        """Depth (h, w) of one hypothesis through the observation's camera, 0 where there is no hand."""
+        ...
+
+    def close(self) -> None:
+        """Free what the backend holds; the scorer cannot be used after."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class ScorerBase:
+    """What backends share: closing by `with`, and the check of poses."""
+
+    _target: Target | None = None
+
+    def close(self) -> None:
+        """Nothing to free unless a backend says otherwise."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def target(self) -> Target:
+        """The observation set by `observe`. Raises RuntimeError before that."""
+        if self._target is None:
+            raise RuntimeError("call observe(target) before scoring or rendering")
+        return self._target
+
+
+def as_batch(poses: ArrayLike) -> NDArray[np.float64]:
+    """Poses as a contiguous (B, 27) float64 array. Raises ValueError for any other shape or non-finite numbers."""
+    batch = np.ascontiguousarray(poses, dtype=np.float64)
+    if batch.ndim != 2 or batch.shape[1] != POSE_SIZE:
+        raise ValueError(f"poses must be (B, {POSE_SIZE}), found {batch.shape}")
+    if not np.all(np.isfinite(batch)):
+        raise ValueError("poses must be finite numbers")
+    return batch
