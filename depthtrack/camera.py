@@ -1,7 +1,6 @@
 """Pinhole cameras. Camera frame: x right, y down, z forward; pixel centres at integer coordinates."""
 
 import json
-import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -96,7 +95,7 @@ class Camera:
         """Read `camera.json`. Raises InputError when it is missing, not JSON, or describes no usable camera."""
         try:
             fields = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"cannot read the camera file {path}: {error}") from error
         return cls.from_dict(fields, str(path))
 
@@ -113,7 +112,7 @@ class Camera:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12  # false for NaN
 
 
 PRESETS: dict[str, Camera] = {
@@ -121,5 +120,7 @@ PRESETS: dict[str, Camera] = {
     "kinect1": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.001),
     "kinect2": Camera(512, 424, 365.5, 365.5, 255.5, 211.5, 0.001),
     "realsense": Camera(640, 480, 475.0, 475.0, 319.5, 239.5, 0.000125),
+    # What the TUM RGB-D benchmark recommends for its registered recordings, and its depth unit of 1/5000 m.
+    "tum": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.0002),
 }
 """Cameras by sensor name, for recordings and synthesis that bring none of their own."""

@@ -134,7 +134,7 @@ class HandShape:
             return cls._from_fields(json.loads(path.read_text(encoding="utf-8")))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-        except (OSError, UnicodeDecodeError, ValueError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"cannot read the hand file {path}: {error}") from error
         except KeyError as error:
             raise InputError(

@@ -7,7 +7,7 @@ hand.json             sizes of the hand                      hand_mask/, exact_d
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -70,17 +70,26 @@ class FolderSequence:
         )
 
     def __iter__(self) -> Iterator[Frame]:
-        for index in range(len(self)):
+        return self.frames(range(len(self)))
+
+    def frames(self, indices: Iterable[int]) -> Iterator[Frame]:
+        """See `Sequence`."""
+        readable, last_error = 0, None
+        for index in indices:
             try:
                 frame = self[index]
             except DamagedFrameError as error:
                 if self._on_damage == "refuse":
-                    raise
+                    raise DamagedFrameError(
+                        f"frame {index}: {error} (--on-damage skip leaves such frames out)"
+                    ) from error
                 self._damaged[index] = DamagedFrame(index, self._depth[index].timestamp, str(error))
-                if len(self._damaged) == len(self):
-                    raise InputError(f"none of the {len(self)} frames can be read; the last: {error}") from error
+                last_error = error
                 continue
+            readable += 1
             yield frame
+        if last_error is not None and not readable:
+            raise InputError(f"{self.folder}: not one frame can be read; the last: {last_error}") from last_error
 
     def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
         """See `Sequence`. Raises DamagedFrameError where the mask is there and cannot be read."""
@@ -139,12 +148,16 @@ def _read_description(folder: Path) -> Mapping[str, Any]:
     if not path.exists():
         return {}
     try:
-        fields = json.loads(read_text(path, _MAX_JSON_BYTES))
+        fields = json.loads(read_text(path, _MAX_JSON_BYTES), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} must be a JSON object that says how the recording was made: {error}") from error
     if not isinstance(fields, dict):
         raise InputError(f"{path} must be a JSON object that says how the recording was made, found {type(fields)}")
     return fields
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"JSON has no {name}")
 
 
 def _exact_depth_scale(description: Mapping[str, Any], folder: Path) -> float:

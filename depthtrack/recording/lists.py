@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from depthtrack.errors import InputError
 
@@ -135,7 +135,9 @@ class _Inside:
 
     def holds(self, name: str) -> bool:
         relative = PurePosixPath(name)
-        if relative.is_absolute() or ".." in relative.parts or "\\" in name or ":" in name or "\0" in name:
+        if relative.is_absolute() or ".." in relative.parts or not name.isprintable():
+            return False
+        if "\\" in name or PureWindowsPath(name).drive:
             return False
         if relative.parent not in self._directories:
             self._directories[relative.parent] = self._leads_inside(relative.parent)

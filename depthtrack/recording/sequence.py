@@ -1,6 +1,6 @@
 """What every recording offers, whatever its format: frames one at a time, a camera, ground truth if it has any."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -30,9 +30,9 @@ class Frame:
 class GroundTruth:
     """What is known about a recording beside its images; each part may be absent.
 
-    `timestamps` (T,) of the annotated frames in seconds; `poses` (T, 27); `joints` (T, 21, 3) keypoints in metres,
-    camera frame, MediaPipe order; `hand` the sizes of the recorded hand. An annotated frame may be missing from the
-    images and the other way round: look a frame up by its timestamp with `at`.
+    `timestamps` (T,) of the annotated frames in seconds, increasing; `poses` (T, 27); `joints` (T, 21, 3) keypoints
+    in metres, camera frame, MediaPipe order; `hand` the sizes of the recorded hand. An annotated frame may be missing
+    from the images and the other way round: look a frame up by its timestamp with `at`.
     """
 
     timestamps: NDArray[np.float64]
@@ -42,10 +42,10 @@ class GroundTruth:
 
     def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
         """Row of the annotation at `timestamp`, or None when none lies within `tolerance` seconds."""
-        if len(self.timestamps) == 0:
-            return None
-        row = int(np.argmin(np.abs(self.timestamps - timestamp)))
-        return row if abs(self.timestamps[row] - timestamp) <= tolerance else None
+        after = int(np.searchsorted(self.timestamps, timestamp))
+        rows = [row for row in (after - 1, after) if 0 <= row < len(self.timestamps)]
+        nearest = min(rows, key=lambda row: abs(self.timestamps[row] - timestamp), default=None)
+        return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
 
 
 OnDamage = Literal["refuse", "skip"]
@@ -96,6 +96,10 @@ class Sequence(Protocol):
     def __getitem__(self, index: int) -> Frame: ...
 
     def __iter__(self) -> Iterator[Frame]: ...
+
+    def frames(self, indices: Iterable[int]) -> Iterator[Frame]:
+        """Iterate over some of the frames only, damage treated alike; raises InputError if none can be read."""
+        ...
 
     def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
         """True silhouette (h, w) of the hand without its forearm, where the recording knows it."""

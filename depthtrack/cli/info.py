@@ -1,0 +1,117 @@
+"""`depthtrack info`: what a recording holds."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from depthtrack.recording.summary import RecordingSummary
+
+
+@dataclass(frozen=True)
+class Command:
+    """Tell what a recording holds: frames, rate, camera, depth range, missing readings, ground truth, damage."""
+
+    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
+    sample: Annotated[int | None, tyro.conf.arg(metavar="FRAMES")] = None
+    """Read only so many frames, evenly spread, where a recording is long; all of them unless given."""
+    json: bool = False
+    """Print JSON, in SI units and radians, instead of text."""
+
+    def run(self) -> None:
+        from dataclasses import asdict
+        from json import dumps
+
+        import numpy as np
+        from tqdm import tqdm
+
+        from depthtrack.recording.summary import summarise
+
+        if self.sample is not None and self.sample < 1:
+            raise InputError(f"--sample must be at least 1 frame, found {self.sample}")
+        sequence = self.recording.open()
+        count = min(len(sequence), self.sample or len(sequence))
+        indices = np.linspace(0, len(sequence) - 1, count).round().astype(int).tolist()
+        summary = summarise(
+            sequence,
+            indices,
+            self.recording.on_damage,
+            # Shown only where people watch, and only when it takes longer than a moment.
+            progress=lambda frames: tqdm(frames, total=count, unit="frame", delay=1, leave=False, disable=None),
+        )
+        print(dumps(asdict(summary), indent=2) if self.json else _text(summary))
+
+
+def _text(summary: "RecordingSummary") -> str:
+    """Aligned lines for people, in the units they think in."""
+    from math import degrees
+
+    camera = summary.camera
+    across, down = (degrees(angle) for angle in summary.field_of_view)
+    rate = "" if summary.rate is None else f" over {summary.duration:.2f} s, {summary.rate:.4g} Hz"
+    of_those_read = "" if summary.frames_read == summary.frames else f" (of {summary.frames_read} read)"
+    rows = [
+        ("recording", [summary.name]),
+        ("frames", [f"{summary.frames}{rate}"]),
+        ("gaps", [f"{gap.length:.3f} s after {gap.after:.3f} s" for gap in summary.gaps] or ["none"]),
+        (
+            "camera",
+            [f"{camera.width}x{camera.height}, fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, cy {camera.cy:g}"],
+        ),
+        ("field of view", [f"{across:.1f} x {down:.1f} degrees"]),
+        ("depth", _depth_lines(summary)),
+        ("no reading", [f"{100 * summary.missing:.1f} % of the pixels"]),
+        ("colour", [f"{summary.colours} frames{of_those_read}" if summary.colours else "none"]),
+        ("ground truth", _truth_lines(summary, of_those_read)),
+        ("made as", [f"{key}: {_value_text(value)}" for key, value in summary.description.items()] or ["not told"]),
+        (
+            "damaged",
+            [f"frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}" for frame in summary.damaged]
+            or ["none"],
+        ),
+    ]
+    return "\n".join(line for label, lines in rows for line in _block(label, lines))
+
+
+def _depth_lines(summary: "RecordingSummary") -> list[str]:
+    unit = f"in steps of {1000 * summary.camera.depth_scale:g} mm"
+    if summary.depth_percentiles is None:
+        return [f"no reading at all; {unit}"]
+    nearest, low, median, high, farthest = summary.depth_percentiles.values()
+    return [
+        f"{nearest:.3f} to {farthest:.3f} m, {unit}",
+        f"median {median:.3f} m, 98 % between {low:.3f} and {high:.3f} m",
+    ]
+
+
+def _truth_lines(summary: "RecordingSummary", of_those_read: str) -> list[str]:
+    lines = [
+        f"{name} in {count} frames{among}"
+        for name, count, among in (
+            ("poses", summary.poses, ""),
+            ("joints", summary.joints, ""),
+            ("hand masks", summary.masks, of_those_read),
+            ("exact depth", summary.exact_depths, of_those_read),
+        )
+        if count
+    ]
+    return [*lines, *([f"hand sizes: {summary.hand}"] if summary.hand else [])] or ["none"]
+
+
+def _block(label: str, lines: list[str], width: int = 15, most: int = 12) -> list[str]:
+    """A label and its lines, indented alike; a long block is cut, and says so."""
+    shown = lines if len(lines) <= most else [*lines[: most - 1], f"... and {len(lines) - most + 1} more"]
+    return [f"{label if i == 0 else '':<{width}}{line}" for i, line in enumerate(shown)]
+
+
+def _value_text(value: object) -> str:
+    """A value of sequence.json on one line, cut short, without characters that could steer a terminal."""
+    from json import dumps
+
+    text = value if isinstance(value, str) else dumps(value, ensure_ascii=False)
+    text = "".join(c if c.isprintable() else " " for c in text)
+    return text if len(text) <= 200 else text[:197] + "..."

@@ -1,0 +1,75 @@
+"""The options of every command that opens a recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from depthtrack.camera import Camera
+    from depthtrack.recording import Sequence
+
+# Written out, because reading them from depthtrack.camera would make `--help` wait for numpy.
+PresetName = Literal["kinect1", "kinect2", "realsense", "tum"]
+Pixels = Annotated[float | None, tyro.conf.arg(metavar="PIXELS")]
+
+
+@dataclass(frozen=True)
+class RecordingOptions:
+    """Which recording to open and, where it brings none of its own, its camera."""
+
+    path: tyro.conf.Positional[Path]
+    """The recording: a sequence folder, or a plain TUM RGB-D folder with a camera given below."""
+    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Camera to use instead of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
+    camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
+    """Nominal camera of a sensor, or of the TUM RGB-D benchmark, to use instead."""
+    fx: Pixels = None
+    """Focal length; replaces the file's or preset's, or makes a camera together with --depth-scale."""
+    fy: Pixels = None
+    """Vertical focal length; the same as --fx unless given."""
+    cx: Pixels = None
+    """Column of the principal point; the image's middle unless given."""
+    cy: Pixels = None
+    """Row of the principal point; the image's middle unless given."""
+    depth_scale: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
+    """Worth of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
+    on_damage: Literal["refuse", "skip"] = "refuse"
+    """At a frame that cannot be read: stop with an error, or skip and count it."""
+
+    def open(self) -> "Sequence":
+        """The recording. Raises InputError."""
+        from depthtrack.recording import open_sequence
+
+        return open_sequence(self.path, self._chosen_camera(), self.on_damage)
+
+    def _chosen_camera(self) -> "Camera | None":
+        """The camera these options describe, or None for the recording's own."""
+        from dataclasses import replace
+
+        from depthtrack.camera import PRESETS, Camera
+        from depthtrack.recording import image_size
+
+        numbers = {
+            "fx": self.fx,
+            "fy": self.fy or self.fx,
+            "cx": self.cx,
+            "cy": self.cy,
+            "depth_scale": self.depth_scale,
+        }
+        given: dict[str, Any] = {name: number for name, number in numbers.items() if number is not None}
+        if self.camera is not None and self.camera_preset is not None:
+            raise InputError("--camera and --camera-preset both name a camera: give one of them")
+        if self.camera is not None:
+            return replace(Camera.from_json(self.camera), **given)
+        if self.camera_preset is not None:
+            return replace(PRESETS[self.camera_preset], **given)
+        if not given:
+            return None
+        if self.fx is None or self.depth_scale is None:
+            raise InputError("a camera from numbers needs --fx and --depth-scale at least (or name a --camera-preset)")
+        width, height = image_size(self.path)
+        return Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given})
