@@ -1,6 +1,6 @@
 """A frame with everything known about it: what pictures and viewers show."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Self, TypeVar
 
@@ -30,13 +30,12 @@ class Moment:
     keypoints: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, sequence: Sequence, index: int, estimate: MaskEstimator | None = None) -> Self:
-        """Frame `index` of a recording; `estimate` is asked for a mask where the recording knows none.
+    def of(cls, sequence: Sequence, frame: Frame, estimate: MaskEstimator | None = None) -> Self:
+        """A frame of a recording; `estimate` is asked for a mask where the recording knows none.
 
-        Raises DamagedFrameError as the recording does.
+        Raises DamagedFrameError where the true mask is there and cannot be read.
         """
-        frame = sequence[index]
-        true_mask = sequence.hand_mask(index)
+        true_mask = sequence.hand_mask(frame.index)
         mask = true_mask if true_mask is not None or estimate is None else estimate(frame)
         return cls(frame, mask, true_mask is not None, true_keypoints(sequence.ground_truth, frame.timestamp))
 
@@ -75,6 +74,17 @@ class Moment:
             self.mask_is_true,
             self.keypoints,
         )
+
+
+def moments(
+    sequence: Sequence, indices: Iterable[int] | None = None, estimate: MaskEstimator | None = None
+) -> Iterator[Moment]:
+    """Moments of a recording, one at a time: of the frames `indices` in that order, or of all.
+
+    Damaged frames are refused or skipped as was chosen when the recording was opened.
+    """
+    for frame in sequence.frames(range(len(sequence)) if indices is None else indices):
+        yield Moment.of(sequence, frame, estimate)
 
 
 def true_keypoints(truth: GroundTruth | None, timestamp: float) -> NDArray[np.float64] | None:

@@ -112,4 +112,4 @@ def _inner_contour(mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
 
 def _line_width(image: NDArray[np.uint8]) -> int:
     """Pixels; a line that looks the same at any resolution."""
-    return max(1, round(image.shape[0] / 300))
+    return max(1, round(image.shape[0] / 160))

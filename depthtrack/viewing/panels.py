@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Sequence
 from depthtrack.viewing.depth_colours import depth_to_rgb
-from depthtrack.viewing.moments import MaskEstimator, Moment, evenly_chosen
+from depthtrack.viewing.moments import MaskEstimator, Moment, evenly_chosen, moments
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, SURFACE, TEXT, TRUE_MASK, Rgb
@@ -55,12 +55,12 @@ def panel(moment: Moment, layers: Iterable[Layer], height: int, near: float, far
 
 def useful_layers(sequence: Sequence, estimate: MaskEstimator | None = None) -> tuple[Layer, ...]:
     """The layers of `panel` that have something to show, judged from a few frames; the same for a whole recording."""
-    moments = [Moment.of(sequence, index) for index in evenly_chosen(len(sequence), 5)]
+    sample = list(moments(sequence, evenly_chosen(len(sequence), 5)))
     shown: dict[Layer, bool] = {
         "depth": True,
-        "colour": any(moment.frame.colour is not None for moment in moments),
-        "mask": estimate is not None or any(moment.mask is not None for moment in moments),
-        "skeleton": any(moment.keypoints is not None for moment in moments),
+        "colour": any(moment.frame.colour is not None for moment in sample),
+        "mask": estimate is not None or any(moment.mask is not None for moment in sample),
+        "skeleton": any(moment.keypoints is not None for moment in sample),
     }
     return tuple(layer for layer, useful in shown.items() if useful)
 
