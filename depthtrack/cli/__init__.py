@@ -50,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output (head, less) went away; what remains cannot be delivered.
         sys.stderr.close()
         return 0
+    except OSError as error:
+        # A full disk, a folder without permission: nothing of ours is wrong, and the reason says what to do.
+        print(f"depthtrack {name}: {error.filename or 'input or output'}: {error.strerror or error}", file=sys.stderr)
+        return 2
     return 0
 
 

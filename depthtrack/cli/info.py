@@ -67,12 +67,11 @@ def _text(summary: "RecordingSummary") -> str:
         ("no reading", [f"{100 * summary.missing:.1f} % of the pixels"]),
         ("colour", [f"{summary.colours} frames{of_those_read}" if summary.colours else "none"]),
         ("ground truth", _truth_lines(summary, of_those_read)),
-        ("made as", [f"{key}: {_value_text(value)}" for key, value in summary.description.items()] or ["not told"]),
         (
-            "damaged",
-            [f"frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}" for frame in summary.damaged]
-            or ["none"],
+            "made as",
+            [f"{_value_text(key)}: {_value_text(value)}" for key, value in summary.description.items()] or ["not told"],
         ),
+        ("damaged", _damage_lines(summary)),
     ]
     return "\n".join(line for label, lines in rows for line in _block(label, lines))
 
@@ -100,6 +99,12 @@ def _truth_lines(summary: "RecordingSummary", of_those_read: str) -> list[str]:
         if count
     ]
     return [*lines, *([f"hand sizes: {summary.hand}"] if summary.hand else [])] or ["none"]
+
+
+def _damage_lines(summary: "RecordingSummary") -> list[str]:
+    frames = [f"frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}" for frame in summary.damaged]
+    count = len({frame.index for frame in summary.damaged})
+    return [f"{count} of {summary.frames} frames", *frames] if frames else ["none"]
 
 
 def _block(label: str, lines: list[str], width: int = 15, most: int = 12) -> list[str]:

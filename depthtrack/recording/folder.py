@@ -7,6 +7,7 @@ hand.json             sizes of the hand                      hand_mask/, exact_d
 """
 
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from depthtrack.camera import Camera
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.recording.images import read_colour, read_depth, read_header, read_mask
-from depthtrack.recording.lists import associate, check_size, is_inside, read_list, read_text
+from depthtrack.recording.lists import associate, check_size, is_inside, read_lines, read_list
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.recording.truth import read_ground_truth
 
@@ -110,7 +111,7 @@ class FolderSequence:
         """The image of another kind that belongs to a depth image, by that image's name."""
         name = f"{kind}/{PurePosixPath(self._depth[index].name).stem}.png"
         path = self.folder / name
-        if not path.exists():
+        if not os.path.lexists(path):
             return None
         if not is_inside(self.folder, name):
             raise DamagedFrameError(f"{path} must lie within the folder of the recording")
@@ -148,7 +149,7 @@ def _read_description(folder: Path) -> Mapping[str, Any]:
     if not path.exists():
         return {}
     try:
-        fields = json.loads(read_text(path, _MAX_JSON_BYTES), parse_constant=_refuse_constant)
+        fields = json.loads("".join(read_lines(path, _MAX_JSON_BYTES)), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} must be a JSON object that says how the recording was made: {error}") from error
     if not isinstance(fields, dict):

@@ -23,6 +23,7 @@ _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8\xff"
 # Start-of-frame markers of JPEG, which carry the size: C0..CF without DHT (C4), JPG (C8) and DAC (CC).
 _JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_JPEG_SCAN = 0xDA
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,8 @@ def read_colour(path: Path, shape: tuple[int, int]) -> NDArray[np.uint8]:
     """RGB (h, w, 3) of a PNG or JPEG. Raises DamagedFrameError."""
     data, _ = _read(path, shape)
     image = _decode(path, data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if image.shape != (*shape, 3):
+        raise DamagedFrameError(f"{path} must decode to 8-bit colour {shape}, found {image.dtype} {image.shape}")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
@@ -158,19 +161,27 @@ def _check_png(path: Path, data: bytes) -> None:
 
 
 def _check_jpeg(path: Path, data: bytes) -> None:
-    """The end mark must follow the last segment; compressed pixels never contain it (ITU T.81, B.1.1.5)."""
-    scan = max((position for _, position in _jpeg_segments(data)), default=0)
-    if data.rfind(b"\xff\xd9") < scan:
+    """The end mark must follow the first scan; compressed pixels never contain it (ITU T.81, sec. B.1.1.5)."""
+    scans = [position for marker, position in _jpeg_segments(data) if marker == _JPEG_SCAN]
+    if not scans or data.rfind(b"\xff\xd9") < scans[0]:
         raise DamagedFrameError(f"{path} is truncated: it ends after {len(data)} bytes, in the middle of the image")
 
 
 def _jpeg_segments(data: bytes) -> list[tuple[int, int]]:
-    """(marker, position of its length field) of the segments up to the first scan."""
+    """(marker, position of its length field) of the segments up to the first scan.
+
+    Stops at anything else than a segment with a length, so that no header can be hidden from this check.
+    """
     segments, position = [], 2
     while position + 4 <= len(data) and data[position] == 0xFF:
         marker = data[position + 1]
+        if marker == 0xFF:  # fill bytes may stand before a marker
+            position += 1
+            continue
+        if marker < 0xC0 or 0xD0 <= marker <= 0xD9:
+            break
         segments.append((marker, position + 2))
-        if marker == 0xDA:
+        if marker == _JPEG_SCAN:
             break
         position += 2 + struct.unpack_from(">H", data, position + 2)[0]
     return segments

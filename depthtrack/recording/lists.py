@@ -6,19 +6,21 @@ Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012,
 import heapq
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from depthtrack.errors import InputError
 
-MAX_TEXT_BYTES = 1 << 28
-"""Largest text file read, in bytes: hours of video, and a bound on what an absurd file can take."""
+MAX_FRAMES = 1_000_000
+"""Most images in one list: nine hours at 30 Hz."""
+MAX_LIST_BYTES = 1 << 26
+"""Largest list file read: room for that many lines, and a bound on what an absurd file can take."""
 MAX_COLOUR_DELAY = 0.02
 """Largest difference of timestamps, in seconds, at which a colour image still belongs to a depth image."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ListedFile:
     """One line of a list: when the image was taken (seconds) and its name within the folder."""
 
@@ -34,7 +36,7 @@ def read_list(folder: Path, list_name: str) -> list[ListedFile]:
     path = folder / list_name
     files: list[ListedFile] = []
     inside = _Inside(folder)
-    for number, line in enumerate(read_text(path).splitlines(), start=1):
+    for number, line in enumerate(read_lines(path, MAX_LIST_BYTES), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         file = _parse(line, f"{path}, line {number}")
@@ -47,17 +49,21 @@ def read_list(folder: Path, list_name: str) -> list[ListedFile]:
             raise InputError(
                 f"{path}, line {number}: the file {file.name!r} must lie within the folder of the recording"
             )
+        if len(files) == MAX_FRAMES:
+            raise InputError(f"{path} lists more than {MAX_FRAMES:,} images: split the recording")
         files.append(file)
     if not files:
         raise InputError(f"{path} lists no image: expected lines of the form 'timestamp filename'")
     return files
 
 
-def read_text(path: Path, largest: int = MAX_TEXT_BYTES) -> str:
-    """A UTF-8 file of at most `largest` bytes. Raises InputError."""
+def read_lines(path: Path, largest: int) -> Iterator[str]:
+    """Lines of a UTF-8 file of at most `largest` bytes, one at a time. Raises InputError."""
     check_size(path, largest)
     try:
-        return path.read_text(encoding="utf-8")
+        # The mark that some spreadsheets put before UTF-8 is no part of the text.
+        with path.open(encoding="utf-8-sig") as file:
+            yield from file
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -141,8 +147,8 @@ class _Inside:
             return False
         if relative.parent not in self._directories:
             self._directories[relative.parent] = self._leads_inside(relative.parent)
-        path = self._folder / relative
-        return self._directories[relative.parent] and (not path.is_symlink() or self._leads_inside(relative))
+        is_link = os.path.islink(self._folder / relative)
+        return self._directories[relative.parent] and (not is_link or self._leads_inside(relative))
 
     def _leads_inside(self, relative: PurePosixPath) -> bool:
         return Path(os.path.realpath(self._folder / relative)).is_relative_to(self._root)

@@ -1,6 +1,7 @@
 """Ground truth beside the images: `hand_poses.csv`, `joints.csv` and `hand.json`."""
 
-import csv
+import math
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.lists import check_size, read_text
+from depthtrack.recording.lists import check_size, read_lines
 from depthtrack.recording.sequence import GroundTruth
 
 POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
+MAX_TABLE_BYTES = 1 << 28
+"""Largest table read: hours of ground truth."""
 POSES_HEADER = ("timestamp", *POSE_NAMES)
 JOINTS_HEADER = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"))
 
@@ -26,7 +29,7 @@ def read_ground_truth(folder: Path) -> GroundTruth | None:
     tables = [table for table in (poses, joints) if table is not None]
     if not tables and hand is None:
         return None
-    if len(tables) == 2 and not np.array_equal(tables[0][:, 0], tables[1][:, 0]):
+    if poses is not None and joints is not None and not _same_times(poses[:, 0], joints[:, 0]):
         raise InputError(f"{folder}: {POSES_FILE} and {JOINTS_FILE} must annotate the same timestamps, line by line")
     if poses is not None:
         lengths = np.linalg.norm(poses[:, 1:][:, ORIENTATION], axis=1)
@@ -44,6 +47,10 @@ def read_ground_truth(folder: Path) -> GroundTruth | None:
     )
 
 
+def _same_times(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    return len(a) == len(b) and bool(np.all(np.abs(a - b) < 1e-6))
+
+
 def _read_hand(path: Path) -> HandShape | None:
     if not path.exists():
         return None
@@ -55,29 +62,36 @@ def _read_table(path: Path, header: tuple[str, ...]) -> NDArray[np.float64] | No
     """Rows (T, len(header)) of a CSV with that header, finite and in order of time; None where the file is absent."""
     if not path.exists():
         return None
-    rows = csv.reader(read_text(path).splitlines())
-    found = tuple(next(rows, []))
-    if found != header:
+    lines = read_lines(path, MAX_TABLE_BYTES)
+    found = next(lines, "").strip().split(",")
+    if tuple(found) != header:
         raise InputError(
             f"{path}: the header must be '{header[0]},{header[1]},...,{header[-1]}', found {_start(found)}"
         )
-    table: list[NDArray[np.float64]] = []
-    for number, row in enumerate(rows, start=2):
-        try:
-            values = np.array(row, dtype=np.float64)
-        except ValueError:
-            values = np.zeros(0)
-        if len(values) != len(header) or not np.all(np.isfinite(values)):
-            raise InputError(
-                f"{path}, line {number}: expected {len(header)} finite numbers, found {_start(tuple(row))}"
-            )
-        if table and values[0] <= table[-1][0]:
-            raise InputError(f"{path}, line {number}: timestamps must increase, found {values[0]} after {table[-1][0]}")
-        table.append(values)
-    if not table:
+    # A flat array of doubles: a list of Python floats would take several times the file's size.
+    values, last = array("d"), -math.inf
+    for number, line in enumerate(lines, start=2):
+        fields = line.strip().split(",")
+        row = _numbers(fields)
+        if len(row) != len(header):
+            raise InputError(f"{path}, line {number}: expected {len(header)} finite numbers, found {_start(fields)}")
+        if row[0] <= last:
+            raise InputError(f"{path}, line {number}: timestamps must increase, found {row[0]} after {last}")
+        values.extend(row)
+        last = row[0]
+    if not values:
         raise InputError(f"{path} holds no row below its header: delete the file if nothing is annotated")
-    return np.array(table)
+    return np.array(values).reshape(-1, len(header))
 
 
-def _start(fields: tuple[str, ...]) -> str:
+def _numbers(fields: list[str]) -> list[float]:
+    """The fields as finite numbers, or nothing when one of them is none."""
+    try:
+        row = [float(text) for text in fields]
+    except ValueError:
+        return []
+    return row if all(map(math.isfinite, row)) else []
+
+
+def _start(fields: list[str]) -> str:
     return f"{len(fields)} fields beginning with {','.join(fields)[:60]!r}"

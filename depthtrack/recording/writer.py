@@ -49,14 +49,15 @@ class SequenceWriter:
         overwrite: bool = False,
         threads: int = 2,
     ) -> None:
-        self._path = Path(path).absolute()
+        self._path = Path(os.path.abspath(path))
         self._camera = camera
         self._hand = hand
         self._description = dict(description or {})
         self._colour_format = colour_format
         self._overwrite = overwrite
         self._threads = threads
-        self._work = self._path.with_name(f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}")
+        self._work = self._path.parent / f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}"
+        json.dumps(self._description, allow_nan=False)  # fail now and not after the last frame
         self._tables: dict[str, TextIO] = {}
         self._annotation: frozenset[str] | None = None
         self._last_stem: str | None = None
@@ -94,7 +95,7 @@ class SequenceWriter:
         if colour is not None:
             self._submit("rgb", stem, colour, lambda image: image, self._colour_format)
         if mask is not None:
-            self._submit("hand_mask", stem, mask, lambda image: image.astype(np.uint8) * np.uint8(255))
+            self._submit("hand_mask", stem, mask, lambda image: (image != 0) * np.uint8(255))
         if exact_depth is not None:
             self._description["exact_depth_scale"] = EXACT_DEPTH_SCALE
             self._submit("exact_depth", stem, exact_depth, lambda image: _stored(image, EXACT_DEPTH_SCALE))
@@ -195,7 +196,11 @@ class SequenceWriter:
         if self._path.exists():
             replaced = self._work.with_name(self._work.name + "-replaced")
             self._path.rename(replaced)
-            self._work.rename(self._path)
+            try:
+                self._work.rename(self._path)
+            except OSError:
+                replaced.rename(self._path)
+                raise
             shutil.rmtree(replaced)
         else:
             self._work.rename(self._path)
