@@ -12,7 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
 from depthtrack.viewing.depth_colours import colour_scale
 from depthtrack.viewing.moments import Moment
-from depthtrack.viewing.panels import GAP, beside, blank, captioned, paint, stacked
+from depthtrack.viewing.panels import beside, blank, captioned, paint, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, TEXT, TRUE_MASK, Rgb
 
@@ -39,13 +39,6 @@ def contact_sheet(
     return framed(stacked(parts, gap=12))
 
 
-def tile_grid(tiles: list[Image], columns: int, gap: int = GAP) -> Image:
-    """Tiles of one size in rows of `columns`, from left to right; the last row is filled up with background."""
-    height, width = tiles[0].shape[:2]
-    filled = tiles + [blank(width, height)] * (-len(tiles) % columns)
-    return stacked((beside(filled[i : i + columns], gap) for i in range(0, len(filled), columns)), gap)
-
-
 def framed(image: Image, margin: int = MARGIN) -> Image:
     """`image` with a margin of background all around."""
     out = blank(image.shape[1] + 2 * margin, image.shape[0] + 2 * margin)
@@ -55,11 +48,15 @@ def framed(image: Image, margin: int = MARGIN) -> Image:
 
 def describe(sequence: Sequence) -> str:
     """Length, duration, rate and size in one line."""
-    times, camera = sequence.timestamps, sequence.camera
-    parts = [f"{len(sequence)} frames", f"{camera.width} x {camera.height}"]
-    if len(times) > 1 and times[-1] > times[0]:
-        parts[1:1] = [f"{times[-1] - times[0]:.1f} s", f"{1 / np.median(np.diff(times)):.0f} Hz"]
-    return "  ·  ".join(parts)
+    times, camera, rate = sequence.timestamps, sequence.camera, frame_rate(sequence)
+    span = [] if rate is None else [f"{times[-1] - times[0]:.1f} s", f"{rate:.0f} Hz"]
+    return "  ·  ".join([f"{len(sequence)} frames", *span, f"{camera.width} x {camera.height}"])
+
+
+def frame_rate(sequence: Sequence) -> float | None:
+    """Frames a second by the usual interval; None for a single frame."""
+    times = sequence.timestamps
+    return float(1 / np.median(np.diff(times))) if len(times) > 1 else None
 
 
 def save_png(image: Image, path: Path) -> None:

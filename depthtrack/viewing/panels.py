@@ -47,10 +47,17 @@ def paint(moment: Moment, layer: Layer, height: int, near: float, far: float) ->
 
 
 def panel(moment: Moment, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
-    """The layers of one moment side by side under their names: a film's picture, or a row of a sheet."""
-    return beside(
-        [captioned(paint(moment, layer, height, near, far), *_layer_caption(layer, moment)) for layer in layers]
-    )
+    """The layers of one moment under their names: a film's picture. Up to three stand side by side, more in two rows.
+
+    Each is `height` pixels high without its caption; the first tells the frame's number and time.
+    """
+    tiles: list[Image] = []
+    for layer in layers:
+        name, remark, accent = _layer_caption(layer, moment)
+        if not tiles:
+            remark = f"frame {moment.frame.index}  ·  {moment.frame.timestamp:.2f} s"
+        tiles.append(captioned(paint(moment, layer, height, near, far), name, remark, accent))
+    return tile_grid(tiles, columns=len(tiles) if len(tiles) <= 3 else -(-len(tiles) // 2))
 
 
 def useful_layers(sequence: Sequence, estimate: MaskEstimator | None = None) -> tuple[Layer, ...]:
@@ -78,6 +85,13 @@ def beside(images: Iterable[Image], gap: int = GAP) -> Image:
 def stacked(images: Iterable[Image], gap: int = GAP) -> Image:
     """Images of one width in a column."""
     return np.concatenate(_with_gaps(list(images), gap, axis=0), axis=0)
+
+
+def tile_grid(tiles: list[Image], columns: int, gap: int = GAP) -> Image:
+    """Tiles of one size in rows of `columns`, from left to right; the last row is filled up with background."""
+    height, width = tiles[0].shape[:2]
+    filled = tiles + [blank(width, height)] * (-len(tiles) % columns)
+    return stacked((beside(filled[i : i + columns], gap) for i in range(0, len(filled), columns)), gap)
 
 
 def captioned(image: Image, left: str, right: str = "", accent: Rgb = TEXT) -> Image:

@@ -55,9 +55,9 @@ class RerunViewer:
         stream.set_time("time", duration=moment.frame.timestamp)
         stream.set_time("frame", sequence=moment.frame.index)
         stream.log(f"{CAMERA}/depth", self._depth_image(moment))
-        stream.log(f"{CAMERA}/depth_picture", _jpeg(rr, depth_to_rgb(moment.frame.depth, *self._range)))
+        stream.log(f"{CAMERA}/depth_picture", _jpeg(rr, depth_to_rgb(moment.frame.depth, *self._range), -9))
         colour = moment.frame.colour
-        self._log_or_clear(f"{CAMERA}/colour", None if colour is None else _jpeg(rr, colour))
+        self._log_or_clear(f"{CAMERA}/colour", None if colour is None else _jpeg(rr, colour, -8))
         self._log_or_clear(f"{CAMERA}/mask", _mask_image(rr, moment))
         self._log_or_clear("world/hand", self._hand_points(moment))
         keypoints = moment.keypoints
@@ -123,7 +123,7 @@ class RerunViewer:
         images = [
             rrb.Spatial2DView(origin=CAMERA, name=name, contents=[f"$origin/{part}" for part in parts])
             for name, parts in (
-                ("colour, hand and true skeleton", ("colour", "mask", "skeleton")),
+                ("hand and true skeleton", ("depth_picture", "colour", "mask", "skeleton")),
                 ("depth", ("depth", "depth_picture", "skeleton")),
             )
         ]
@@ -173,9 +173,10 @@ def _rerun() -> Any:
         raise MissingExtraError("the interactive viewer", "view") from error
 
 
-def _jpeg(rr: Any, image: NDArray[np.uint8]) -> Any:
+def _jpeg(rr: Any, image: NDArray[np.uint8], draw_order: float) -> Any:
+    """A picture over rerun's depth images (order -20) and under its masks (0)."""
     _, data = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 90])
-    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
+    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg", draw_order=draw_order)
 
 
 def _mask_image(rr: Any, moment: Moment) -> Any | None:

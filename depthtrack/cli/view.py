@@ -1,0 +1,176 @@
+"""`depthtrack view`: look at a recording."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from depthtrack.recording import Sequence
+    from depthtrack.viewing.moments import Moment
+    from depthtrack.viewing.rerun_viewer import RerunViewer
+
+INSTALL_HINT = "pip install 'depthtrack[view]'"
+
+
+@dataclass(frozen=True)
+class Command:
+    """Look at a recording: depth, colour, the hand's mask and the true skeleton.
+
+    Opens the interactive viewer where it is installed and there is a screen, and else writes a contact sheet. The
+    options below write files instead; several may be given at once.
+    """
+
+    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
+    sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    """Write a contact sheet: moments evenly chosen from the recording."""
+    strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    """Write a banner close on the hand: a column a moment; colour, depth, hand and skeleton below each other."""
+    video: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mp4")] = None
+    """Write a video of the whole recording."""
+    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
+    """Write a recording for the interactive viewer (rerun FILE.rrd opens it)."""
+    web: bool = False
+    """Serve the interactive viewer to a browser, until interrupted."""
+    frames: Annotated[tuple[int, ...], tyro.conf.arg(metavar="INDEX...")] = ()
+    """Frames to show on sheet and strip, instead of evenly chosen ones."""
+    count: Annotated[int | None, tyro.conf.arg(metavar="MOMENTS")] = None
+    """How many moments to choose: 12 on a sheet and 7 on a strip unless given."""
+    depth_range: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="NEAR FAR")] = None
+    """Metres at the ends of the depth colours; found from the recording unless given."""
+    codec: Literal["quick", "web"] = "quick"
+    """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
+
+    def run(self) -> None:
+        self._check_options()
+        sequence = self.recording.open()
+        near, far = self.depth_range or _depth_range(sequence)
+        if self.sheet is not None:
+            self._write_sheet(sequence, self.sheet, near, far)
+        if self.strip is not None:
+            self._write_strip(sequence, self.strip)
+        if self.video is not None:
+            self._write_video(sequence, self.video, near, far)
+        if self.rrd is not None:
+            _write_rrd(_viewer(sequence, near, far), self.rrd, self._all_moments(sequence))
+        if self.web:
+            self._serve(sequence, near, far)
+        if not (self.sheet or self.strip or self.video or self.rrd or self.web):
+            self._show(sequence, near, far)
+        for frame in sequence.damaged:
+            print(f"skipped frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}")
+
+    def _check_options(self) -> None:
+        if self.count is not None and self.count < 1:
+            raise InputError(f"--count must be at least 1 moment, found {self.count}")
+        if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1]:
+            raise InputError(f"--depth-range must be two growing numbers of metres, found {self.depth_range}")
+
+    def _show(self, sequence: "Sequence", near: float, far: float) -> None:
+        """The interactive viewer, or the next best thing."""
+        reason = _why_no_window()
+        if reason is None:
+            viewer = _viewer(sequence, near, far)
+            viewer.open_window()
+            for moment in self._all_moments(sequence):
+                viewer.log(moment)
+            viewer.close()
+        else:
+            self._write_sheet(sequence, Path(f"{sequence.name}-contact-sheet.png"), near, far)
+            print(reason)
+
+    def _serve(self, sequence: "Sequence", near: float, far: float) -> None:
+        from time import sleep
+
+        viewer = _viewer(sequence, near, far)
+        print(f"the viewer is at {viewer.serve()}  (Ctrl-C ends it)", flush=True)
+        try:
+            for moment in self._all_moments(sequence):
+                viewer.log(moment)
+            while True:
+                sleep(3600)
+        except KeyboardInterrupt:
+            print()
+
+    def _write_sheet(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:
+        from depthtrack.viewing.contact_sheet import contact_sheet, describe, save_png
+
+        moments = self._chosen_moments(sequence, self.count or 12)
+        save_png(contact_sheet(moments, sequence.name, describe(sequence), near, far), path)
+        print(f"wrote the contact sheet {path}")
+
+    def _write_strip(self, sequence: "Sequence", path: Path) -> None:
+        from depthtrack.viewing.contact_sheet import save_png
+        from depthtrack.viewing.strip import strip
+
+        save_png(strip(self._chosen_moments(sequence, self.count or 7)), path)
+        print(f"wrote the strip {path}")
+
+    def _write_video(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:
+        from depthtrack.viewing.contact_sheet import frame_rate
+        from depthtrack.viewing.panels import panel, useful_layers
+        from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, VideoWriter
+
+        layers = useful_layers(sequence)
+        codecs = WEB_CODECS if self.codec == "web" else QUICK_CODECS
+        with VideoWriter(path, frame_rate(sequence) or 30.0, codecs) as writer:
+            for moment in self._all_moments(sequence):
+                writer.write(panel(moment, layers, 360, near, far))
+        print(f"wrote the video {path}: {writer.frame_count} frames")
+
+    def _all_moments(self, sequence: "Sequence") -> "Iterator[Moment]":
+        """Every frame, with a progress bar where people watch."""
+        from tqdm import tqdm
+
+        from depthtrack.viewing.moments import moments
+
+        yield from tqdm(moments(sequence), total=len(sequence), unit="frame", delay=1, leave=False, disable=None)
+
+    def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[Moment]":
+        from depthtrack.viewing.moments import evenly_chosen, moments
+
+        outside = [index for index in self.frames if not 0 <= index < len(sequence)]
+        if outside:
+            raise InputError(f"--frames must be from 0 to {len(sequence) - 1} in {sequence.name}, found {outside[0]}")
+        return moments(sequence, self.frames or evenly_chosen(len(sequence), count))
+
+
+def _depth_range(sequence: "Sequence") -> tuple[float, float]:
+    """Near and far of a few frames spread over the recording, in metres."""
+    import numpy as np
+
+    from depthtrack.viewing.depth_colours import depth_range
+    from depthtrack.viewing.moments import evenly_chosen
+
+    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
+
+
+def _why_no_window() -> str | None:
+    """What keeps the interactive viewer from opening, and what to do; None when nothing does."""
+    import os
+    import sys
+    from importlib.util import find_spec
+
+    if find_spec("rerun") is None:
+        return f"for the interactive viewer:  {INSTALL_HINT}"
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return (
+            "there is no screen for the interactive viewer: --web serves it to a browser, --rrd FILE.rrd saves for it"
+        )
+    return None
+
+
+def _viewer(sequence: "Sequence", near: float, far: float) -> "RerunViewer":
+    from depthtrack.viewing.rerun_viewer import RerunViewer
+
+    return RerunViewer(sequence.name, sequence.camera, near, far)
+
+
+def _write_rrd(viewer: "RerunViewer", path: Path, moments: "Iterable[Moment]") -> None:
+    count = viewer.save(path, moments)
+    print(f"wrote {path}: {count} frames; open it with  rerun {path}")
