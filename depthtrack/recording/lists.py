@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 
 from depthtrack.errors import InputError
 
@@ -132,26 +132,34 @@ def _parse(line: str, where: str) -> ListedFile:
 
 
 class _Inside:
-    """Tells whether a listed name stays within a folder; links are followed, each directory once."""
+    """Tells whether a listed name stays within a folder; links are followed, each directory once.
+
+    Plain strings: a list has one name for every frame, and path objects would take longer than reading it.
+    """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self._folder = str(folder)
         self._root = Path(os.path.realpath(folder))
-        self._directories: dict[PurePosixPath, bool] = {}
+        self._directories: dict[str, bool] = {}
 
     def holds(self, name: str) -> bool:
-        relative = PurePosixPath(name)
-        if relative.is_absolute() or ".." in relative.parts or not name.isprintable():
+        # Backslashes and drive letters lead elsewhere on Windows; names that cannot be printed could steer a terminal.
+        if (
+            name.startswith("/")
+            or name[1:2] == ":"
+            or "\\" in name
+            or ".." in name.split("/")
+            or not name.isprintable()
+        ):
             return False
-        if "\\" in name or PureWindowsPath(name).drive:
-            return False
-        if relative.parent not in self._directories:
-            self._directories[relative.parent] = self._leads_inside(relative.parent)
-        is_link = os.path.islink(self._folder / relative)
-        return self._directories[relative.parent] and (not is_link or self._leads_inside(relative))
+        directory = name.rpartition("/")[0]
+        if directory not in self._directories:
+            self._directories[directory] = self._leads_inside(directory)
+        is_link = os.path.islink(f"{self._folder}/{name}")
+        return self._directories[directory] and (not is_link or self._leads_inside(name))
 
-    def _leads_inside(self, relative: PurePosixPath) -> bool:
-        return Path(os.path.realpath(self._folder / relative)).is_relative_to(self._root)
+    def _leads_inside(self, name: str) -> bool:
+        return Path(os.path.realpath(f"{self._folder}/{name}")).is_relative_to(self._root)
 
 
 def is_inside(folder: Path, name: str) -> bool:

@@ -5,7 +5,7 @@ import os
 import secrets
 import shutil
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -24,6 +24,8 @@ from depthtrack.recording.images import write_jpeg, write_png
 from depthtrack.recording.truth import HAND_FILE, JOINTS_FILE, JOINTS_HEADER, POSES_FILE, POSES_HEADER
 
 ColourFormat = Literal["jpg", "png"]
+_Table = tuple[str, tuple[str, ...]]
+"""File name and header of a table of ground truth."""
 
 
 class SequenceWriter:
@@ -59,7 +61,7 @@ class SequenceWriter:
         self._work = self._path.parent / f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}"
         json.dumps(self._description, allow_nan=False)  # fail now and not after the last frame
         self._tables: dict[str, TextIO] = {}
-        self._annotation: frozenset[str] | None = None
+        self._annotation: set[_Table] | None = None
         self._last_stem: str | None = None
         self._waiting: deque[Future[None]] = deque()
 
@@ -91,15 +93,15 @@ class SequenceWriter:
         missing from frames, but where there is some it has the same parts.
         """
         stem = self._stem(timestamp)
-        self._submit("depth", stem, depth, lambda image: _stored(image, self._camera.depth_scale))
-        if colour is not None:
-            self._submit("rgb", stem, colour, lambda image: image, self._colour_format)
-        if mask is not None:
-            self._submit("hand_mask", stem, mask, lambda image: (image != 0) * np.uint8(255))
-        if exact_depth is not None:
-            self._description["exact_depth_scale"] = EXACT_DEPTH_SCALE
-            self._submit("exact_depth", stem, exact_depth, lambda image: _stored(image, EXACT_DEPTH_SCALE))
-        self._write_truth(stem, pose, joints)
+        images = self._checked_images({"depth": depth, "rgb": colour, "hand_mask": mask, "exact_depth": exact_depth})
+        truth = self._checked_truth(pose, joints)
+        # Nothing is refused from here on: a frame is written whole or not at all.
+        self._last_stem = stem
+        for kind, image in images.items():
+            self._submit(kind, stem, image.copy())
+        for (name, header), values in truth.items():
+            # repr is the shortest text that reads back as the same float64.
+            self._write_line(name, ",".join(header), ",".join([stem, *map(repr, values.ravel().tolist())]))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -131,48 +133,52 @@ class SequenceWriter:
         stem = f"{timestamp:.6f}"
         if self._last_stem is not None and float(stem) <= float(self._last_stem):
             raise InputError(f"timestamps must increase by a microsecond or more, found {stem} after {self._last_stem}")
-        self._last_stem = stem
         return stem
 
-    def _submit(
-        self,
-        kind: str,
-        stem: str,
-        image: NDArray[Any],
-        encode: Callable[[NDArray[Any]], NDArray[Any]],
-        suffix: str = "png",
-    ) -> None:
+    def _checked_images(self, images: dict[str, NDArray[Any] | None]) -> dict[str, NDArray[Any]]:
+        given = {kind: image for kind, image in images.items() if image is not None}
+        for kind, image in given.items():
+            expected = (*self._camera.shape, 3) if kind == "rgb" else self._camera.shape
+            if image.shape != expected:
+                raise InputError(f"a frame's {kind} must have the camera's shape {expected}, found {image.shape}")
+        return given
+
+    def _checked_truth(self, pose: ArrayLike | None, joints: ArrayLike | None) -> dict[_Table, NDArray[np.float64]]:
+        rows: dict[_Table, NDArray[np.float64]] = {}
+        for table, shape, values in (
+            ((POSES_FILE, POSES_HEADER), (POSE_SIZE,), pose),
+            ((JOINTS_FILE, JOINTS_HEADER), (len(KEYPOINT_NAMES), 3), joints),
+        ):
+            if values is None:
+                continue
+            rows[table] = np.asarray(values, dtype=np.float64)
+            if rows[table].shape != shape or not np.all(np.isfinite(rows[table])):
+                raise InputError(f"a row of {table[0]} must be {shape} finite numbers, found shape {rows[table].shape}")
+        if rows and self._annotation is not None and rows.keys() != self._annotation:
+            raise InputError("every annotated frame of a recording must have the same of pose and joints")
+        self._annotation = set(rows) or self._annotation
+        return rows
+
+    def _submit(self, kind: str, stem: str, image: NDArray[Any]) -> None:
         """Hand one image to the workers and list it; waits while they are behind, and raises what they raised."""
-        expected = (*self._camera.shape, 3) if kind == "rgb" else self._camera.shape
-        if image.shape != expected:
-            raise InputError(f"a frame's {kind} must have the camera's shape {expected}, found {image.shape}")
-        folder = self._work / kind
-        folder.mkdir(exist_ok=True)
-        path, image, write = folder / f"{stem}.{suffix}", image.copy(), write_png if suffix == "png" else write_jpeg
-        self._waiting.append(self._pool.submit(lambda: write(path, encode(image))))
+        suffix = self._colour_format if kind == "rgb" else "png"
+        path = self._work / kind / f"{stem}.{suffix}"
+        path.parent.mkdir(exist_ok=True)
+        self._waiting.append(self._pool.submit(self._encode, kind, path, image))
         while len(self._waiting) > 8 * self._threads:
             self._waiting.popleft().result()
         if kind in ("depth", "rgb"):
             self._write_line(f"{kind}.txt", "# timestamp[s] filename", f"{stem} {kind}/{path.name}")
+        if kind == "exact_depth":
+            self._description["exact_depth_scale"] = EXACT_DEPTH_SCALE
 
-    def _write_truth(self, stem: str, pose: ArrayLike | None, joints: ArrayLike | None) -> None:
-        parts = frozenset(name for name, part in (("pose", pose), ("joints", joints)) if part is not None)
-        if not parts:
-            return
-        if self._annotation not in (None, parts):
-            raise InputError("every annotated frame of a recording must have the same of pose and joints")
-        self._annotation = parts
-        for part, shape, name, header in (
-            (pose, (POSE_SIZE,), POSES_FILE, POSES_HEADER),
-            (joints, (len(KEYPOINT_NAMES), 3), JOINTS_FILE, JOINTS_HEADER),
-        ):
-            if part is None:
-                continue
-            values = np.asarray(part, dtype=np.float64)
-            if values.shape != shape or not np.all(np.isfinite(values)):
-                raise InputError(f"a row of {name} must be {shape} finite numbers, found shape {values.shape}")
-            # repr is the shortest text that reads back as the same float64.
-            self._write_line(name, ",".join(header), ",".join([stem, *map(repr, values.ravel().tolist())]))
+    def _encode(self, kind: str, path: Path, image: NDArray[Any]) -> None:
+        if kind == "rgb":
+            (write_jpeg if path.suffix == ".jpg" else write_png)(path, image)
+        elif kind == "hand_mask":
+            write_png(path, (image != 0) * np.uint8(255))
+        else:
+            write_png(path, _stored(image, self._camera.depth_scale if kind == "depth" else EXACT_DEPTH_SCALE))
 
     def _write_line(self, name: str, header: str, line: str) -> None:
         if name not in self._tables:
