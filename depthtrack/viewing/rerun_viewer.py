@@ -2,6 +2,8 @@
 
 import importlib
 import os
+import shutil
+import sysconfig
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, PALM, TRUE_
 
 CAMERA = "world/camera"
 TRUE_CLASS, ESTIMATED_CLASS = 1, 2
+_INSTEAD = "end the viewer that runs already, or write an .rrd file or a contact sheet instead"
 _FLAT_IMAGES = ("colour", "depth_picture", "mask", "skeleton")
 
 
@@ -38,14 +41,24 @@ class RerunViewer:
         self._camera = camera
 
     def open_window(self) -> None:
-        """Start rerun's own window, which goes on after this program ends."""
-        self._stream.spawn(default_blueprint=self._layout())
+        """Start rerun's own window, which goes on after this program ends. Raises InputError where it cannot start."""
+        # The program beside this Python, which is on no PATH unless the virtual environment is activated.
+        program = shutil.which("rerun", path=sysconfig.get_path("scripts"))
+        try:
+            self._rr.spawn(executable_path=program, recording=self._stream, default_blueprint=self._layout())
+        except RuntimeError as error:
+            raise InputError(f"the viewer's window cannot start ({_first_line(error)}): {_INSTEAD}") from error
         self._log_static()
 
     def serve(self, port: int = 9090, open_browser: bool = True) -> str:
-        """Serve the viewer to browsers while this process lives; returns its address."""
-        source = self._stream.serve_grpc(default_blueprint=self._layout())
-        self._rr.serve_web_viewer(web_port=port, open_browser=open_browser, connect_to=source)
+        """Serve the viewer to browsers while this process lives; returns its address. Raises InputError."""
+        try:
+            source = self._stream.serve_grpc(default_blueprint=self._layout())
+            self._rr.serve_web_viewer(web_port=port, open_browser=open_browser, connect_to=source)
+        except RuntimeError as error:
+            raise InputError(
+                f"the viewer cannot be served at port {port} ({_first_line(error)}): {_INSTEAD}"
+            ) from error
         self._log_static()
         return f"http://localhost:{port}/?url={source}"
 
@@ -164,6 +177,10 @@ class RerunViewer:
 
     def _log_or_clear(self, entity: str, content: Any | None) -> None:
         self._stream.log(entity, self._rr.Clear(recursive=False) if content is None else content)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().partition("\n")[0]
 
 
 def _rerun() -> Any:
