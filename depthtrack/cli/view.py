@@ -36,7 +36,7 @@ class Command:
     rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
     """Write a recording for the interactive viewer (rerun FILE.rrd opens it)."""
     web: bool = False
-    """Serve the interactive viewer to a browser, until interrupted."""
+    """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
     frames: Annotated[tuple[int, ...], tyro.conf.arg(metavar="INDEX...")] = ()
     """Frames to show on sheet and strip, instead of evenly chosen ones."""
     count: Annotated[int | None, tyro.conf.arg(metavar="MOMENTS")] = None

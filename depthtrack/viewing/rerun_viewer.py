@@ -3,6 +3,7 @@
 import importlib
 import os
 import shutil
+import socket
 import sysconfig
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,7 +22,6 @@ from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, PALM, TRUE_
 
 CAMERA = "world/camera"
 TRUE_CLASS, ESTIMATED_CLASS = 1, 2
-_INSTEAD = "end the viewer that runs already, or write an .rrd file or a contact sheet instead"
 _FLAT_IMAGES = ("colour", "depth_picture", "mask", "skeleton")
 
 
@@ -47,18 +47,20 @@ class RerunViewer:
         try:
             self._rr.spawn(executable_path=program, recording=self._stream, default_blueprint=self._layout())
         except RuntimeError as error:
-            raise InputError(f"the viewer's window cannot start ({_first_line(error)}): {_INSTEAD}") from error
+            reason = str(error).strip().partition("\n")[0]
+            raise InputError(
+                f"the viewer's window cannot start ({reason}): write an .rrd file or a contact sheet instead"
+            ) from error
         self._log_static()
 
-    def serve(self, port: int = 9090, open_browser: bool = True) -> str:
-        """Serve the viewer to browsers while this process lives; returns its address. Raises InputError."""
-        try:
-            source = self._stream.serve_grpc(default_blueprint=self._layout())
-            self._rr.serve_web_viewer(web_port=port, open_browser=open_browser, connect_to=source)
-        except RuntimeError as error:
-            raise InputError(
-                f"the viewer cannot be served at port {port} ({_first_line(error)}): {_INSTEAD}"
-            ) from error
+    def serve(self, open_browser: bool = True) -> str:
+        """Serve the viewer to browsers while this process lives; returns its address.
+
+        Rerun listens on every network interface: whoever reaches this machine's ports can look on.
+        """
+        port = _free_port(9090)
+        source = self._stream.serve_grpc(grpc_port=_free_port(9876), default_blueprint=self._layout())
+        self._rr.serve_web_viewer(web_port=port, open_browser=open_browser, connect_to=source)
         self._log_static()
         return f"http://localhost:{port}/?url={source}"
 
@@ -179,8 +181,17 @@ class RerunViewer:
         self._stream.log(entity, self._rr.Clear(recursive=False) if content is None else content)
 
 
-def _first_line(error: Exception) -> str:
-    return str(error).strip().partition("\n")[0]
+def _free_port(usual: int) -> int:
+    """The usual port, or any free one where it is taken: rerun only logs that it could not listen."""
+    for port in (usual, 0):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("", port))
+            except OSError:
+                continue
+            return int(probe.getsockname()[1])
+    raise InputError("the viewer cannot be served: no network port is free")
 
 
 def _rerun() -> Any:
