@@ -1,0 +1,76 @@
+"""The hand's primitives as the kernels read them: eight lanes a vector, one finger a lane.
+
+Slots, eight lanes each: four groups of spheres (base joint to fingertip), three of cones (one a phalanx), and one
+general group: palm cylinder, its two caps, the thumb's ellipsoid, and two discs that only bound the cylinder's ends.
+The sizes are read back from the matrices of `hand.primitives`, which stay the one place that defines the model.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import FINGERS
+from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+LANES = 8
+SPHERES, CONES, GENERAL, SLOTS = 0, 32, 56, 64
+"""First slot of each group, and how many slots there are."""
+
+# Rows of the constants: eight lanes each.
+BASE_ROTATION, BASE_POSITION, LENGTH, MIRROR = 0, 9, 12, 15
+SPHERE_RADIUS, TIP_LENGTH, CONE_RADIUS, CONE_SLOPE, CONE_LENGTH = 16, 20, 21, 24, 27
+GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH, IS_THUMB, ROWS = 30, 33, 36, 39, 40, 41
+
+ACTIVE: NDArray[np.int64] = np.array(
+    [GENERAL + k for k in range(4)]
+    + [SPHERES + LANES * k + f for k in range(4) for f in range(5) if (k, f) != (0, 0)]
+    + [CONES + LANES * k + f for k in range(3) for f in range(5) if (k, f) != (0, 0)]
+)
+"""The 37 slots that are drawn; the thumb's first phalanx is an ellipsoid."""
+
+
+def constants(shape: HandShape) -> Array:
+    """Everything about a hand that does not depend on its pose: (ROWS * 8,) float64, metres."""
+    model, primitives = HandModel(shape), Primitives.of(shape)
+    matrix = dict(zip(primitives.names, primitives.T_body_unit, strict=True))
+    rows = np.zeros((ROWS, LANES))
+    rows[BASE_ROTATION : BASE_ROTATION + 9, :5] = model.base_transforms[:, :3, :3].reshape(5, 9).T
+    rows[BASE_POSITION : BASE_POSITION + 3, :5] = model.base_transforms[:, :3, 3].T
+    rows[LENGTH : LENGTH + 3, :5] = model.lengths.T
+    rows[MIRROR] = shape.mirror
+    for lane, finger in enumerate(FINGERS):
+        for k in range(4):
+            if (sphere := matrix.get(f"{finger}_sphere_{k}")) is not None:
+                rows[SPHERE_RADIUS + k, lane] = sphere[0, 0]
+            if (cone := matrix.get(f"{finger}_cone_{k}")) is not None:
+                _read_cone(rows, k, lane, cone)
+        rows[TIP_LENGTH, lane] = matrix[f"{finger}_sphere_3"][1, 3]
+    _read_general(rows, matrix)
+    return rows.ravel()
+
+
+def _read_cone(rows: Array, k: int, lane: int, T: Array) -> None:
+    taper = T[3, 2]  # radius at the start over radius at the end, less one: see primitives.cone
+    length, radius = T[1, 2] / (1 + taper), abs(T[0, 0])
+    rows[CONE_RADIUS + k, lane] = radius
+    rows[CONE_LENGTH + k, lane] = length
+    rows[CONE_SLOPE + k, lane] = (radius - radius / (1 + taper)) / length
+
+
+def _read_general(rows: Array, matrix: dict[str, Array]) -> None:
+    cylinder = matrix["palm_cylinder"]
+    start, length = cylinder[:3, 3], cylinder[1, 2]
+    cross_section = np.array([abs(cylinder[0, 0]), 0.0, abs(cylinder[2, 1])])
+    parts = [(start, cross_section)]
+    for name in ("palm_wrist_cap", "palm_knuckle_cap", "thumb_ellipsoid"):
+        parts.append((matrix[name][:3, 3], np.abs(np.diag(matrix[name])[:3])))
+    parts += [(start, cross_section), (start + [0, length, 0], cross_section)]
+    for lane, (centre, radii) in enumerate(parts):
+        rows[GENERAL_CENTRE : GENERAL_CENTRE + 3, lane] = centre
+        # A radius of 0 marks a direction without end: it drops out of the quadric.
+        rows[GENERAL_INVERSE : GENERAL_INVERSE + 3, lane] = np.divide(1, radii, out=np.zeros(3), where=radii > 0)
+        rows[GENERAL_SQUARE : GENERAL_SQUARE + 3, lane] = radii**2
+    rows[GENERAL_LENGTH, 0] = length
+    rows[IS_THUMB, 3] = 1

@@ -1,0 +1,284 @@
+"""Explicit SIMD for numba kernels: short vectors that behave like numbers.
+
+LLVM's auto-vectoriser gives up on the rasteriser's loops, so their inner lines are written on vectors: a value of
+type `Vector(float32, 16)` is one AVX-512 register (two on AVX2, four on SSE), with the usual operators. All functions
+here exist only inside numba-compiled code.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import intrinsic, lower_builtin, register_model
+
+
+class Vector(types.Type):
+    """`lanes` elements of a numba scalar type; `boolean` elements make a mask."""
+
+    def __init__(self, element: types.Type, lanes: int) -> None:
+        self.element, self.lanes = element, lanes
+        super().__init__(name=f"Vector({element} x {lanes})")
+
+    @property
+    def mask(self) -> "Vector":
+        return Vector(types.boolean, self.lanes)
+
+    def llvm(self) -> ir.Type:
+        return ir.VectorType(_LLVM_ELEMENTS[self.element], self.lanes)
+
+
+_LLVM_ELEMENTS: dict[types.Type, ir.Type] = {
+    types.float32: ir.FloatType(),
+    types.float64: ir.DoubleType(),
+    types.boolean: ir.IntType(1),
+}
+F32X16 = Vector(types.float32, 16)
+F64X8 = Vector(types.float64, 8)
+# Multiply-adds may be fused: the same machine gives the same bits, whatever the number of threads.
+_FLAGS = ("contract", "nsz")
+
+
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, vector: Vector) -> None:
+        super().__init__(manager, vector, vector.llvm())
+
+
+def _element(value: types.Type) -> types.Type | None:
+    return value.element if isinstance(value, Vector) else None
+
+
+def _operands(a: types.Type, b: types.Type) -> Vector | None:
+    """The vector type two operands meet in, where one may be a scalar; None when neither is a float vector."""
+    vector = a if isinstance(a, Vector) else b
+    other = b if vector is a else a
+    if not isinstance(vector, Vector) or vector.element == types.boolean:
+        return None
+    return vector if other == vector or isinstance(other, types.Float | types.Integer) else None
+
+
+def _widen(context: Any, builder: ir.IRBuilder, value: ir.Value, found: types.Type, wanted: Vector) -> ir.Value:
+    if isinstance(found, Vector):
+        return value
+    scalar = context.cast(builder, value, found, wanted.element)
+    single = builder.insert_element(ir.Constant(wanted.llvm(), ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    lanes = ir.Constant(ir.VectorType(ir.IntType(32), wanted.lanes), [0] * wanted.lanes)
+    return builder.shuffle_vector(single, ir.Constant(wanted.llvm(), ir.Undefined), lanes)
+
+
+_Emit = Callable[[ir.IRBuilder, ir.Value, ir.Value], ir.Value]
+
+
+def _widen_all(context: Any, builder: ir.IRBuilder, found: Any, values: Any, wanted: Vector) -> list[ir.Value]:
+    return [_widen(context, builder, value, t, wanted) for value, t in zip(values, found, strict=True)]
+
+
+def _binary(emit: _Emit) -> Any:
+    @intrinsic  # type: ignore[untyped-decorator]
+    def function(typing_context: Any, a: types.Type, b: types.Type) -> Any:
+        vector = _operands(a, b)
+
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+            assert vector is not None
+            return emit(builder, *_widen_all(context, builder, signature.args, arguments, vector))
+
+        return vector and (vector(a, b), generate)
+
+    return function
+
+
+def _operator(symbol: Any, emit: _Emit, compares: bool = False) -> None:
+    """Teach numba an operator on vectors, directly: an @overload would be compiled anew for every use."""
+
+    class Typing(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, arguments: Any, _: Any) -> Any:
+            vector = _operands(*arguments) if len(arguments) == 2 else None
+            return vector and (vector.mask if compares else vector)(*arguments)
+
+    infer_global(symbol)(Typing)
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        vector = _operands(*signature.args)
+        assert vector is not None
+        return emit(builder, *_widen_all(context, builder, signature.args, arguments, vector))
+
+    for a, b in ((Vector, Vector), (Vector, types.Number), (types.Number, Vector)):
+        lower_builtin(symbol, a, b)(generate)
+
+
+_operator(operator.add, lambda builder, a, b: builder.fadd(a, b, flags=_FLAGS))
+_operator(operator.sub, lambda builder, a, b: builder.fsub(a, b, flags=_FLAGS))
+_operator(operator.mul, lambda builder, a, b: builder.fmul(a, b, flags=_FLAGS))
+_operator(operator.truediv, lambda builder, a, b: builder.fdiv(a, b, flags=_FLAGS))
+_operator(operator.gt, lambda builder, a, b: builder.fcmp_ordered(">", a, b), compares=True)
+_operator(operator.lt, lambda builder, a, b: builder.fcmp_ordered("<", a, b), compares=True)
+_operator(operator.ge, lambda builder, a, b: builder.fcmp_ordered(">=", a, b), compares=True)
+
+vmax = _binary(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
+vmin = _binary(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def both(typing_context: Any, a: types.Type, b: types.Type) -> Any:
+    """Lanes set in both masks."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.and_(*arguments)
+
+    return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def either(typing_context: Any, a: types.Type, b: types.Type) -> Any:
+    """Lanes set in one mask or the other."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.or_(*arguments)
+
+    return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def select(typing_context: Any, mask: types.Type, a: types.Type, b: types.Type) -> Any:
+    """Lanes of `a` where the mask is set, of `b` elsewhere; either may be a scalar, not both."""
+    vector = _operands(a, b)
+    if vector is None or _element(mask) != types.boolean:
+        return None
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.select(arguments[0], *_widen_all(context, builder, signature.args[1:], arguments[1:], vector))
+
+    return vector(mask, a, b), generate
+
+
+def _call(builder: ir.IRBuilder, name: str, result: ir.Type, *arguments: ir.Value) -> ir.Value:
+    function = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(result, [argument.type for argument in arguments]), name
+    )
+    return builder.call(function, arguments)
+
+
+def _suffix(vector: Vector) -> str:
+    return f"v{vector.lanes}f{32 if vector.element == types.float32 else 64}"
+
+
+def _unary(name: str) -> Any:
+    @intrinsic  # type: ignore[untyped-decorator]
+    def function(typing_context: Any, a: types.Type) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+            return _call(builder, f"llvm.{name}.{_suffix(a)}", a.llvm(), arguments[0])
+
+        return (a(a), generate) if isinstance(a, Vector) else None
+
+    return function
+
+
+vsqrt = _unary("sqrt")
+vabs = _unary("fabs")
+vfloor = _unary("floor")
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def first(typing_context: Any, a: types.Type) -> Any:
+    """The first lane, a scalar."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.extract_element(arguments[0], ir.Constant(ir.IntType(32), 0))
+
+    return (a.element(a), generate) if isinstance(a, Vector) else None
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def narrow(typing_context: Any, a: types.Type) -> Any:
+    """The same lanes in float32."""
+    if _element(a) != types.float64:
+        return None
+    single = Vector(types.float32, a.lanes)
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.fptrunc(arguments[0], single.llvm())
+
+    return single(a), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def vsum(typing_context: Any, a: types.Type) -> Any:
+    """Sum of the lanes, pairwise: the order is fixed, so the bits are."""
+    if not isinstance(a, Vector):
+        return None
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        value, lanes = arguments[0], a.lanes
+        while lanes > 1:
+            half = lanes // 2
+            undefined = ir.Constant(value.type, ir.Undefined)
+            index = ir.VectorType(ir.IntType(32), half)
+            low = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half))))
+            high = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half, lanes))))
+            value, lanes = builder.fadd(low, high), half
+        return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+
+    return a.element(a), generate
+
+
+def _address(context: Any, builder: ir.IRBuilder, array: Any, value: ir.Value, index: ir.Value, to: ir.Type) -> ir.Value:
+    data = context.make_array(array)(context, builder, value).data
+    return builder.bitcast(builder.gep(data, [index], inbounds=True), to.as_pointer())
+
+
+def loader(vector: Vector) -> Any:
+    """A function `load(array, index)`: lanes of a contiguous 1-d array from any index on, unchecked."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def load(typing_context: Any, array: types.Type, index: types.Type) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+            pointer = _address(context, builder, array, *arguments, vector.llvm())
+            return builder.load(pointer, align=vector.element.bitwidth // 8)
+
+        return vector(array, index), generate
+
+    return load
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def store(typing_context: Any, array: types.Type, index: types.Type, vector: types.Type) -> Any:
+    """Write all lanes into a contiguous 1-d array from any index on, unchecked."""
+    if not isinstance(vector, Vector):
+        return None
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        pointer = _address(context, builder, array, *arguments[:2], vector.llvm())
+        builder.store(arguments[2], pointer, align=vector.element.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(array, index, vector), generate
+
+
+def filler(vector: Vector) -> Any:
+    """A function `fill(scalar)`: the scalar in every lane."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def fill(typing_context: Any, scalar: types.Type) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+            return _widen(context, builder, arguments[0], scalar, vector)
+
+        return vector(scalar), generate
+
+    return fill
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def fetch_add(typing_context: Any, counter: types.Type, amount: types.Type) -> Any:
+    """Add to counter[0] (an int64 array) as one indivisible step and return what it held: hands out work to threads."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        data = context.make_array(counter)(context, builder, arguments[0]).data
+        step = context.cast(builder, arguments[1], amount, types.int64)
+        return builder.atomic_rmw("add", data, step, "monotonic")
+
+    return types.int64(counter, amount), generate
