@@ -99,12 +99,11 @@ def _read(path: Path, shape: tuple[int, int]) -> tuple[bytes, ImageHeader]:
     try:
         if not path.is_file():
             raise DamagedFrameError(f"{path} is missing")
-        with path.open("rb") as file:
-            data = file.read(largest + 1)
+        if path.stat().st_size > largest:
+            raise DamagedFrameError(f"{path} is larger than any image of {width}x{height} pixels can be")
+        data = path.read_bytes()
     except OSError as error:
         raise DamagedFrameError(f"{path} cannot be read: {error.strerror}") from error
-    if len(data) > largest:
-        raise DamagedFrameError(f"{path} is larger than any image of {width}x{height} pixels can be")
     header = _header(path, data)
     if (header.height, header.width) != shape:
         raise DamagedFrameError(
