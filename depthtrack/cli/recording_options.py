@@ -55,7 +55,7 @@ class RecordingOptions:
 
         numbers = {
             "fx": self.fx,
-            "fy": self.fy or self.fx,
+            "fy": self.fx if self.fy is None else self.fy,
             "cx": self.cx,
             "cy": self.cy,
             "depth_scale": self.depth_scale,
