@@ -70,17 +70,18 @@ def draw_skeleton(
     palette = {"palm": PALM, **FINGER_COLOURS, **(colours or {})}
     pixels = camera.project(points)
     out = np.ascontiguousarray(image).copy()
-    for (a, b), part in _far_to_near(points):
-        if np.isfinite(pixels[[a, b]]).all():
-            _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
+    seen = np.isfinite(pixels.sum(axis=-1))
+    for (a, b), part in _far_to_near(points, seen):
+        _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
     return out
 
 
-def _far_to_near(points: NDArray[np.float64]) -> list[tuple[Bone, str]]:
-    """Bones with the part whose colour they take, the farthest first."""
+def _far_to_near(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> list[tuple[Bone, str]]:
+    """Bones with both ends seen, and the part whose colour they take; the farthest first."""
     bones = [(bone, "palm") for bone in PALM_BONES]
     bones += [(bone, finger) for finger, chain in FINGER_BONES.items() for bone in chain]
-    return sorted(bones, key=lambda entry: -float(points[list(entry[0]), 2].sum()))
+    visible = [((a, b), part) for (a, b), part in bones if seen[a] and seen[b]]
+    return sorted(visible, key=lambda entry: -float(points[list(entry[0]), 2].sum()))
 
 
 def _draw_bone(
