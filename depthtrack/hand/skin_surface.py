@@ -1,0 +1,240 @@
+"""The flesh of a hand as an implicit solid: tapered bones blended smoothly, with webs and the muscles of the palm.
+
+Built for a right hand of scale 1 in its rest pose, fingers spread and half bent: there no two fingers touch, and no
+joint is ever far from the posture its skin was made in. Distances are negative inside and exact enough near the
+surface to blend by; metres in the palm frame throughout.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import HandModel, body_of
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+
+_FLEXION = np.radians([(0, 12, 18), (22, 34, 20), (22, 36, 20), (22, 36, 20), (22, 34, 20)])
+_SPREAD = np.radians(10.0)
+
+
+def rest_pose(shape: HandShape) -> Array:
+    """The pose (27,) in which the skin is made, the palm frame being the camera's.
+
+    Neighbouring fingers spread by 10 degrees, or by more where they are too thick to stay clear of each other.
+    """
+    angles = np.zeros((5, 4))
+    angles[:, 1:] = _FLEXION
+    lengths, thick, across = shape.lengths[1:, 0], shape.radii[1:], shape.bases[1:, 0]
+    spread = np.full(3, _SPREAD)
+    for t in (0.5, 1.0):  # halfway along the first phalanx and at its end
+        radius = (1 - t) * thick[:, 0] + t * thick[:, 1]
+        missing = radius[:-1] + radius[1:] + 0.04 * shape.palm_length + across[1:] - across[:-1]
+        sideways = missing / (0.9 * t * (lengths[:-1] + lengths[1:]) / 2)
+        spread = np.maximum(spread, np.arcsin(np.clip(sideways, 0, 0.7)))
+    angles[1:, 0] = [spread[0], 0, -spread[1], -spread[1] - spread[2]]
+    return make_pose(np.zeros(3), (1, 0, 0, 0), angles.ravel())
+
+
+@dataclass(frozen=True)
+class Cone:
+    """A tapered capsule from `start` to `end` (3,), with its radius at either end."""
+
+    start: Array
+    end: Array
+    radius_start: float
+    radius_end: float
+
+    def distance(self, points: Array) -> Array:
+        """(N,) of points (N, 3); measured across the axis, as the cones of the primitive model are."""
+        axis = self.end - self.start
+        t = np.clip((points - self.start) @ (axis / (axis @ axis + 1e-18)), 0, 1)
+        across = points - self.start - t[:, None] * axis
+        return np.sqrt(np.einsum("ij,ij->i", across, across)) - (
+            self.radius_start + t * (self.radius_end - self.radius_start)
+        )
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A web: strands from one edge to another, side by side, thinning towards the far end.
+
+    `one` and `other` (2, 3) are the near and the far end of either edge; `radius_near` and `radius_far` half the
+    thickness there.
+    """
+
+    one: Array
+    other: Array
+    radius_near: float
+    radius_far: float
+
+    def distance(self, points: Array) -> Array:
+        """(N,) of points (N, 3), measured to the strand they lie beside."""
+        near, far = (self.one + self.other) / 2
+        along = far - near
+        t = np.clip((points - near) @ (along / (along @ along + 1e-18)), 0, 1)[:, None]
+        start, end = (edge[0] + t * (edge[1] - edge[0]) for edge in (self.one, self.other))
+        strand = end - start
+        s = np.einsum("ij,ij->i", points - start, strand) / np.maximum(np.einsum("ij,ij->i", strand, strand), 1e-18)
+        across = points - start - np.clip(s, 0, 1)[:, None] * strand
+        radius = self.radius_near + t[:, 0] * (self.radius_far - self.radius_near)
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", across, across)) - radius)
+
+
+def smooth_min(a: Array, b: Array, k: float) -> Array:
+    """Union of two solids with a fillet about `k` metres wide; bulges by at most k / 4."""
+    h = np.maximum(k - np.abs(a - b), 0) / k
+    return np.minimum(a, b) - h * h * k / 4
+
+
+@dataclass(frozen=True)
+class Flesh:
+    """The solid hand at rest. `bones` (16, 4, 4) are the rest transforms, T_palm_body."""
+
+    shape: HandShape
+    bones: Array
+    fingers: tuple[tuple[Cone, ...], ...]
+    palm: tuple[Cone, ...]
+    muscles: tuple[Cone, ...]
+    webs: tuple[Sheet, ...]
+
+    @classmethod
+    def of(cls, shape: HandShape) -> Self:
+        """The flesh of a right hand of scale 1 with the sizes of `shape`."""
+        shape = shape.with_(side="right", scale=1.0)
+        bones = HandModel(shape).transforms(rest_pose(shape))
+        fingers = tuple(tuple(_finger(shape, bones, finger)) for finger in range(5))
+        return cls(
+            shape, bones, fingers, tuple(_palm(shape)), tuple(_muscles(shape, bones)), tuple(_webs(shape, bones))
+        )
+
+    def distance(self, points: Array) -> Array:
+        """Signed distance (N,) of points (N, 3) to the skin."""
+        unit = self.shape.palm_length
+        body = self.palm_distance(points)
+        for muscle in self.muscles:
+            body = smooth_min(body, muscle.distance(points), 0.12 * unit)
+        for web in self.webs:
+            body = smooth_min(body, web.distance(points), 0.07 * unit)
+        body = -smooth_min(-body, points[:, 1] - self.shape.wrist[1] + 0.02 * unit, 0.14 * unit)
+        # Each finger grows out of the hand by itself, so that neighbours never melt into each other.
+        fingers = [
+            smooth_min(body, self.finger_distance(points, finger), (0.12 if finger == 0 else 0.05) * unit)
+            for finger in range(5)
+        ]
+        return np.minimum.reduce(fingers)
+
+    def finger_distance(self, points: Array, finger: int) -> Array:
+        """Signed distance (N,) to one finger alone."""
+        first, *others = (cone.distance(points) for cone in self.fingers[finger])
+        for other in others:
+            first = smooth_min(first, other, 0.25 * self.shape.radii[finger, 3])
+        return first
+
+    def palm_distance(self, points: Array) -> Array:
+        """Signed distance (N,) to the palm without its muscles and webs."""
+        first, *others = (cone.distance(points) for cone in self.palm)
+        for other in others:
+            first = smooth_min(first, other, 0.12 * self.shape.palm_length)
+        return first
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Corners of a box that holds the hand."""
+        # The palm's cones run on below the wrist, where they are cut off.
+        whole = [*self.muscles, *(cone for finger in self.fingers for cone in finger)]
+        low, high = _box([*whole, *self.palm])
+        low[1] = min(_box(whole)[0][1], self.shape.wrist[1])
+        margin = 0.1 * self.shape.palm_length
+        return low - margin, high + margin
+
+
+def _box(cones: list[Cone]) -> tuple[Array, Array]:
+    ends = np.array([end for cone in cones for end in (cone.start, cone.end)])
+    radii = np.array([radius for cone in cones for radius in (cone.radius_start, cone.radius_end)])[:, None]
+    return (ends - radii).min(axis=0), (ends + radii).max(axis=0)
+
+
+def _finger(shape: HandShape, bones: Array, finger: int) -> list[Cone]:
+    cones = []
+    for k in range(3):
+        T = bones[body_of(finger, k)]
+        r0, r1 = shape.radii[finger, k], shape.radii[finger, k + 1]
+        length = shape.lengths[finger, k]
+        if k == 2:
+            length = max(length - r1, 1e-4)
+        cones.append(_cone(T, (0, 0, 0), (0, length, 0), r0, r1))
+        if (finger, k) != (0, 0):
+            # The pad: flesh on the palmar side between the joints.
+            pad = 0.9 * min(r0, r1)
+            cones.append(
+                _cone(T, (0, 0.4 * length, 0.22 * r0), (0, (0.65 if k < 2 else 0.9) * length, 0.2 * r1), pad, pad)
+            )
+    return cones
+
+
+def _palm(shape: HandShape) -> list[Cone]:
+    wrist, half = shape.wrist, shape.palm_thickness / 2
+    knuckles, radii = shape.bases[1:], shape.radii[1:, 0]
+    # The outer knuckles' flesh reaches the breadth of the palm.
+    left, right = knuckles[3, 0] - radii[3], knuckles[0, 0] + radii[0]
+    middle = (left + right) / 2
+    stretch = shape.palm_breadth / (right - left)
+    cones = []
+    wrist_radius = shape.wrist_thickness / 2
+    spread = max(shape.wrist_breadth / 2 - wrist_radius, 0)
+    for knuckle, radius, side in zip(knuckles, radii, (1.0, 0.35, -0.35, -1.0), strict=True):
+        head = knuckle + np.array([(knuckle[0] - middle) * (stretch - 1), 0, 0])
+        root = wrist + np.array([side * spread, 0.1 * shape.palm_length, 0])
+        waist = 0.45 * root + 0.55 * head
+        thick = 0.55 * half + 0.45 * radius
+        cones += [Cone(root, waist, 0.9 * wrist_radius, thick), Cone(waist, head, thick, 0.92 * radius)]
+    for side in (-1.0, 1.0):
+        end = wrist + np.array([side * spread, 0, 0])
+        cones.append(Cone(end - np.array([0, shape.palm_length / 4, 0]), end, wrist_radius, wrist_radius))
+    return cones
+
+
+def _muscles(shape: HandShape, bones: Array) -> list[Cone]:
+    unit, thick = shape.palm_length, shape.palm_thickness
+    thumb, length = bones[body_of(0, 0)], shape.lengths[0, 0]
+    little = shape.bases[4]
+    wrist = shape.wrist
+    carpus = wrist + np.array([0.06 * unit, 0.17 * unit, 0.25 * thick])
+    thenar = Cone(carpus, _at(thumb, (-0.1 * length, 0.62 * length, 0.1 * length)), 0.42 * thick, 0.36 * thick)
+    heel = np.array([0.55 * little[0], wrist[1] + 0.16 * unit, 0.22 * thick])
+    edge = np.array([0.98 * little[0], little[1] - 0.2 * unit, 0.12 * thick])
+    hypothenar = Cone(heel, edge, 0.42 * thick, 0.3 * thick)
+    return [thenar, hypothenar]
+
+
+def _webs(shape: HandShape, bones: Array) -> list[Sheet]:
+    webs = []
+    for finger in range(1, 4):
+        radius = float(shape.radii[finger : finger + 2, 0].mean())
+        # From behind the knuckles to a third of the first phalanges, a little to the palmar side.
+        one, other = (
+            np.stack([_at(bones[body_of(f, 0)], (0, t * shape.lengths[f, 0], 0.25 * radius)) for t in (-0.25, 0.33)])
+            for f in (finger, finger + 1)
+        )
+        webs.append(Sheet(one, other, 0.6 * radius, 0.42 * radius))
+    # Between thumb and index, the fold spans from metacarpal to metacarpal.
+    length, knuckle, carpus = (
+        shape.lengths[0, 0],
+        shape.bases[1],
+        shape.wrist + np.array([0.1, 0.15, 0]) * shape.palm_length,
+    )
+    thumb = np.stack([_at(bones[body_of(0, 0)], (0, t * length, 0)) for t in (0.35, 0.85)])
+    index = np.stack([carpus + t * (knuckle - carpus) for t in (0.4, 0.75)])
+    radius = 0.5 * float(shape.radii[1, 0])
+    return [*webs, Sheet(thumb, index, radius, radius)]
+
+
+def _cone(T: Array, start: tuple[float, ...], end: tuple[float, ...], radius_start: float, radius_end: float) -> Cone:
+    return Cone(_at(T, start), _at(T, end), float(radius_start), float(radius_end))
+
+
+def _at(T: Array, point: tuple[float, ...]) -> Array:
+    return np.asarray(T[:3, :3] @ np.array(point) + T[:3, 3])
