@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from depthtrack.cli import main
 from depthtrack.errors import InputError
@@ -107,6 +109,15 @@ REFUSALS: dict[str, tuple[Change, str]] = {
 }
 
 
+def problem_of(folder: Path) -> str:
+    """What opening and reading a recording is refused with; nothing where it is not."""
+    try:
+        list(open_sequence(folder, on_damage="skip"))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 @pytest.mark.parametrize("name", REFUSALS)
 def test_an_unusable_folder_gives_one_sentence_and_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
@@ -124,6 +135,23 @@ def test_an_unusable_folder_gives_one_sentence_and_code_2(
     assert said.err.count("\n") == 1
     assert "Traceback" not in said.err
     assert str(folder) in said.err
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_any_change_of_a_text_file_gives_a_recording_or_one_sentence(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    folder = write_sample(tmp_path_factory.mktemp("changed") / "sample")
+    path = data.draw(st.sampled_from(sorted(path for path in folder.iterdir() if path.is_file())))
+    content = path.read_bytes()
+    start = data.draw(st.integers(0, len(content)))
+    end = data.draw(st.integers(start, min(len(content), start + 20)))
+    inserted = data.draw(
+        st.binary(max_size=6) | st.sampled_from([b"nan", b"1e999", b"../", b"null", b"{", b"\n", b","])
+    )
+    path.write_bytes(content[:start] + inserted + content[end:])
+    assert "\n" not in problem_of(folder)
 
 
 def test_absurdly_long_files_are_refused_before_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

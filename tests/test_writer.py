@@ -198,6 +198,8 @@ def test_an_empty_folder_is_filled(tmp_path: Path) -> None:
         ({"joints": joints_at(0)}, "the same of pose and joints"),
         ({"pose": np.full(27, np.nan)}, "finite numbers"),
         ({"pose": np.zeros(26)}, "finite numbers"),
+        ({"pose": np.full(27, 0.1)}, "quaternion must have length 1"),
+        ({"colour": np.zeros((*CAMERA.shape, 3))}, "must be 8-bit RGB"),
     ],
 )
 def test_unusable_frames_are_refused(tmp_path: Path, arguments: dict[str, Any], message: str) -> None:

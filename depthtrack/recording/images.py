@@ -1,7 +1,8 @@
 """The images of a sequence folder, one at a time: PNG and JPEG, checked before anything is decoded.
 
 A header may claim any size, so the claim is held to the camera's size before the decoder may reserve memory, and a
-PNG's checksums are verified so that a damaged image is an error and never a slightly wrong one.
+PNG's checksums are verified so that damaged depth is an error and never a slightly wrong image. JPEG has no checksum:
+there a missing end is noticed, a changed byte may not be.
 """
 
 import struct

@@ -15,6 +15,8 @@ from depthtrack.recording.lists import check_size, read_lines
 from depthtrack.recording.sequence import GroundTruth
 
 POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
+QUATERNION_TOLERANCE = 1e-3
+"""How far from 1 the length of a pose's quaternion may be: what rounding to a few digits does."""
 MAX_TABLE_BYTES = 1 << 28
 """Largest table read: hours of ground truth."""
 POSES_HEADER = ("timestamp", *POSE_NAMES)
@@ -33,7 +35,7 @@ def read_ground_truth(folder: Path) -> GroundTruth | None:
         raise InputError(f"{folder}: {POSES_FILE} and {JOINTS_FILE} must annotate the same timestamps, line by line")
     if poses is not None:
         lengths = np.linalg.norm(poses[:, 1:][:, ORIENTATION], axis=1)
-        if np.any(np.abs(lengths - 1) > 1e-3):
+        if np.any(np.abs(lengths - 1) > QUATERNION_TOLERANCE):
             worst = int(np.argmax(np.abs(lengths - 1)))
             raise InputError(
                 f"{folder / POSES_FILE}: quaternions (qw, qx, qy, qz) must have length 1, found {lengths[worst]:.4g}"

@@ -17,11 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
-from depthtrack.hand.pose import POSE_SIZE
+from depthtrack.hand.pose import ORIENTATION, POSE_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.folder import EXACT_DEPTH_SCALE
 from depthtrack.recording.images import write_jpeg, write_png
-from depthtrack.recording.truth import HAND_FILE, JOINTS_FILE, JOINTS_HEADER, POSES_FILE, POSES_HEADER
+from depthtrack.recording.truth import (
+    HAND_FILE,
+    JOINTS_FILE,
+    JOINTS_HEADER,
+    POSES_FILE,
+    POSES_HEADER,
+    QUATERNION_TOLERANCE,
+)
 
 ColourFormat = Literal["jpg", "png"]
 _Table = tuple[str, tuple[str, ...]]
@@ -141,6 +148,8 @@ class SequenceWriter:
             expected = (*self._camera.shape, 3) if kind == "rgb" else self._camera.shape
             if image.shape != expected:
                 raise InputError(f"a frame's {kind} must have the camera's shape {expected}, found {image.shape}")
+            if kind == "rgb" and image.dtype != np.uint8:
+                raise InputError(f"a frame's colour must be 8-bit RGB, found {image.dtype}")
         return given
 
     def _checked_truth(self, pose: ArrayLike | None, joints: ArrayLike | None) -> dict[_Table, NDArray[np.float64]]:
@@ -154,6 +163,8 @@ class SequenceWriter:
             rows[table] = np.asarray(values, dtype=np.float64)
             if rows[table].shape != shape or not np.all(np.isfinite(rows[table])):
                 raise InputError(f"a row of {table[0]} must be {shape} finite numbers, found shape {rows[table].shape}")
+        if pose is not None and abs(np.linalg.norm(np.asarray(pose)[ORIENTATION]) - 1) > QUATERNION_TOLERANCE:
+            raise InputError("a pose's quaternion must have length 1: normalise it first")
         if rows and self._annotation is not None and rows.keys() != self._annotation:
             raise InputError("every annotated frame of a recording must have the same of pose and joints")
         self._annotation = set(rows) or self._annotation
