@@ -68,7 +68,7 @@ class Command:
     def _check_options(self) -> None:
         if self.count is not None and self.count < 1:
             raise InputError(f"--count must be at least 1 moment, found {self.count}")
-        if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1]:
+        if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1] < float("inf"):
             raise InputError(f"--depth-range must be two growing numbers of metres, found {self.depth_range}")
 
     def _show(self, sequence: "Sequence", near: float, far: float) -> None:

@@ -94,12 +94,14 @@ class RerunViewer:
         aside = path.with_name(f".{path.stem}.{os.getpid()}.rrd")
         count = 0
         try:
-            self._stream.save(aside, default_blueprint=self._layout())
-            self._log_static()
-            for moment in moments:
-                self.log(moment)
-                count += 1
-            self.close()
+            try:
+                self._stream.save(aside, default_blueprint=self._layout())
+                self._log_static()
+                for moment in moments:
+                    self.log(moment)
+                    count += 1
+            finally:
+                self.close()
             os.replace(aside, path)
         finally:
             aside.unlink(missing_ok=True)
@@ -173,7 +175,7 @@ class RerunViewer:
         v, u = np.nonzero(moment.mask & (depth > 0))
         colours = moment.frame.colour if moment.frame.colour is not None else depth_to_rgb(depth, *self._range)
         points = moment.camera.unproject(np.stack([u, v], axis=-1), depth[v, u])
-        # A pixel's width each, which covers the grey points of the depth image below them.
+        # A pixel's width each, which covers the points of the depth image at the same places.
         radii = points[:, 2] / moment.camera.fx
         return self._rr.Points3D(points.astype(np.float32), colors=colours[v, u], radii=radii)
 

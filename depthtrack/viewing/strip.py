@@ -34,7 +34,7 @@ def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
     if not moments:
         raise InputError("a picture strip needs at least one readable frame")
     close = _close_on_the_hand(moments)
-    near, far = depth_range(np.stack([moment.frame.depth for moment in close]))
+    near, far = _range_of_the_hand(close)
     side = (width - LABEL_WIDTH - GAP * len(close)) // len(close)
     rows = [
         beside([_label(name, side), *(_square(paint(moment, layer, side, near, far), side) for moment in close)], GAP)
@@ -66,6 +66,15 @@ def _close_on_the_hand(moments: Sequence[Moment]) -> list[Moment]:
         left, top, right, bottom = box or (0, 0, moment.camera.width, moment.camera.height)
         out.append(moment.cropped((left + right - side) // 2, (top + bottom - side) // 2, side, side))
     return out
+
+
+def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
+    """Near and far (metres) that give the hand most of the colours; of everything where no silhouette is known."""
+    hands = [moment.frame.depth[moment.mask] for moment in moments if moment.mask is not None]
+    if not hands:
+        return depth_range(np.stack([moment.frame.depth for moment in moments]))
+    near, far = depth_range(np.concatenate(hands))
+    return near, far + 0.25 * (far - near)
 
 
 def _square(image: Image, side: int) -> Image:
