@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +38,9 @@ def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
     near, far = _range_of_the_hand(close)
     side = (width - LABEL_WIDTH - GAP * len(close)) // len(close)
     rows = [
-        beside([_label(name, side), *(_square(paint(moment, layer, side, near, far), side) for moment in close)], GAP)
+        beside(
+            [_label(name, side), *(_smooth(paint(moment, layer, 2 * side, near, far), side) for moment in close)], GAP
+        )
         for layer, name in ROWS
         if _has(close, layer)
     ]
@@ -77,9 +80,9 @@ def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
     return near, far + 0.25 * (far - near)
 
 
-def _square(image: Image, side: int) -> Image:
-    """Rounding may leave a pixel more or less than a square."""
-    return image[:side, :side]
+def _smooth(image: Image, side: int) -> Image:
+    """A square of half the size, which smooths lines and contours."""
+    return cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def _label(name: str, height: int) -> Image:
