@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster import quadrics as q
-from depthtrack.rendering.raster.quadrics import set_up
+from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.simd import (
     F32X16,
     both,
@@ -20,6 +20,8 @@ from depthtrack.rendering.raster.simd import (
     select,
     store,
     vabs,
+    vhighest,
+    vlowest,
     vmax,
     vmin,
     vsqrt,
@@ -41,7 +43,19 @@ _ACTIVE = layout.ACTIVE
 
 
 @numba.njit(cache=True)
-def _draw(slot, is_segment, table, buffer, stride, low, high, iota):  # type: ignore[no-untyped-def]
+def _rows_seen(x, d, d_u, d_v, d_uu, d_uv, d_vv, height):
+    """Rows (first, last) in which any column of a block has D >= 0, with a row of slack: the lanes decide exactly."""
+    b = x * d_uv + d_v
+    discriminant = b * b - (x * (x * d_uu + d_u) + d) * (np.float32(4.0) * d_vv)
+    root, half = vsqrt(vmax(discriminant, 0.0)), np.float32(-0.5) / d_vv
+    crosses, height = discriminant >= 0.0, np.float32(height)
+    first = vlowest(select(crosses, (b - root) * half, height))
+    last = vhighest(select(crosses, (b + root) * half, np.float32(-1.0)))
+    return int(max(first - np.float32(1.0), np.float32(0.0))), int(min(last + np.float32(1.0), height))
+
+
+@numba.njit(cache=True)
+def _draw(slot, is_segment, table, buffer, stride, low, high, iota):
     """Draw one primitive; `low` and `high` (rows,) keep the columns covered so far."""
     u_low, u_high = int(table[q.U_LOW * q.SLOTS + slot]), int(table[q.U_HIGH * q.SLOTS + slot])
     v_low, v_high = int(table[q.V_LOW * q.SLOTS + slot]), int(table[q.V_HIGH * q.SLOTS + slot])
@@ -57,41 +71,32 @@ def _draw(slot, is_segment, table, buffer, stride, low, high, iota):  # type: ig
     axis_v = table[q.AXIS_V * q.SLOTS + slot]
     axis_low = _fill(table[q.AXIS_LOW * q.SLOTS + slot])
     axis_high = _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
-    beta_u_lanes, d_uu_lanes, axis_u_lanes = _fill(beta_u), _fill(d_uu), _fill(axis_u)
-    for v in range(v_low, v_high + 1):
-        dv = np.float32(v - v_low)
-        row_beta = beta + beta_v * dv
-        row_d = d + dv * (d_v + d_vv * dv)
-        row_d_u = d_u + d_uv * dv
-        row_axis = axis + axis_v * dv
-        start, stop = u_low, u_high
-        if u_high - u_low >= 2 * BLOCK and d_uu < 0.0:
-            # Where D >= 0 along the row; one pixel of slack, the lanes decide exactly.
-            discriminant = row_d_u * row_d_u - np.float32(4.0) * d_uu * row_d
-            if discriminant < 0.0:
-                continue
-            root = np.sqrt(discriminant)
-            half = np.float32(-0.5) / d_uu
-            start = max(start, u_low + int((row_d_u - root) * half) - 1)
-            stop = min(stop, u_low + int((row_d_u + root) * half) + 1)
-            if stop < start:
-                continue
-        low[v] = min(low[v], start)
-        high[v] = max(high[v], stop)
-        for u in range(start, stop + 1, BLOCK):
-            x = iota + np.float32(u - u_low)
-            D = x * (x * d_uu_lanes + row_d_u) + row_d
-            w = vsqrt(vmax(D, 0.0)) * sigma + (x * beta_u_lanes + row_beta)
+    beta_v_lanes, d_vv_lanes, axis_v_lanes = _fill(beta_v), _fill(d_vv), _fill(axis_v)
+    for u in range(u_low, u_high + 1, BLOCK):
+        x = iota + np.float32(u - u_low)
+        first, last = 0, v_high - v_low
+        if u_high - u_low >= BLOCK and d_vv < 0.0:
+            first, last = _rows_seen(x, d, d_u, d_v, d_uu, d_uv, d_vv, last)
+        # What depends on the column alone stays in registers down the block's rows.
+        column_beta, column_d, column_d_v = x * beta_u + beta, x * (x * d_uu + d_u) + d, x * d_uv + d_v
+        column_axis = x * axis_u + axis
+        stop = min(u + BLOCK - 1, u_high)
+        y = _fill(np.float32(first))
+        for v in range(v_low + first, v_low + last + 1):
+            low[v], high[v] = min(low[v], u), max(high[v], stop)
+            D = y * (y * d_vv_lanes + column_d_v) + column_d
+            w = vsqrt(vmax(D, 0.0)) * sigma + (y * beta_v_lanes + column_beta)
             seen = both(D >= 0.0, w < _W_NEAR)
             if is_segment:
-                e = x * axis_u_lanes + row_axis
+                e = y * axis_v_lanes + column_axis
                 seen = both(seen, both(e >= w * axis_low, w * axis_high >= e))
             index = v * stride + u
             store(buffer, index, vmax(_load(buffer, index), select(seen, w, 0.0)))
+            y = y + np.float32(1.0)
 
 
 @numba.njit(cache=True)
-def draw(pose, hand, camera, scratch, table, buffer, stride, low, high, iota):  # type: ignore[no-untyped-def]
+def draw(pose, hand, camera, scratch, table, buffer, stride, low, high, iota):
     """Draw a whole hand into a cleared buffer, and clear the padding again."""
     set_up(pose, hand, camera, scratch, table)
     width = int(camera[6])
@@ -108,7 +113,7 @@ def draw(pose, hand, camera, scratch, table, buffer, stride, low, high, iota):  
 
 
 @numba.njit(cache=True)
-def _compare(observed, skin, buffer, stride, low, high, match_depth, clamp_depth):  # type: ignore[no-untyped-def]
+def _compare(observed, skin, buffer, stride, low, high, match_depth, clamp_depth):
     """What the drawn pixels change in the sums of Eq. (2); clears the buffer on the way.
 
     Returns the change of the clamped difference, the matched pixels on skin, and all matched pixels.
@@ -124,11 +129,9 @@ def _compare(observed, skin, buffer, stride, low, high, match_depth, clamp_depth
             o = _load(observed, index)
             drawn = w > 0.0
             difference = vabs(o - one / w)
-            there = o > 0.0
-            without = select(there, vmin(o, clamp_depth), 0.0)
-            clamped = clamped + select(drawn, vmin(difference, clamp_depth) - without, 0.0)
+            clamped = clamped + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
             # A missing reading (o = 0) matches anything that is drawn.
-            allowed = select(there, _fill(match_depth), np.float32(3e38))
+            allowed = select(o > 0.0, _fill(match_depth), np.float32(3e38))
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
             on_skin = on_skin + hit * _load(skin, index)
@@ -175,7 +178,7 @@ def score_poses(
 
 
 @numba.njit(cache=True)
-def _energy(pose, sums, objective):  # type: ignore[no-untyped-def]
+def _energy(pose, sums, objective):
     """Eq. (1) from the sums of Eq. (2), as `objective.Terms.of_sums` does for batches."""
     depth = sums[0] / objective[2] / (sums[2] + objective[3])
     total = sums[1] + sums[2]

@@ -64,9 +64,9 @@ def _read_general(rows: Array, matrix: dict[str, Array]) -> None:
     start, length = cylinder[:3, 3], cylinder[1, 2]
     cross_section = np.array([abs(cylinder[0, 0]), 0.0, abs(cylinder[2, 1])])
     parts = [(start, cross_section)]
-    for name in ("palm_wrist_cap", "palm_knuckle_cap", "thumb_ellipsoid"):
-        parts.append((matrix[name][:3, 3], np.abs(np.diag(matrix[name])[:3])))
-    parts += [(start, cross_section), (start + [0, length, 0], cross_section)]
+    ellipsoids = (matrix[name] for name in ("palm_wrist_cap", "palm_knuckle_cap", "thumb_ellipsoid"))
+    parts += [(T[:3, 3], np.abs(np.diag(T)[:3])) for T in ellipsoids]
+    parts += [(start, cross_section), (start + np.array([0, length, 0]), cross_section)]
     for lane, (centre, radii) in enumerate(parts):
         rows[GENERAL_CENTRE : GENERAL_CENTRE + 3, lane] = centre
         # A radius of 0 marks a direction without end: it drops out of the quadric.

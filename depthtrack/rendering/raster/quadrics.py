@@ -1,11 +1,9 @@
-"""From poses to quadrics in the image: what every primitive looks like, as polynomials of the pixel.
+"""What every primitive looks like in the image, as polynomials of the pixel.
 
 A ray (dx, dy, 1) / w meets a quadric where C w^2 + 2 B w + A = 0, with w the inverse depth. C does not depend on the
 pixel, B is linear and A quadratic in it, so the face seen from outside is w = beta + sigma sqrt(D), beta = -B / C
-linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is computed in float64 on eight lanes.
+linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is computed in float64, a lane a primitive.
 """
-
-import math
 
 import numba
 import numpy as np
@@ -15,7 +13,6 @@ from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster.simd import (
     F64X8,
     filler,
-    first,
     loader,
     narrow,
     select,
@@ -44,37 +41,12 @@ COEFFICIENT_ROWS = 19
 
 
 @numba.njit(cache=True)
-def _sine_cosine(x):  # type: ignore[no-untyped-def]
-    """Sine and cosine to 1e-11, by their series about the nearest multiple of pi."""
-    n = vfloor(x * (1 / math.pi) + 0.5)
-    r = x - n * math.pi
-    sign = 1.0 - 2.0 * (n - 2.0 * vfloor(n * 0.5))
-    q = r * r
-    s = q * (-1 / 1307674368000.0) + 1 / 6227020800.0
-    s = q * s + (-1 / 39916800.0)
-    s = q * s + 1 / 362880.0
-    s = q * s + (-1 / 5040.0)
-    s = q * s + 1 / 120.0
-    s = q * s + (-1 / 6.0)
-    s = q * s + 1.0
-    c = q * (1 / 20922789888000.0) + (-1 / 87178291200.0)
-    c = q * c + 1 / 479001600.0
-    c = q * c + (-1 / 3628800.0)
-    c = q * c + 1 / 40320.0
-    c = q * c + (-1 / 720.0)
-    c = q * c + 1 / 24.0
-    c = q * c + (-0.5)
-    c = q * c + 1.0
-    return sign * s * r, sign * c
-
-
-@numba.njit(cache=True)
-def _put(table: Coefficients, row: int, slot: int, value) -> None:  # type: ignore[no-untyped-def]
+def _put(table: Coefficients, row: int, slot: int, value) -> None:
     store(table, row * SLOTS + slot, narrow(value))
 
 
 @numba.njit(cache=True)
-def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):  # type: ignore[no-untyped-def]
+def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):
     """Pixels (low, high) an ellipsoid spans along one image axis: the two planes through the lens that touch it.
 
     `c` and `cz` are its centre across and along the view, s_.. the entries of R diag(radii^2) R^T.
@@ -92,7 +64,7 @@ def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):  # type: ignore[no-
 
 
 @numba.njit(cache=True)
-def _span(size, low_a, high_a, za, low_b, high_b, zb):  # type: ignore[no-untyped-def]
+def span(size, low_a, high_a, za, low_b, high_b, zb):
     """Pixels spanned by two ends together: anywhere when the lens' plane lies between them."""
     across = za * zb < 0.0
     low, high = vmin(low_a, low_b), vmax(high_a, high_b)
@@ -100,7 +72,7 @@ def _span(size, low_a, high_a, za, low_b, high_b, zb):  # type: ignore[no-untype
 
 
 @numba.njit(cache=True)
-def _write(table, slot, camera, bounds, q, G, C):  # type: ignore[no-untyped-def]
+def _write(table, slot, camera, bounds, q, G, C):
     """Coefficients of A = d^T G d, -B = d.q and C about the first pixel of the bounds.
 
     `bounds` (u_low, u_high, v_low, v_high); G symmetric as (xx, yy, zz, xy, xz, yz). A vanishing C would mean a lens
@@ -128,7 +100,7 @@ def _write(table, slot, camera, bounds, q, G, C):  # type: ignore[no-untyped-def
 
 
 @numba.njit(cache=True)
-def _write_segment(table, slot, camera, bounds, a, low, length):  # type: ignore[no-untyped-def]
+def _write_segment(table, slot, camera, bounds, a, low, length):
     """The part of an axis `a` that exists: e - low w >= 0 and high w - e >= 0, where e = d.a."""
     dx, dy = (bounds[0] - camera[2]) * camera[4], (bounds[2] - camera[3]) * camera[5]
     _put(table, AXIS, slot, dx * a[0] + dy * a[1] + a[2])
@@ -139,7 +111,7 @@ def _write_segment(table, slot, camera, bounds, a, low, length):  # type: ignore
 
 
 @numba.njit(cache=True)
-def _write_cones(table, k, hand, camera, bounds, p, a):  # type: ignore[no-untyped-def]
+def write_cones(table, k, hand, camera, bounds, p, a):
     """Cones of phalanx k from joints `p` along unit axes `a`: |x - p|^2 - s^2 = (r - slope s)^2, s = (x - p).a."""
     slope = _load(hand, 8 * (layout.CONE_SLOPE + k))
     m = p[0] * a[0] + p[1] * a[1] + p[2] * a[2]
@@ -162,15 +134,23 @@ def _write_cones(table, k, hand, camera, bounds, p, a):  # type: ignore[no-untyp
 
 
 @numba.njit(cache=True)
-def _write_general(table, hand, camera, scratch, x, y, z, p):  # type: ignore[no-untyped-def]
+def write_general(table, hand, camera, scratch, x, y, z, p):
     """Palm cylinder, caps and the thumb's ellipsoid: axes x, y, z and body positions p, a lane each."""
-    c0, c1, c2 = _load(hand, 8 * layout.GENERAL_CENTRE), _load(hand, 8 * layout.GENERAL_CENTRE + 8), _load(hand, 8 * layout.GENERAL_CENTRE + 16)
+    c0, c1, c2 = (
+        _load(hand, 8 * layout.GENERAL_CENTRE),
+        _load(hand, 8 * layout.GENERAL_CENTRE + 8),
+        _load(hand, 8 * layout.GENERAL_CENTRE + 16),
+    )
     p = (
         x[0] * c0 + y[0] * c1 + z[0] * c2 + p[0],
         x[1] * c0 + y[1] * c1 + z[1] * c2 + p[1],
         x[2] * c0 + y[2] * c1 + z[2] * c2 + p[2],
     )
-    s0, s1, s2 = _load(hand, 8 * layout.GENERAL_SQUARE), _load(hand, 8 * layout.GENERAL_SQUARE + 8), _load(hand, 8 * layout.GENERAL_SQUARE + 16)
+    s0, s1, s2 = (
+        _load(hand, 8 * layout.GENERAL_SQUARE),
+        _load(hand, 8 * layout.GENERAL_SQUARE + 8),
+        _load(hand, 8 * layout.GENERAL_SQUARE + 16),
+    )
     S_zz = s0 * x[2] * x[2] + s1 * y[2] * y[2] + s2 * z[2] * z[2]
     u_low, u_high = _bound(
         camera[0], camera[2], camera[6], p[0], p[2],
@@ -187,12 +167,19 @@ def _write_general(table, hand, camera, scratch, x, y, z, p):  # type: ignore[no
     # Lane 0, the cylinder, spans what its two end discs (lanes 4 and 5) span.
     store(scratch, 0, p[2])
     across = scratch[4] * scratch[5] < 0.0
-    u_low, v_low = _first_from_discs(scratch, u_low, across, 0.0, True), _first_from_discs(scratch, v_low, across, 0.0, True)
+    u_low, v_low = (
+        _first_from_discs(scratch, u_low, across, 0.0, True),
+        _first_from_discs(scratch, v_low, across, 0.0, True),
+    )
     u_high = _first_from_discs(scratch, u_high, across, camera[6] - 1.0, False)
     v_high = _first_from_discs(scratch, v_high, across, camera[7] - 1.0, False)
     bounds = (u_low, u_high, v_low, v_high)
 
-    i0, i1, i2 = _load(hand, 8 * layout.GENERAL_INVERSE), _load(hand, 8 * layout.GENERAL_INVERSE + 8), _load(hand, 8 * layout.GENERAL_INVERSE + 16)
+    i0, i1, i2 = (
+        _load(hand, 8 * layout.GENERAL_INVERSE),
+        _load(hand, 8 * layout.GENERAL_INVERSE + 8),
+        _load(hand, 8 * layout.GENERAL_INVERSE + 16),
+    )
     h0 = i0 * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2])
     h1 = i1 * (y[0] * p[0] + y[1] * p[1] + y[2] * p[2])
     h2 = i2 * (z[0] * p[0] + z[1] * p[1] + z[2] * p[2])
@@ -214,7 +201,7 @@ def _write_general(table, hand, camera, scratch, x, y, z, p):  # type: ignore[no
 
 
 @numba.njit(cache=True)
-def _first_from_discs(scratch, bound, across, anywhere, low):  # type: ignore[no-untyped-def]
+def _first_from_discs(scratch, bound, across, anywhere, low):
     store(scratch, 0, bound)
     if across:
         scratch[0] = anywhere
@@ -224,89 +211,7 @@ def _first_from_discs(scratch, bound, across, anywhere, low):  # type: ignore[no
 
 
 @numba.njit(cache=True)
-def _turn(s, c, a, b):  # type: ignore[no-untyped-def]
-    """Axes a and b turned in their plane: a towards b."""
-    return (
-        (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2]),
-        (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2]),
-    )
-
-
-@numba.njit(cache=True)
-def _rotated(R, hand, row, stride):  # type: ignore[no-untyped-def]
-    """R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
-    b0, b1, b2 = _load(hand, 8 * row), _load(hand, 8 * (row + stride)), _load(hand, 8 * (row + 2 * stride))
-    return (
-        R[0] * b0 + R[1] * b1 + R[2] * b2,
-        R[3] * b0 + R[4] * b1 + R[5] * b2,
-        R[6] * b0 + R[7] * b1 + R[8] * b2,
-    )
-
-
-@numba.njit(cache=True)
-def _with_thumb(mask, palm0, palm1, palm2, fingers):  # type: ignore[no-untyped-def]
-    """The palm's vector in every lane, but for the thumb's ellipsoid: the first finger's."""
-    return (
-        select(mask, first(fingers[0]), _fill(palm0)),
-        select(mask, first(fingers[1]), _fill(palm1)),
-        select(mask, first(fingers[2]), _fill(palm2)),
-    )
-
-
-@numba.njit(cache=True)
-def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Coefficients) -> None:
-    """Fill the coefficient table for one pose.
-
-    `pose` (27,), `hand` from `layout.constants`, `camera` (8,): fx, fy, cx, cy, 1/fx, 1/fy, width, height; `scratch`
-    (32,); `table` (COEFFICIENT_ROWS * SLOTS,) float32 out. Fingers are lanes: the kinematics of
-    `hand.kinematics.HandModel.transforms`, all fingers at once.
-    """
-    R = _palm_rotation(pose[3], pose[4], pose[5], pose[6])
-    x, y, z = _rotated(R, hand, 0, 3), _rotated(R, hand, 1, 3), _rotated(R, hand, 2, 3)
-    p = _rotated(R, hand, layout.BASE_POSITION, 1)
-    p = (p[0] + pose[0], p[1] + pose[1], p[2] + pose[2])
-    for finger in range(5):
-        for k in range(4):
-            scratch[8 * k + finger] = pose[7 + 4 * finger + k]
-    s, c = _sine_cosine(_load(scratch, 0) * _load(hand, 8 * layout.MIRROR))
-    y, x = _turn(s, c, y, x)
-    s1, c1 = _sine_cosine(_load(scratch, 8))
-    s2, c2 = _sine_cosine(_load(scratch, 16))
-    s3, c3 = _sine_cosine(_load(scratch, 24))
-    # Joint by joint: spheres sit at the joints, cones between them.
-    bounds = _write_spheres(table, 0, hand, camera, p)
-    y, z = _turn(s1, c1, y, z)
-    thumb = _load(hand, 8 * layout.IS_THUMB) > 0.5
-    _write_general(
-        table,
-        hand,
-        camera,
-        scratch,
-        _with_thumb(thumb, R[0], R[3], R[6], x),
-        _with_thumb(thumb, R[1], R[4], R[7], y),
-        _with_thumb(thumb, R[2], R[5], R[8], z),
-        _with_thumb(thumb, pose[0], pose[1], pose[2], p),
-    )
-    p, bounds = _phalanx(table, 0, layout.LENGTH, hand, camera, bounds, p, y)
-    y, z = _turn(s2, c2, y, z)
-    p, bounds = _phalanx(table, 1, layout.LENGTH + 1, hand, camera, bounds, p, y)
-    y, z = _turn(s3, c3, y, z)
-    _phalanx(table, 2, layout.TIP_LENGTH, hand, camera, bounds, p, y)
-
-
-@numba.njit(cache=True)
-def _palm_rotation(qw, qx, qy, qz):  # type: ignore[no-untyped-def]
-    """Rotation matrix of a quaternion of any length, row by row."""
-    n = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
-    return (
-        1 - n * (qy * qy + qz * qz), n * (qx * qy - qw * qz), n * (qx * qz + qw * qy),
-        n * (qx * qy + qw * qz), 1 - n * (qx * qx + qz * qz), n * (qy * qz - qw * qx),
-        n * (qx * qz - qw * qy), n * (qy * qz + qw * qx), 1 - n * (qx * qx + qy * qy),
-    )  # fmt: skip
-
-
-@numba.njit(cache=True)
-def _write_spheres(table, k, hand, camera, p):  # type: ignore[no-untyped-def]
+def write_spheres(table, k, hand, camera, p):
     """Spheres k of all fingers at `p`; returns their bounds."""
     radius = _load(hand, 8 * (layout.SPHERE_RADIUS + k))
     square, zero, one = radius * radius, _fill(0.0), _fill(1.0)
@@ -316,15 +221,3 @@ def _write_spheres(table, k, hand, camera, p):  # type: ignore[no-untyped-def]
     C = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - square
     _write(table, layout.SPHERES + 8 * k, camera, bounds, p, (one, one, one, zero, zero, zero), C)
     return bounds
-
-
-@numba.njit(cache=True)
-def _phalanx(table, k, length_row, hand, camera, bounds, p, y):  # type: ignore[no-untyped-def]
-    """Cones k from joints `p` along `y`, and the spheres at their far end; returns those with their bounds."""
-    length = _load(hand, 8 * length_row)
-    end = (p[0] + y[0] * length, p[1] + y[1] * length, p[2] + y[2] * length)
-    end_bounds = _write_spheres(table, k + 1, hand, camera, end)
-    u_low, u_high = _span(camera[6], bounds[0], bounds[1], p[2], end_bounds[0], end_bounds[1], end[2])
-    v_low, v_high = _span(camera[7], bounds[2], bounds[3], p[2], end_bounds[2], end_bounds[3], end[2])
-    _write_cones(table, k, hand, camera, (u_low, u_high, v_low, v_high), p, y)
-    return end, end_bounds

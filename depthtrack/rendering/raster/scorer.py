@@ -32,7 +32,9 @@ class _Workspace:
     @classmethod
     def of(cls, rows: int, stride: int) -> Self:
         return cls(
-            np.zeros(rows * stride, np.float32), np.full(rows, rows * stride, np.int64), np.full(rows, -1, np.int64)
+            np.zeros(rows * stride, np.float32),
+            np.full(rows, rows * stride, np.int64),
+            np.full(rows, -1, np.int64),
         )
 
     @property

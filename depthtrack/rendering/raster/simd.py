@@ -38,13 +38,14 @@ _LLVM_ELEMENTS: dict[types.Type, ir.Type] = {
     types.boolean: ir.IntType(1),
 }
 F32X16 = Vector(types.float32, 16)
+F32X32 = Vector(types.float32, 32)
 F64X8 = Vector(types.float64, 8)
 # Multiply-adds may be fused: the same machine gives the same bits, whatever the number of threads.
 _FLAGS = ("contract", "nsz")
 
 
 @register_model(Vector)
-class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, vector: Vector) -> None:
         super().__init__(manager, vector, vector.llvm())
 
@@ -79,7 +80,7 @@ def _widen_all(context: Any, builder: ir.IRBuilder, found: Any, values: Any, wan
 
 
 def _binary(emit: _Emit) -> Any:
-    @intrinsic  # type: ignore[untyped-decorator]
+    @intrinsic
     def function(typing_context: Any, a: types.Type, b: types.Type) -> Any:
         vector = _operands(a, b)
 
@@ -95,7 +96,7 @@ def _binary(emit: _Emit) -> Any:
 def _operator(symbol: Any, emit: _Emit, compares: bool = False) -> None:
     """Teach numba an operator on vectors, directly: an @overload would be compiled anew for every use."""
 
-    class Typing(AbstractTemplate):  # type: ignore[misc]
+    class Typing(AbstractTemplate):
         def generic(self, arguments: Any, _: Any) -> Any:
             vector = _operands(*arguments) if len(arguments) == 2 else None
             return vector and (vector.mask if compares else vector)(*arguments)
@@ -123,7 +124,7 @@ vmax = _binary(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a,
 vmin = _binary(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def both(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     """Lanes set in both masks."""
 
@@ -133,7 +134,7 @@ def both(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def either(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     """Lanes set in one mask or the other."""
 
@@ -143,7 +144,7 @@ def either(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def select(typing_context: Any, mask: types.Type, a: types.Type, b: types.Type) -> Any:
     """Lanes of `a` where the mask is set, of `b` elsewhere; either may be a scalar, not both."""
     vector = _operands(a, b)
@@ -168,7 +169,7 @@ def _suffix(vector: Vector) -> str:
 
 
 def _unary(name: str) -> Any:
-    @intrinsic  # type: ignore[untyped-decorator]
+    @intrinsic
     def function(typing_context: Any, a: types.Type) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
             return _call(builder, f"llvm.{name}.{_suffix(a)}", a.llvm(), arguments[0])
@@ -183,7 +184,7 @@ vabs = _unary("fabs")
 vfloor = _unary("floor")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def first(typing_context: Any, a: types.Type) -> Any:
     """The first lane, a scalar."""
 
@@ -193,7 +194,7 @@ def first(typing_context: Any, a: types.Type) -> Any:
     return (a.element(a), generate) if isinstance(a, Vector) else None
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def narrow(typing_context: Any, a: types.Type) -> Any:
     """The same lanes in float32."""
     if _element(a) != types.float64:
@@ -206,27 +207,35 @@ def narrow(typing_context: Any, a: types.Type) -> Any:
     return single(a), generate
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def vsum(typing_context: Any, a: types.Type) -> Any:
-    """Sum of the lanes, pairwise: the order is fixed, so the bits are."""
-    if not isinstance(a, Vector):
-        return None
+def _across(combine: _Emit) -> Any:
+    """A reduction over the lanes, halves against halves: the order is fixed, so the bits are."""
 
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        value, lanes = arguments[0], a.lanes
-        while lanes > 1:
-            half = lanes // 2
-            undefined = ir.Constant(value.type, ir.Undefined)
-            index = ir.VectorType(ir.IntType(32), half)
-            low = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half))))
-            high = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half, lanes))))
-            value, lanes = builder.fadd(low, high), half
-        return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+    @intrinsic
+    def function(typing_context: Any, a: types.Type) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+            value, lanes = arguments[0], a.lanes
+            while lanes > 1:
+                half = lanes // 2
+                undefined = ir.Constant(value.type, ir.Undefined)
+                index = ir.VectorType(ir.IntType(32), half)
+                low = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half))))
+                high = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half, lanes))))
+                value, lanes = combine(builder, low, high), half
+            return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
 
-    return a.element(a), generate
+        return (a.element(a), generate) if isinstance(a, Vector) else None
+
+    return function
 
 
-def _address(context: Any, builder: ir.IRBuilder, array: Any, value: ir.Value, index: ir.Value, to: ir.Type) -> ir.Value:
+vsum = _across(lambda builder, a, b: builder.fadd(a, b))
+vlowest = _across(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
+vhighest = _across(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
+
+
+def _address(
+    context: Any, builder: ir.IRBuilder, array: Any, value: ir.Value, index: ir.Value, to: ir.Type
+) -> ir.Value:
     data = context.make_array(array)(context, builder, value).data
     return builder.bitcast(builder.gep(data, [index], inbounds=True), to.as_pointer())
 
@@ -234,10 +243,11 @@ def _address(context: Any, builder: ir.IRBuilder, array: Any, value: ir.Value, i
 def loader(vector: Vector) -> Any:
     """A function `load(array, index)`: lanes of a contiguous 1-d array from any index on, unchecked."""
 
-    @intrinsic  # type: ignore[untyped-decorator]
+    @intrinsic
     def load(typing_context: Any, array: types.Type, index: types.Type) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-            pointer = _address(context, builder, array, *arguments, vector.llvm())
+            data, at = arguments
+            pointer = _address(context, builder, array, data, at, vector.llvm())
             return builder.load(pointer, align=vector.element.bitwidth // 8)
 
         return vector(array, index), generate
@@ -245,15 +255,16 @@ def loader(vector: Vector) -> Any:
     return load
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def store(typing_context: Any, array: types.Type, index: types.Type, vector: types.Type) -> Any:
     """Write all lanes into a contiguous 1-d array from any index on, unchecked."""
     if not isinstance(vector, Vector):
         return None
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        pointer = _address(context, builder, array, *arguments[:2], vector.llvm())
-        builder.store(arguments[2], pointer, align=vector.element.bitwidth // 8)
+        data, at, value = arguments
+        pointer = _address(context, builder, array, data, at, vector.llvm())
+        builder.store(value, pointer, align=vector.element.bitwidth // 8)
         return context.get_dummy_value()
 
     return types.void(array, index, vector), generate
@@ -262,7 +273,7 @@ def store(typing_context: Any, array: types.Type, index: types.Type, vector: typ
 def filler(vector: Vector) -> Any:
     """A function `fill(scalar)`: the scalar in every lane."""
 
-    @intrinsic  # type: ignore[untyped-decorator]
+    @intrinsic
     def fill(typing_context: Any, scalar: types.Type) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
             return _widen(context, builder, arguments[0], scalar, vector)
@@ -272,7 +283,7 @@ def filler(vector: Vector) -> Any:
     return fill
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def fetch_add(typing_context: Any, counter: types.Type, amount: types.Type) -> Any:
     """Add to counter[0] (an int64 array) as one indivisible step and return what it held: hands out work to threads."""
 

@@ -1,0 +1,135 @@
+"""From a pose to the quadrics of all primitives: the kinematics, a finger a lane, in float64."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.rendering.raster import layout
+from depthtrack.rendering.raster.quadrics import Coefficients, span, write_cones, write_general, write_spheres
+from depthtrack.rendering.raster.simd import F64X8, filler, first, loader, select, vfloor
+
+Array = NDArray[np.float64]
+
+_load = loader(F64X8)
+_fill = filler(F64X8)
+
+
+@numba.njit(cache=True)
+def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Coefficients) -> None:
+    """Fill the coefficient table for one pose.
+
+    `pose` (27,), `hand` from `layout.constants`, `camera` (8,): fx, fy, cx, cy, 1/fx, 1/fy, width, height; `scratch`
+    (32,); `table` (COEFFICIENT_ROWS * SLOTS,) float32 out. Fingers are lanes: the kinematics of
+    `hand.kinematics.HandModel.transforms`, all fingers at once.
+    """
+    R = _palm_rotation(pose[3], pose[4], pose[5], pose[6])
+    x, y, z = _rotated(R, hand, 0, 3), _rotated(R, hand, 1, 3), _rotated(R, hand, 2, 3)
+    p = _rotated(R, hand, layout.BASE_POSITION, 1)
+    p = (p[0] + pose[0], p[1] + pose[1], p[2] + pose[2])
+    for finger in range(5):
+        for k in range(4):
+            scratch[8 * k + finger] = pose[7 + 4 * finger + k]
+    s, c = _sine_cosine(_load(scratch, 0) * _load(hand, 8 * layout.MIRROR))
+    y, x = _turn(s, c, y, x)
+    s1, c1 = _sine_cosine(_load(scratch, 8))
+    s2, c2 = _sine_cosine(_load(scratch, 16))
+    s3, c3 = _sine_cosine(_load(scratch, 24))
+    # Joint by joint: spheres sit at the joints, cones between them.
+    bounds = write_spheres(table, 0, hand, camera, p)
+    y, z = _turn(s1, c1, y, z)
+    thumb = _load(hand, 8 * layout.IS_THUMB) > 0.5
+    write_general(
+        table,
+        hand,
+        camera,
+        scratch,
+        _with_thumb(thumb, R[0], R[3], R[6], x),
+        _with_thumb(thumb, R[1], R[4], R[7], y),
+        _with_thumb(thumb, R[2], R[5], R[8], z),
+        _with_thumb(thumb, pose[0], pose[1], pose[2], p),
+    )
+    p, bounds = _phalanx(table, 0, layout.LENGTH, hand, camera, bounds, p, y)
+    y, z = _turn(s2, c2, y, z)
+    p, bounds = _phalanx(table, 1, layout.LENGTH + 1, hand, camera, bounds, p, y)
+    y, z = _turn(s3, c3, y, z)
+    _phalanx(table, 2, layout.TIP_LENGTH, hand, camera, bounds, p, y)
+
+
+@numba.njit(cache=True)
+def _palm_rotation(qw, qx, qy, qz):
+    """Rotation matrix of a quaternion of any length, row by row."""
+    n = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
+    return (
+        1 - n * (qy * qy + qz * qz), n * (qx * qy - qw * qz), n * (qx * qz + qw * qy),
+        n * (qx * qy + qw * qz), 1 - n * (qx * qx + qz * qz), n * (qy * qz - qw * qx),
+        n * (qx * qz - qw * qy), n * (qy * qz + qw * qx), 1 - n * (qx * qx + qy * qy),
+    )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def _rotated(R, hand, row, stride):
+    """R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
+    b0, b1, b2 = _load(hand, 8 * row), _load(hand, 8 * (row + stride)), _load(hand, 8 * (row + 2 * stride))
+    return (
+        R[0] * b0 + R[1] * b1 + R[2] * b2,
+        R[3] * b0 + R[4] * b1 + R[5] * b2,
+        R[6] * b0 + R[7] * b1 + R[8] * b2,
+    )
+
+
+@numba.njit(cache=True)
+def _turn(s, c, a, b):
+    """Axes a and b turned in their plane: a towards b."""
+    return (
+        (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2]),
+        (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2]),
+    )
+
+
+@numba.njit(cache=True)
+def _sine_cosine(x):
+    """Sine and cosine to 1e-11, by their series about the nearest multiple of pi."""
+    n = vfloor(x * (1 / math.pi) + 0.5)
+    r = x - n * math.pi
+    sign = 1.0 - 2.0 * (n - 2.0 * vfloor(n * 0.5))
+    q = r * r
+    s = q * (-1 / 1307674368000.0) + 1 / 6227020800.0
+    s = q * s + (-1 / 39916800.0)
+    s = q * s + 1 / 362880.0
+    s = q * s + (-1 / 5040.0)
+    s = q * s + 1 / 120.0
+    s = q * s + (-1 / 6.0)
+    s = q * s + 1.0
+    c = q * (1 / 20922789888000.0) + (-1 / 87178291200.0)
+    c = q * c + 1 / 479001600.0
+    c = q * c + (-1 / 3628800.0)
+    c = q * c + 1 / 40320.0
+    c = q * c + (-1 / 720.0)
+    c = q * c + 1 / 24.0
+    c = q * c + (-0.5)
+    c = q * c + 1.0
+    return sign * s * r, sign * c
+
+
+@numba.njit(cache=True)
+def _with_thumb(mask, palm0, palm1, palm2, fingers):
+    """The palm's vector in every lane, but for the thumb's ellipsoid: the first finger's."""
+    return (
+        select(mask, first(fingers[0]), _fill(palm0)),
+        select(mask, first(fingers[1]), _fill(palm1)),
+        select(mask, first(fingers[2]), _fill(palm2)),
+    )
+
+
+@numba.njit(cache=True)
+def _phalanx(table, k, length_row, hand, camera, bounds, p, y):
+    """Cones k from joints `p` along `y`, and the spheres at their far end; returns those with their bounds."""
+    length = _load(hand, 8 * length_row)
+    end = (p[0] + y[0] * length, p[1] + y[1] * length, p[2] + y[2] * length)
+    end_bounds = write_spheres(table, k + 1, hand, camera, end)
+    u_low, u_high = span(camera[6], bounds[0], bounds[1], p[2], end_bounds[0], end_bounds[1], end[2])
+    v_low, v_high = span(camera[7], bounds[2], bounds[3], p[2], end_bounds[2], end_bounds[3], end[2])
+    write_cones(table, k, hand, camera, (u_low, u_high, v_low, v_high), p, y)
+    return end, end_bounds
