@@ -58,7 +58,8 @@ class Terms:
         depth = clamped / objective.depth_unit / (union + objective.epsilon)
         # Where neither hand is seen, nothing disagrees: 0 / 0 counts as full agreement.
         total = matched_skin + union
-        skin = 1 - np.divide(2 * matched_skin, total, out=np.ones_like(total), where=total > 0)
+        # Where neither hand is seen, nothing speaks for the hypothesis.
+        skin = 1 - np.divide(2 * matched_skin, total, out=np.zeros_like(total), where=total > 0)
         kinematic = finger_crossing(poses)
         return cls(objective.combine(depth, skin, kinematic), depth, skin, kinematic)
 
