@@ -1,0 +1,93 @@
+"""How deep fingers sink into each other or into the palm: a check that postures are those of a solid hand.
+
+Phalanges are taken as tapered capsules and the palm as a flat slab. Real fingers press on each other and give way
+by a few millimetres, so a small depth is natural; a finger that passes through another reaches ten and more.
+"""
+
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+
+
+class Clearance:
+    """Penetration between the parts of a hand of given sizes."""
+
+    def __init__(self, shape: HandShape) -> None:
+        self._shape = shape
+        self._model = HandModel(shape)
+
+    def penetration(self, poses: ArrayLike) -> Array:
+        """Depth (...,) in metres of the worst overlap in each pose (..., 27); 0 where nothing touches."""
+        points = self._model.endpoints(poses)
+        points = points.reshape(*points.shape[:-2], 5, 4, 3)
+        start, end = self._skin_ends(points)
+        return np.maximum(self._between_fingers(start, end), self._into_palm(poses, end))
+
+    @cached_property
+    def _radii(self) -> Array:
+        """(5, 4) at base, two joints and tip."""
+        return self._shape.radii * self._shape.scale
+
+    @cached_property
+    def _pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Phalanges (finger * 3 + k) that can meet; knuckles of neighbours share their flesh and are left out."""
+        pairs = [
+            (3 * f + i, 3 * g + j)
+            for f, g in combinations(range(5), 2)
+            for i in range(3)
+            for j in range(3)
+            if not (i == 0 and j == 0)
+        ]
+        first, second = zip(*pairs, strict=True)
+        return np.array(first), np.array(second)
+
+    def _skin_ends(self, points: Array) -> tuple[Array, Array]:
+        """Ends of the capsules' axes (..., 5, 3, 3): the last one stops a radius short of the fingertip."""
+        start, end = points[..., :-1, :], points[..., 1:, :].copy()
+        tip = end[..., 2, :] - start[..., 2, :]
+        length = np.linalg.norm(tip, axis=-1, keepdims=True)
+        end[..., 2, :] -= tip * np.minimum(self._radii[:, 3:] / length, 0.99)
+        return start, end
+
+    def _between_fingers(self, start: Array, end: Array) -> Array:
+        flat = (*start.shape[:-3], 15, 3)
+        start, end = start.reshape(flat), end.reshape(flat)
+        r0, r1 = self._radii[:, :-1].ravel(), self._radii[:, 1:].ravel()
+        a, b = self._pairs
+        distance, s, t = _closest(start[..., a, :], end[..., a, :], start[..., b, :], end[..., b, :])
+        reach = r0[a] + s * (r1 - r0)[a] + r0[b] + t * (r1 - r0)[b]
+        return np.maximum(reach - distance, 0).max(axis=-1)
+
+    def _into_palm(self, poses: ArrayLike, ends: Array) -> Array:
+        """Depth of the far ends of middle and last phalanges in the slab of the palm."""
+        T = self._model.transforms(poses)[..., 0, :, :]
+        local = np.einsum("...ji,...fkj->...fki", T[..., :3, :3], ends - T[..., None, None, :3, 3])[..., 1:, :]
+        shape, radii = self._shape, self._radii[:, 2:]
+        half = np.array([shape.palm_breadth, shape.palm_length]) / 2 * shape.scale
+        inside = np.all(np.abs(local[..., :2]) < 0.9 * half, axis=-1) & (local[..., 2] > -radii)
+        depth = shape.palm_thickness / 2 * shape.scale + radii - local[..., 2]
+        return np.max(np.where(inside, np.maximum(depth, 0), 0), axis=(-1, -2))
+
+
+def _closest(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array, Array]:
+    """Distance (...) of segments p and q (..., 3), and where along each it is reached (0 to 1).
+
+    Ericson, "Real-Time Collision Detection", 2005, Sec. 5.1.9.
+    """
+    u, v, w = p1 - p0, q1 - q0, p0 - q0
+    a, e = (u * u).sum(-1), (v * v).sum(-1)
+    b, c, f = (u * v).sum(-1), (u * w).sum(-1), (v * w).sum(-1)
+    denominator = a * e - b * b
+    s = np.clip(np.where(denominator > 1e-12, (b * f - c * e) / np.maximum(denominator, 1e-12), 0), 0, 1)
+    t = (b * s + f) / e
+    s = np.where(t < 0, np.clip(-c / a, 0, 1), np.where(t > 1, np.clip((b - c) / a, 0, 1), s))
+    t = np.clip(t, 0, 1)
+    gap = w + u * s[..., None] - v * t[..., None]
+    return np.linalg.norm(gap, axis=-1), s, t

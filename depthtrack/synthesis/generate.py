@@ -1,0 +1,230 @@
+"""Synthetic recordings: from a motion and a handful of options to frames with exact ground truth, and to a folder."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack import __version__
+from depthtrack.errors import InputError
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.writer import SequenceWriter
+from depthtrack.synthesis.backdrop import Backdrop
+from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
+from depthtrack.synthesis.painting import Painter, SkinTone, flip_skin
+from depthtrack.synthesis.randomness import Stream, generator
+from depthtrack.synthesis.room import furnish, put_wall
+from depthtrack.synthesis.scene import HandKind, Scene
+from depthtrack.synthesis.scene_frame import mirrored
+from depthtrack.synthesis.sensors import Sensor, make_sensor
+from depthtrack.synthesis.sensors.ideal import with_gaussian_noise
+from depthtrack.synthesis.viewpoint import Viewpoint
+
+Array = NDArray[np.float64]
+BackgroundKind = Literal["none", "wall", "room"]
+SensorName = Literal["ideal", "kinect1", "kinect2", "realsense"]
+
+RANDOM_FRAMES = 360
+"""Length of a motion that has none of its own, unless asked for another."""
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """Everything that a synthetic recording depends on: the same options give the same bytes.
+
+    `distance` metres from the camera to the nominal place of the palm, None for the usual one before that sensor;
+    `forearm` None means with a wall or room behind the hand; `depth_noise` standard deviation, metres; `skin_flips`
+    share of pixels, 0 to 1; `frames` None means the whole motion; `rate` Hz.
+    """
+
+    motion: str = "everyday"
+    distance: float | None = None
+    viewpoint: int = 0
+    hand: HandShape = field(default_factory=HandShape)
+    model: HandKind = "primitives"
+    forearm: bool | None = None
+    background: BackgroundKind = "none"
+    sensor: SensorName = "ideal"
+    depth_noise: float = 0.0
+    skin_flips: float = 0.0
+    frames: int | None = None
+    rate: float = 30.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.depth_noise <= 0.5:
+            raise InputError(f"depth noise must lie between 0 and 500 mm, found {self.depth_noise * 1000:g} mm")
+        if not 0 <= self.skin_flips <= 1:
+            raise InputError(f"skin flips must lie between 0 and 100 %, found {self.skin_flips * 100:g} %")
+        if not 1 <= self.rate <= 1000:
+            raise InputError(f"the frame rate must lie between 1 and 1000 Hz, found {self.rate:g} Hz")
+        if not 0 <= self.seed < 2**63:
+            raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {self.seed}")
+
+
+@dataclass(frozen=True)
+class SyntheticFrame:
+    """A frame and its ground truth.
+
+    `depth` (h, w) metres as the sensor read it; `colour` (h, w, 3) RGB; `mask` (h, w) where the hand without its
+    forearm is what the camera sees; `skin` (h, w) where skin is seen at all, with the flipped labels; `exact_depth`
+    (h, w) metres; `pose` (27,) and `joints` (21, 3) in the camera frame.
+    """
+
+    timestamp: float
+    depth: Array
+    colour: NDArray[np.uint8]
+    mask: NDArray[np.bool_]
+    skin: NDArray[np.bool_]
+    exact_depth: Array
+    pose: Array
+    joints: Array
+
+
+class Synthesiser:
+    """Makes the frames of a synthetic recording: any of them, in any order, on any thread."""
+
+    def __init__(self, options: Synthesis) -> None:
+        self.options = options
+        self.motion: Motion = load_motion(options.motion)
+        self.sensor: Sensor = make_sensor(options.sensor)
+        self.viewpoint = Viewpoint(options.viewpoint, self.distance)
+        self.timestamps: Array = np.arange(self._frame_count()) / options.rate
+        self.poses: Array = self._poses()
+        self.joints: Array = HandModel(options.hand).keypoints(self.poses)
+        self._tone = SkinTone.sample(self._random(0, Stream.SKIN))
+        backdrop = self._backdrop(self._random(0, Stream.ROOM))
+        self._scene = Scene(options.hand, options.model, self.has_forearm, self.sensor.camera, backdrop)
+        self._painter = Painter(
+            options.hand,
+            self.sensor.camera,
+            backdrop,
+            self._tone,
+            self.sensor.colour_noise,
+            self._random(0, Stream.LIGHT),
+        )
+
+    def __len__(self) -> int:
+        return len(self.timestamps)
+
+    @property
+    def distance(self) -> float:
+        """Metres from the camera to the nominal place of the palm."""
+        return self.sensor.usual_distance if self.options.distance is None else self.options.distance
+
+    @property
+    def has_forearm(self) -> bool:
+        return self.options.background != "none" if self.options.forearm is None else self.options.forearm
+
+    def __getitem__(self, index: int) -> SyntheticFrame:
+        view = self._scene.view(self.poses[index], self._elbow)
+        surface = view.surface
+        depth = self.sensor.read(surface, self._random(index, Stream.DEPTH))
+        if self.options.depth_noise > 0:
+            depth = with_gaussian_noise(depth, self.options.depth_noise, self._random(index, Stream.DEPTH_NOISE))
+        colour, skin = flip_skin(
+            self._painter.paint(view, self._random(index, Stream.COLOUR)),
+            surface.label,
+            self.options.skin_flips,
+            self._tone,
+            self._random(index, Stream.FLIPS),
+        )
+        return SyntheticFrame(
+            timestamp=float(self.timestamps[index]),
+            depth=depth,
+            colour=colour,
+            mask=(surface.label >= 0) & (surface.label < BODY_COUNT),
+            skin=skin,
+            exact_depth=surface.depth,
+            pose=self.poses[index],
+            joints=self.joints[index],
+        )
+
+    def frames(self, threads: int = 2) -> Iterator[SyntheticFrame]:
+        """All frames in order, made by `threads` workers; a few wait in memory."""
+        with ThreadPoolExecutor(threads, thread_name_prefix="synthesise") as pool:
+            waiting: deque[Future[SyntheticFrame]] = deque()
+            for index in range(len(self)):
+                waiting.append(pool.submit(self.__getitem__, index))
+                if len(waiting) > 2 * threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+
+    def description(self) -> dict[str, Any]:
+        """What `sequence.json` tells: how the recording was made, completely."""
+        options = asdict(self.options) | {"distance": self.distance, "forearm": self.has_forearm, "frames": len(self)}
+        options["hand"] = self.options.hand.side
+        return {"made_by": f"depthtrack {__version__} synth", "about": self.motion.about, **options}
+
+    def _backdrop(self, rng: np.random.Generator) -> Backdrop:
+        backdrop = Backdrop.empty(self.sensor.camera, face=SkinTone.sample(rng).back)
+        if self.options.background == "wall":
+            put_wall(backdrop, self.distance, rng)
+        elif self.options.background == "room":
+            furnish(backdrop, self.distance, rng)
+        return backdrop
+
+    def _frame_count(self) -> int:
+        options, duration = self.options, self.motion.duration
+        longest = round((MAX_DURATION if duration is None else duration) * options.rate)
+        count = (RANDOM_FRAMES if duration is None else longest) if options.frames is None else options.frames
+        if not 1 <= count <= longest:
+            raise InputError(f"'{self.motion.name}' has {longest} frames at {options.rate:g} Hz; asked for {count}")
+        return count
+
+    def _poses(self) -> Array:
+        poses = self.motion.poses(self.timestamps, self.options.seed)
+        return self.viewpoint.see(poses if self.options.hand.side == "right" else mirrored(poses))
+
+    @cached_property
+    def _elbow(self) -> Array:
+        """(3,) where this person's forearm comes from, in the camera frame."""
+        elbow = self.motion.elbow + self._random(0, Stream.ARM).uniform(-0.04, 0.04, 3)
+        return self.viewpoint.see_points(elbow * [self.options.hand.mirror, 1, 1])
+
+    def _random(self, frame: int, stream: Stream) -> np.random.Generator:
+        return generator(self.options.seed, frame, stream)
+
+
+def synthesise(
+    options: Synthesis,
+    folder: Path,
+    overwrite: bool = False,
+    threads: int = 2,
+    progress: Callable[[Iterator[SyntheticFrame]], Iterator[SyntheticFrame]] = iter,
+) -> Synthesiser:
+    """Write the recording as a sequence folder, complete or not at all; `progress` wraps the stream of frames.
+
+    Raises InputError for options that cannot be, and for a folder that is there already unless `overwrite`.
+    """
+    made = Synthesiser(options)
+    # JPEG shares colour between neighbouring pixels, which would undo flips of single ones.
+    colour_format: Literal["png", "jpg"] = "png" if options.skin_flips > 0 else "jpg"
+    with SequenceWriter(
+        folder,
+        made.sensor.camera,
+        hand=options.hand,
+        description=made.description(),
+        colour_format=colour_format,
+        overwrite=overwrite,
+        threads=threads,
+    ) as writer:
+        for frame in progress(made.frames(threads)):
+            writer.append(
+                frame.timestamp,
+                frame.depth,
+                colour=frame.colour,
+                mask=frame.mask,
+                exact_depth=frame.exact_depth,
+                pose=frame.pose,
+                joints=frame.joints,
+            )
+    return made

@@ -1,0 +1,134 @@
+"""Reads the motion files of `sequences/`, and a user's own: small TOML tables, checked before they are used."""
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import ANGLE_NAMES, FINGERS
+from depthtrack.resources import resource_folder
+
+Array = NDArray[np.float64]
+
+POSTURES_FILE = "postures.toml"
+_MAX_BYTES = 1 << 20
+
+
+def motion_names() -> list[str]:
+    """Names of the motions that come with the program."""
+    return sorted(path.stem for path in resource_folder("sequences").glob("*.toml") if path.name != POSTURES_FILE)
+
+
+def find_motion(name: str) -> Path:
+    """File of a motion given by name, or by the path of a .toml file. Raises InputError listing the names."""
+    if name in motion_names():
+        return resource_folder("sequences") / f"{name}.toml"
+    path = Path(name)
+    if path.suffix == ".toml" and path.is_file():
+        return path
+    raise InputError(f"no motion '{name}': choose one of {', '.join(motion_names())}, or give the path of a .toml file")
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """The parsed TOML file. Raises InputError when it is missing, larger than 1 MiB, or not TOML."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_BYTES + 1)
+        if len(data) > _MAX_BYTES:
+            raise InputError(f"{path} must be a motion file of at most 1 MiB, found a larger one")
+        return tomllib.loads(data.decode("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"cannot read the motion file {path}: {error}") from error
+
+
+def check_names(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+    """Refuse entries that mean nothing, which are mostly misspelt ones."""
+    known = list(known)
+    for name in table:
+        if name not in known:
+            raise InputError(f"{where}: there is no '{name}'; use {', '.join(known)}")
+
+
+def numbers(value: Any, count: int, bound: float, where: str) -> Array:
+    """`count` finite numbers of magnitude at most `bound`, or an InputError."""
+    valid = isinstance(value, list) and len(value) == count and all(_is_number(v) and abs(v) <= bound for v in value)
+    if not valid:
+        raise InputError(f"{where} must be {count} numbers between {-bound:g} and {bound:g}, found {_short(value)}")
+    return np.array(value, dtype=np.float64)
+
+
+def number(table: Mapping[str, Any], name: str, low: float, high: float, where: str) -> float:
+    """A number of the table between `low` and `high`, or an InputError."""
+    value = table.get(name)
+    if not (_is_number(value) and low <= float(value) <= high):  # type: ignore[arg-type]
+        raise InputError(f"{where}: {name} must be a number from {low:g} to {high:g}, found {_short(value)}")
+    return float(value)  # type: ignore[arg-type]
+
+
+def text(table: Mapping[str, Any], name: str, where: str) -> str:
+    """A line of text of the table, or an InputError."""
+    value = table.get(name)
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{where}: {name} must be a line of text, found {_short(value)}")
+    return value
+
+
+def tables(table: Mapping[str, Any], name: str, most: int, where: str) -> list[dict[str, Any]]:
+    """A list of 1 to `most` tables, or an InputError."""
+    value = table.get(name)
+    if not isinstance(value, list) or not 1 <= len(value) <= most or not all(isinstance(v, dict) for v in value):
+        raise InputError(f"{where}: {name} must be a list of 1 to {most} tables, found {_short(value)}")
+    return value
+
+
+def posture(table: Mapping[str, Any], where: str) -> dict[str, Array]:
+    """Finger angles (4,) in radians of each finger that the table names. Raises InputError outside the joint limits."""
+    angles = {}
+    for finger in FINGERS:
+        if finger in table:
+            angles[finger] = np.radians(numbers(table[finger], 4, 180, f"{where}, {finger} in degrees"))
+            _check_limits(finger, angles[finger], where)
+    return angles
+
+
+def shared_postures(more: Mapping[str, Any], where: str) -> dict[str, Array]:
+    """Angles (20,) by posture name: those of `postures.toml`, and `more` of a motion's own."""
+    path = resource_folder("sequences") / POSTURES_FILE
+    postures = {}
+    for source, table in ((str(path), read_table(path)), (where, more)):
+        for name, fingers in table.items():
+            place = f"{source}, posture '{name}'"
+            if not isinstance(fingers, dict) or set(fingers) != set(FINGERS):
+                raise InputError(f"{place} must give {', '.join(FINGERS)} and nothing else, found {_short(fingers)}")
+            postures[name] = np.concatenate([posture(fingers, place)[finger] for finger in FINGERS])
+    return postures
+
+
+def elbow(table: Mapping[str, Any], where: str) -> Array:
+    """(3,) metres: where the forearm comes from, of somebody who faces the camera unless the file says otherwise."""
+    return numbers(table.get("elbow", [-50, 260, 110]), 3, 2000, f"{where}: elbow in mm") / 1000
+
+
+def _check_limits(finger: str, angles: Array, where: str) -> None:
+    first = 4 * FINGERS.index(finger)
+    low, high = LOWER[first : first + 4], UPPER[first : first + 4]
+    for k in np.flatnonzero((angles < low - 1e-9) | (angles > high + 1e-9)):
+        found, least, most = (round(math.degrees(value)) for value in (angles[k], low[k], high[k]))
+        raise InputError(
+            f"{where}: {ANGLE_NAMES[first + k]} must lie within its range, {least} to {most} degrees, found {found}"
+        )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _short(value: object) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -1,0 +1,162 @@
+"""Natural motion of any length from a seed: the hand wanders and turns while it goes from posture to posture.
+
+Postures are either known ones, slightly varied, or drawn from the couplings of real fingers: the first synergy
+closes all of them together (Santello, Flanders and Soechting, "Postural hand synergies for tool use", 1998), the last
+joint bends by two thirds of the one before it (Rijpkema and Girard, "Computer animation of knowledge-based human
+grasping", 1991), and fingers close up sideways as they bend. What would pass fingers through each other is not drawn.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
+
+from depthtrack.errors import InputError
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import ANGLES, make_pose
+from depthtrack.hand.shape import HandShape
+from depthtrack.synthesis import motion_file
+from depthtrack.synthesis.clearance import Clearance
+from depthtrack.synthesis.randomness import Stream, generator
+from depthtrack.synthesis.scene_frame import orientation
+
+Array = NDArray[np.float64]
+
+_LARGEST_OVERLAP = 0.0035
+_TRIES = 20
+_WANDER = ("right", "down", "away", "tilt", "nod", "turn")
+_SPREAD = np.radians([0, 13, 1, -9, -20])
+"""Abduction of the straight fingers of a spread hand."""
+
+
+@dataclass(frozen=True)
+class RandomMotion:
+    """See the module.
+
+    `postures` (N, 20) radians; `hold`, `move`, `wander` seconds; `ranges` (6, 2) of position (m) and angles (rad);
+    `elbow` (3,) where the forearm comes from, scene frame, metres.
+    """
+
+    name: str
+    about: str
+    postures: Array
+    drawn: float
+    hold: tuple[float, float]
+    move: tuple[float, float]
+    wander: tuple[float, float]
+    ranges: Array
+    elbow: Array
+    duration: None = None
+
+    @classmethod
+    def from_table(cls, name: str, table: dict[str, Any], where: str) -> "RandomMotion":
+        """Build from a parsed motion file; `where` names it in error messages. Raises InputError."""
+        motion_file.check_names(table, ("about", "random", "postures", "elbow"), where)
+        postures = motion_file.shared_postures(table.get("postures", {}), where)
+        options = table["random"]
+        if not isinstance(options, dict):
+            raise InputError(f"{where}: [random] must be a table, found {options!r}")
+        motion_file.check_names(
+            options, ("postures", "drawn", "hold", "move", "wander", *_WANDER), f"{where}, [random]"
+        )
+        names = options.get("postures")
+        if not isinstance(names, list) or not names or any(n not in postures for n in names):
+            raise InputError(f"{where}, [random]: postures must be a list of some of {', '.join(postures)}")
+        ranges = np.array([_range(options, n, -720, 720, where) for n in _WANDER])
+        return cls(
+            name,
+            motion_file.text(table, "about", where),
+            np.stack([postures[n] for n in names]),
+            motion_file.number(options, "drawn", 0, 1, where),
+            _range(options, "hold", 0, 60, where),
+            _range(options, "move", 0.05, 60, where),
+            _range(options, "wander", 0.05, 60, where),
+            np.concatenate([ranges[:3] / 1000, np.radians(ranges[3:])]),
+            motion_file.elbow(table, where),
+        )
+
+    def poses(self, times: ArrayLike, seed: int) -> Array:
+        """See `Motion`. A longer motion of the same seed begins like a shorter one."""
+        t = np.asarray(times, dtype=np.float64)
+        end = float(t.max(initial=0))
+        angles = PchipInterpolator(*self._posture_keys(end, seed))(t)
+        right, down, away, tilt, nod, turn = (self._wander(n, end, seed)(t) for n in range(len(_WANDER)))
+        return make_pose(np.stack([right, down, away], axis=-1), orientation(tilt, nod, turn), angles)
+
+    def _posture_keys(self, end: float, seed: int) -> tuple[Array, Array]:
+        """Times (K,) and angles (K, 20): each posture is reached, held for a moment, and left."""
+        clearance = Clearance(HandShape())
+        times, angles = [0.0], [self.postures[0]]
+        while len(times) < 5 or times[-4] <= end:
+            rng = generator(seed, len(times), Stream.POSTURES)
+            times.append(times[-1] + max(rng.uniform(*self.hold), 1e-3))
+            angles.append(angles[-1])
+            times.append(times[-1] + rng.uniform(*self.move))
+            angles.append(self._next(angles[-1], rng, clearance))
+        return np.array(times), np.stack(angles)
+
+    def _next(self, current: Array, rng: np.random.Generator, clearance: Clearance) -> Array:
+        """A posture that can be reached from the current one without fingers passing through each other."""
+        for _ in range(_TRIES):
+            candidate = self._draw(rng)
+            # Between two held postures the interpolation runs along the straight line.
+            path = current + np.linspace(0.1, 1, 10)[:, None] * (candidate - current)
+            if clearance.penetration(_posed(path)).max() < _LARGEST_OVERLAP:
+                return candidate
+        return current
+
+    def _draw(self, rng: np.random.Generator) -> Array:
+        if rng.random() < self.drawn:
+            return coupled_posture(rng)
+        known = self.postures[rng.integers(len(self.postures))]
+        return np.clip(known + rng.normal(0, np.radians(3), 20), LOWER, UPPER)
+
+    def _wander(self, channel: int, end: float, seed: int) -> PchipInterpolator:
+        """A smooth random walk within the channel's range: a first-order autoregressive process, squashed."""
+        low, high = self.ranges[channel]
+        times, values = [0.0], [0.0]
+        while len(times) < 5 or times[-3] <= end:
+            rng = generator(seed, len(times) * len(_WANDER) + channel, Stream.WANDERING)
+            times.append(times[-1] + rng.uniform(*self.wander))
+            values.append(0.6 * values[-1] + 0.8 * rng.normal())
+        return PchipInterpolator(np.array(times), (low + high) / 2 + (high - low) / 2 * np.tanh(np.array(values)))
+
+
+def coupled_posture(rng: np.random.Generator) -> Array:
+    """Angles (20,) of a hand whose joints move together as they do in real ones."""
+    closing = rng.beta(0.8, 0.8)
+    # Neighbours follow each other: a random walk from index to little finger about the common closing.
+    own = np.clip(closing + np.cumsum(rng.normal(0, 0.12, 4)), 0, 1)
+    balance = rng.uniform(0.55, 1.0)  # how much of the closing happens at the knuckles
+    pip = np.radians(100) * own
+    fingers = np.stack(
+        [
+            _SPREAD[1:] * rng.uniform(0.2, 1.0) * (1 - own),
+            np.radians(85) * own * balance,
+            pip,
+            2 / 3 * pip,
+        ],
+        axis=-1,
+    )
+    # The thumb lies beside the palm or comes across as the fingers close.
+    opposing = np.clip(closing + rng.normal(0, 0.2), 0, 1)
+    thumb = np.radians([rng.uniform(-8, 16), -16 + 30 * opposing, 35 * opposing, 45 * opposing])
+    return np.clip(np.concatenate([thumb, fingers.ravel()]), LOWER, UPPER)
+
+
+def _posed(angles: Array) -> Array:
+    poses = np.zeros((*angles.shape[:-1], 27))
+    poses[..., 3] = 1
+    poses[..., ANGLES] = angles
+    return poses
+
+
+def _range(table: dict[str, Any], name: str, low: float, high: float, where: str) -> tuple[float, float]:
+    pair = motion_file.numbers(table.get(name), 2, max(abs(low), abs(high)), f"{where}, [random]: {name}")
+    if not low <= pair[0] <= pair[1]:
+        raise InputError(
+            f"{where}, [random]: {name} must be a smallest and a largest value from {low:g} on, found {pair}"
+        )
+    return float(pair[0]), float(pair[1])

@@ -1,0 +1,98 @@
+"""What stands before the camera in a frame: the hand, its forearm, and whatever is behind them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin import Skin
+from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.synthesis.backdrop import FOREARM, Backdrop
+from depthtrack.synthesis.forearm import Forearm
+
+Array = NDArray[np.float64]
+HandKind = Literal["primitives", "skin"]
+
+
+class DrawsHand(Protocol):
+    """Draws a posed hand into a surface, labelled by body (0 to 15)."""
+
+    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+        """`transforms` T_camera_body (16, 4, 4), metres."""
+        ...
+
+
+@dataclass(frozen=True)
+class PrimitiveHand:
+    """The hand of spheres and cylinders."""
+
+    primitives: Primitives
+
+    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+        raycast(camera, self.primitives.kinds, self.primitives.placed(transforms), self.primitives.bodies, onto)
+
+
+@dataclass(frozen=True)
+class SkinHand:
+    """The skinned mesh."""
+
+    skin: Skin
+
+    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+        vertices = self.skin.vertices(transforms)
+        rasterise(camera, vertices, self.skin.faces, self.skin.normals(vertices), self.skin.face_bodies, onto)
+
+
+@dataclass(frozen=True)
+class View:
+    """A rendered frame: the surface, and T_camera_body (17, 4, 4) of the 16 bodies and the forearm."""
+
+    surface: Surface
+    transforms: Array
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Renders the hand of given sizes, with or without forearm, before a backdrop that stays."""
+
+    shape: HandShape
+    kind: HandKind
+    has_forearm: bool
+    camera: Camera
+    backdrop: Backdrop
+
+    def view(self, pose: Array, elbow: Array) -> View:
+        """The scene with the hand in `pose` (27,) and its forearm pointing at `elbow` (3,), camera frame."""
+        still = self.backdrop.surface
+        surface = Surface(still.depth.copy(), still.label.copy(), still.normal.copy())
+        transforms = np.empty((BODY_COUNT + 1, 4, 4))
+        transforms[:BODY_COUNT] = self.model.transforms(pose)
+        self._hand.draw(self.camera, transforms[:BODY_COUNT], surface)
+        bend = self._forearm.bend(transforms[0], elbow)
+        transforms[FOREARM] = self._forearm.frame(transforms[0], bend)
+        if self.has_forearm:
+            vertices, normals = self._forearm.mesh(transforms[0], bend)
+            faces = self._forearm.faces
+            rasterise(self.camera, vertices, faces, normals, np.full(len(faces), FOREARM), surface)
+        return View(surface, transforms)
+
+    @cached_property
+    def model(self) -> HandModel:
+        """Kinematics of the hand."""
+        return HandModel(self.shape)
+
+    @cached_property
+    def _hand(self) -> DrawsHand:
+        return PrimitiveHand(Primitives.of(self.shape)) if self.kind == "primitives" else SkinHand(Skin.of(self.shape))
+
+    @cached_property
+    def _forearm(self) -> Forearm:
+        return Forearm(self.shape)

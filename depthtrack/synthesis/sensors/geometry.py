@@ -1,0 +1,99 @@
+"""What depth sensors share: the angle at which they see a surface, its edges, and where a second viewpoint is blind."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.rendering.surface import Surface
+
+Array = NDArray[np.float64]
+
+JUMP = 0.02
+"""Neighbouring depths that differ by more than this share of themselves are two surfaces, not one."""
+
+
+def incidence(surface: Surface, camera: Camera) -> Array:
+    """Angle (h, w) in radians between the surface's normal and the line of sight; pi / 2 where there is no surface."""
+    out = np.empty(surface.depth.shape)
+    _incidence(surface.depth, surface.normal, (camera.fx, camera.fy, camera.cx, camera.cy), out)
+    return out
+
+
+def edges(depth: Array, radius: int = 1) -> NDArray[np.bool_]:
+    """Pixels (h, w) of a surface that ends, or jumps in depth, within `radius` pixels in a row or column."""
+    out = np.zeros(depth.shape, dtype=np.bool_)
+    _edges(depth, radius, JUMP, out)
+    return out
+
+
+def shadow(depth: Array, camera: Camera, baseline: float) -> NDArray[np.bool_]:
+    """Pixels (h, w) of the surface that a second viewpoint, `baseline` metres to the right (+x), does not see.
+
+    A row of the image is a row of the second one too. There, the surface is drawn into a buffer of inverse depth,
+    segment by segment between neighbouring pixels; a pixel is blind where something nearer was drawn over it.
+    """
+    out = np.zeros(depth.shape, dtype=np.bool_)
+    _shadow(depth, camera.fx * baseline, JUMP, out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], out: Array) -> None:
+    fx, fy, cx, cy = intrinsics
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
+            if depth[v, u] <= 0.0:
+                out[v, u] = math.pi / 2
+                continue
+            x, y = (u - cx) / fx, (v - cy) / fy
+            cosine = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2]) / math.sqrt(x * x + y * y + 1.0)
+            out[v, u] = math.acos(min(max(cosine, 0.0), 1.0))
+
+
+@numba.njit(cache=True, nogil=True)
+def _edges(depth: Array, radius: int, jump: float, out: NDArray[np.bool_]) -> None:
+    height, width = depth.shape
+    for v in range(height):
+        for u in range(width):
+            z = depth[v, u]
+            if z <= 0.0:
+                continue
+            for k in range(-radius, radius + 1):
+                across = depth[v, min(max(u + k, 0), width - 1)]
+                along = depth[min(max(v + k, 0), height - 1), u]
+                if abs(across - z) > jump * z or abs(along - z) > jump * z:
+                    out[v, u] = True
+                    break
+
+
+@numba.njit(cache=True, nogil=True)
+def _shadow(depth: Array, focal_baseline: float, jump: float, out: NDArray[np.bool_]) -> None:
+    height, width = depth.shape
+    inverse = np.empty(width)
+    for v in range(height):
+        inverse[:] = 0.0
+        for u in range(width):
+            z = depth[v, u]
+            if z <= 0.0:
+                continue
+            here = u - focal_baseline / z
+            # The surface reaches on to its right neighbour; an isolated pixel covers its own width.
+            z_next = depth[v, u + 1] if u + 1 < width else 0.0
+            if not abs(z_next - z) <= jump * z:
+                z_next = z
+            there = u + 1 - focal_baseline / z_next
+            first, last = math.ceil(min(here, there)), math.floor(max(here, there))
+            for k in range(max(first, 0), min(last, width - 1) + 1):
+                share = (k - here) / (there - here) if there != here else 0.0
+                inverse[k] = max(inverse[k], (1.0 - share) / z + share / z_next)
+        for u in range(width):
+            z = depth[v, u]
+            if z <= 0.0:
+                continue
+            k = round(u - focal_baseline / z)
+            # What lies outside the second image is taken as seen: real ones reach beyond ours on that side.
+            if 0 <= k < width and inverse[k] > (1.0 + jump) / z:
+                out[v, u] = True

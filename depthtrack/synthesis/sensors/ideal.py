@@ -1,0 +1,27 @@
+"""A perfect depth camera: the true depth at every pixel centre."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import PRESETS, Camera
+from depthtrack.rendering.surface import Surface
+
+
+@dataclass(frozen=True)
+class Ideal:
+    """See `Sensor`. Kinect v1's image, stored in steps of 0.1 mm (up to 6.5 m), so that rounding does not matter."""
+
+    camera: Camera = field(default_factory=lambda: replace(PRESETS["kinect1"], depth_scale=0.0001))
+    usual_distance: float = 0.5
+    colour_noise: float = 0.0
+
+    def read(self, surface: Surface, rng: np.random.Generator) -> NDArray[np.float64]:
+        return surface.depth.copy()
+
+
+def with_gaussian_noise(depth: NDArray[np.float64], deviation: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Depth (h, w) with independent normal errors of `deviation` metres (Oikonomidis et al. 2011, Fig. 2c)."""
+    noisy = depth + deviation * rng.standard_normal(depth.shape)
+    return np.where(depth > 0, np.maximum(noisy, 0), 0)
