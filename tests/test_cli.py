@@ -1,0 +1,56 @@
+"""The command line as a whole: it answers at once, and mistakes end in one sentence and exit code 2."""
+
+import subprocess
+import sys
+
+import pytest
+
+from depthtrack import __version__
+from depthtrack.cli import COMMANDS, main
+
+_HEAVY = ("cv2", "numba", "scipy", "trimesh", "matplotlib", "rerun", "OpenGL")
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "depthtrack", *arguments], capture_output=True, text=True, check=False)
+
+
+def test_the_overview_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    text = capsys.readouterr().out
+    for name, entry in COMMANDS.items():
+        assert f"  {name}" in text
+        assert entry.summary in text
+
+
+@pytest.mark.parametrize("command", [None, *COMMANDS])
+def test_help_imports_nothing_heavy(command: str | None) -> None:
+    """What makes `--help` quick: asserted by what it loads, not by a clock."""
+    arguments = ["--help"] if command is None else [command, "--help"]
+    code = (
+        "import sys\nfrom depthtrack.cli import main\n"
+        f"try:\n    main({arguments!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+        f"heavy = {_HEAVY!r} + (('numpy', 'tyro') if {command is None} else ())\n"
+        "loaded = [name for name in heavy if name in sys.modules]\nassert not loaded, loaded"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "usage" in done.stdout
+
+
+def test_unknown_commands_and_options_exit_with_2() -> None:
+    for arguments in (("dance",), ("info",), ("info", "somewhere", "--no-such-option")):
+        done = run(*arguments)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
+
+
+def test_version() -> None:
+    assert run("--version").stdout.strip() == f"depthtrack {__version__}"
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m depthtrack --help | head -1", shell=True, capture_output=True, text=True, check=False
+    )
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,68 @@
+"""The data folders travel with every kind of installation."""
+
+import subprocess
+import sys
+import tarfile
+from pathlib import Path
+
+import pytest
+
+from depthtrack.errors import InputError
+from depthtrack.resources import resource_folder
+
+ROOT = Path(__file__).parent.parent
+_REPORT = (
+    "from depthtrack.resources import resource_folder as f;"
+    "print(f('sequences') / 'everyday.toml', f('shaders').is_dir(), sep='\\n')"
+)
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an sdist, and the wheel built from that sdist."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def installed(package: Path, folder: Path) -> list[str]:
+    """Install a distribution alone into a folder, and ask it from elsewhere where its data is."""
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run([*pip, "--target", str(folder / "site"), str(package)], check=True, capture_output=True)
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", _REPORT],
+        cwd=folder,
+        env={"PYTHONPATH": str(folder / "site")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.split("\n")
+
+
+@pytest.mark.parametrize("pattern", ["*.whl", "*.tar.gz"])
+def test_wheel_and_sdist_carry_their_data(distributions: Path, tmp_path: Path, pattern: str) -> None:
+    (package,) = distributions.glob(pattern)
+    everyday, shaders, *_ = installed(package, tmp_path)
+    assert Path(everyday).is_relative_to(tmp_path / "site")
+    assert Path(everyday).is_file()
+    assert shaders == "True"
+
+
+def test_sdist_holds_what_building_and_testing_need(distributions: Path) -> None:
+    (sdist,) = distributions.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"pyproject.toml", "README.md", "LICENSE", "Makefile", "sequences/everyday.toml"} <= names
+    assert any(name.startswith("tests/") for name in names)
+
+
+def test_a_checkout_finds_its_own_folders() -> None:
+    assert resource_folder("sequences") == ROOT / "sequences"
+
+
+def test_a_missing_folder_is_told() -> None:
+    with pytest.raises(InputError, match="reinstall"):
+        resource_folder("no-such-folder")
