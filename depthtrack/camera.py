@@ -72,7 +72,7 @@ class Camera:
 
     def crop(self, left: int, top: int, width: int, height: int) -> Self:
         """Camera of the window whose first pixel is (left, top); the window may reach outside the image."""
-        return replace(self, width=width, height=height, cx=self.cx - left, cy=self.cy - top)
+        return replace(self, width=int(width), height=int(height), cx=self.cx - int(left), cy=self.cy - int(top))
 
     def resized(self, factor: float) -> Self:
         """Camera of the image resampled by `factor` (0.5 halves both sides), pixel areas aligned at the corner."""
