@@ -12,7 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
 from depthtrack.viewing.depth_colours import colour_scale
 from depthtrack.viewing.moments import Moment
-from depthtrack.viewing.panels import beside, blank, captioned, paint, stacked, tile_grid
+from depthtrack.viewing.panels import Layer, beside, blank, captioned, paint, smaller, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, TEXT, TRUE_MASK, Rgb
 
@@ -78,8 +78,9 @@ def save_png(image: Image, path: Path) -> None:
 
 def _tile(moment: Moment, height: int, near: float, far: float) -> Image:
     """Depth and overview; without colour the overview is drawn on the depth itself."""
-    overview = paint(moment, "overview", height, near, far)
-    pictures = [overview] if moment.frame.colour is None else [paint(moment, "depth", height, near, far), overview]
+    layers: list[Layer] = ["overview"] if moment.frame.colour is None else ["depth", "overview"]
+    large = [paint(moment, layer, 2 * height, near, far) for layer in layers]
+    pictures = [smaller(image, image.shape[1] // 2, height) for image in large]
     return captioned(beside(pictures, gap=0), f"frame {moment.frame.index}", f"{moment.frame.timestamp:.2f} s")
 
 

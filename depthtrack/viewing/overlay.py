@@ -60,17 +60,17 @@ def draw_skeleton(
     """`image` with the 21 keypoints (21, 3), metres in the camera frame, as bones and joints, a colour per finger.
 
     `camera` is the image's own (resized and cropped with it). Nearer bones cover farther ones. Keypoints that are
-    not finite or not in front of the camera are left out with their bones. `thickness` in pixels follows the image's
-    height unless given; `colours` by finger, and "palm", replace the theme's.
+    not finite or not in front of the camera are left out with their bones. `thickness` in pixels follows the hand's
+    size in the image unless given; `colours` by finger, and "palm", replace the theme's.
     """
     points = np.asarray(keypoints, dtype=np.float64)
     if points.shape != (len(KEYPOINT_NAMES), 3):
         raise ValueError(f"keypoints must have shape ({len(KEYPOINT_NAMES)}, 3), found {points.shape}")
-    thickness = _line_width(image) + 1 if thickness is None else thickness
     palette = {"palm": PALM, **FINGER_COLOURS, **(colours or {})}
     pixels = camera.project(points)
     out = np.ascontiguousarray(image).copy()
     seen = np.isfinite(pixels.sum(axis=-1))
+    thickness = _bone_thickness(image, pixels[seen]) if thickness is None else thickness
     for (a, b), part in _far_to_near(points, seen):
         _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
     return out
@@ -109,6 +109,12 @@ def _inner_contour(mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * width + 1, 2 * width + 1))
     inner = cv2.erode(mask.astype(np.uint8), element, borderType=cv2.BORDER_CONSTANT, borderValue=1)
     return mask & (inner == 0)
+
+
+def _bone_thickness(image: NDArray[np.uint8], pixels: NDArray[np.float64]) -> int:
+    """Pixels; a hand looks the same near and far, within what the image's size makes readable."""
+    extent = float(np.ptp(pixels, axis=0).max()) if len(pixels) else 0.0
+    return round(min(max(extent / 90, 1), 2 * _line_width(image)))
 
 
 def _line_width(image: NDArray[np.uint8]) -> int:

@@ -130,10 +130,15 @@ def _with_gaps(images: list[Image], gap: int, axis: int) -> list[Image]:
     return parts
 
 
+def smaller(image: Image, width: int, height: int) -> Image:
+    """`image` shrunk by averaging, which smooths lines that were drawn large."""
+    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+
+
 def _scaled(image: Image, width: int, height: int) -> Image:
-    shrinks = height < image.shape[0]
-    method = cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
-    return cv2.resize(image, (width, height), interpolation=method).astype(np.uint8, copy=False)
+    if height < image.shape[0]:
+        return smaller(image, width, height)
+    return cv2.resize(image, (width, height), interpolation=cv2.INTER_CUBIC).astype(np.uint8, copy=False)
 
 
 def _scaled_mask(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:

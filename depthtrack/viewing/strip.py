@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.moments import Moment
-from depthtrack.viewing.panels import Layer, beside, blank, paint, stacked
+from depthtrack.viewing.panels import Layer, beside, blank, paint, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT
 
@@ -39,7 +38,8 @@ def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
     side = (width - LABEL_WIDTH - GAP * len(close)) // len(close)
     rows = [
         beside(
-            [_label(name, side), *(_smooth(paint(moment, layer, 2 * side, near, far), side) for moment in close)], GAP
+            [_label(name, side), *(smaller(paint(moment, layer, 2 * side, near, far), side, side) for moment in close)],
+            GAP,
         )
         for layer, name in ROWS
         if _has(close, layer)
@@ -78,11 +78,6 @@ def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
         return depth_range(np.stack([moment.frame.depth for moment in moments]))
     near, far = depth_range(np.concatenate(hands))
     return near, far + 0.25 * (far - near)
-
-
-def _smooth(image: Image, side: int) -> Image:
-    """A square of half the size, which smooths lines and contours."""
-    return cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 
 def _label(name: str, height: int) -> Image:
