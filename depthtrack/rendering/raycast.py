@@ -61,7 +61,7 @@ def _window(camera: Camera, kind: int, T: Array) -> tuple[int, int, int, int]:
     return int(u0), int(u1), int(v0), int(v1)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _cast(
     kinds: NDArray[np.int64],
     inverses: Array,

@@ -39,7 +39,7 @@ def rasterise(
     return surface
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _rasterise(
     vertices: Array,
     faces: NDArray[np.int64],
