@@ -15,6 +15,7 @@ from depthtrack.errors import DepthtrackError, InputError, MissingExtraError
 from depthtrack.recording import open_sequence
 from depthtrack.viewing.moments import Moment, moments
 from depthtrack.viewing.rerun_viewer import RerunViewer
+from depthtrack.viewing.theme import ESTIMATED_MASK
 from depthtrack.viewing.video import VideoWriter
 from tests.recording_samples import CAMERA, TIMES, write_sample
 
@@ -148,6 +149,7 @@ def test_asking_for_a_viewer_file_without_the_extra_names_the_pip_line(
         ["--frames", "5", "--sheet", "a.png"],
         ["--frames", "-1", "--strip", "a.png"],
         ["--count", "0"],
+        ["--count", "1000000000"],
         ["--depth-range", "2", "1"],
         ["--depth-range", "nan", "1"],
         ["--sheet", "a.txt"],
@@ -201,3 +203,18 @@ def test_a_viewer_file_that_fails_leaves_nothing(sample: Path, out: Path) -> Non
         with pytest.raises(InputError):
             RerunViewer("sample", CAMERA, 0.4, 0.9).save(out / name, iter(()))
     assert names(out) == []
+
+
+# Estimated masks
+
+
+def test_a_hand_without_a_true_mask_is_estimated_unless_told_not_to(real_data: Path, out: Path) -> None:
+    recording = str(real_data / "rgbd" / "sr305-poses")
+    assert main(["view", recording, "--sheet", "with.png", "--count", "3"]) == 0
+    assert main(["view", recording, "--sheet", "without.png", "--count", "3", "--no-estimate"]) == 0
+    for name, expected in (("with.png", True), ("without.png", False)):
+        page = cv2.imread(name)
+        assert page is not None
+        tiles = page[:-60, :, ::-1].astype(int)  # RGB, without the legend
+        marked = np.all(np.abs(tiles - ESTIMATED_MASK) < 40, axis=-1)
+        assert bool(marked.sum() > 100) == expected

@@ -300,6 +300,11 @@ def test_a_strip_looks_close_at_the_hand() -> None:
     assert 0.55 < lit.mean() < 0.75
 
 
+def test_a_strip_of_too_many_moments_is_refused() -> None:
+    with pytest.raises(InputError, match="room for 43"):
+        strip([moment()] * 44)
+
+
 def test_text_stays_inside_the_image_and_is_as_wide_as_told() -> None:
     canvas = np.zeros((40, 300, 3), dtype=np.uint8)
     put_text(canvas, "frame 12", (20, 20), 16, (255, 255, 255))

@@ -12,9 +12,10 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.recording import Sequence
-    from depthtrack.viewing.moments import Moment
+    from depthtrack.viewing.moments import MaskEstimator, Moment
     from depthtrack.viewing.rerun_viewer import RerunViewer
 
+MOST_MOMENTS = 200
 INSTALL_HINT = "pip install 'depthtrack[view]'"
 
 
@@ -43,6 +44,8 @@ class Command:
     """How many moments to choose: 12 on a sheet and 7 on a strip unless given."""
     depth_range: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="NEAR FAR")] = None
     """Metres at the ends of the depth colours; found from the recording unless given."""
+    estimate: bool = True
+    """Where the recording knows no true mask, show the hand as segmentation finds it, in another colour."""
     codec: Literal["quick", "web"] = "quick"
     """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
 
@@ -66,8 +69,10 @@ class Command:
             print(f"skipped frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}")
 
     def _check_options(self) -> None:
-        if self.count is not None and self.count < 1:
-            raise InputError(f"--count must be at least 1 moment, found {self.count}")
+        if self.count is not None and not 1 <= self.count <= MOST_MOMENTS:
+            raise InputError(f"--count must be from 1 to {MOST_MOMENTS} moments, found {self.count}")
+        if len(self.frames) > MOST_MOMENTS:
+            raise InputError(f"--frames must name at most {MOST_MOMENTS} frames, found {len(self.frames)}")
         if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1] < float("inf"):
             raise InputError(f"--depth-range must be two growing numbers of metres, found {self.depth_range}")
 
@@ -116,7 +121,7 @@ class Command:
         from depthtrack.viewing.panels import panel, useful_layers
         from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, VideoWriter
 
-        layers = useful_layers(sequence)
+        layers = useful_layers(sequence, self._estimator())
         codecs = WEB_CODECS if self.codec == "web" else QUICK_CODECS
         with VideoWriter(path, frame_rate(sequence) or 30.0, codecs) as writer:
             for moment in self._all_moments(sequence):
@@ -129,7 +134,14 @@ class Command:
 
         from depthtrack.viewing.moments import moments
 
-        yield from tqdm(moments(sequence), total=len(sequence), unit="frame", delay=1, leave=False, disable=None)
+        yield from tqdm(
+            moments(sequence, None, self._estimator()),
+            total=len(sequence),
+            unit="frame",
+            delay=1,
+            leave=False,
+            disable=None,
+        )
 
     def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[Moment]":
         from depthtrack.viewing.moments import evenly_chosen, moments
@@ -137,7 +149,15 @@ class Command:
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
         if outside:
             raise InputError(f"--frames must be from 0 to {len(sequence) - 1} in {sequence.name}, found {outside[0]}")
-        return moments(sequence, self.frames or evenly_chosen(len(sequence), count))
+        return moments(sequence, self.frames or evenly_chosen(len(sequence), count), self._estimator())
+
+    def _estimator(self) -> "MaskEstimator | None":
+        """A fresh one for each pass over the recording, which it follows."""
+        if not self.estimate:
+            return None
+        from depthtrack.viewing.estimated_masks import mask_estimator
+
+        return mask_estimator()
 
 
 def _depth_range(sequence: "Sequence") -> tuple[float, float]:

@@ -25,6 +25,9 @@ FINGER_BONES: dict[str, tuple[Bone, ...]] = {
 }
 """The three bones of each finger, from the palm outward, as pairs of keypoints."""
 
+BONE_BREADTH = 0.0018
+"""Metres; slim enough that neighbouring fingers stay apart."""
+
 _SUBPIXEL_BITS = 4
 _FARTHEST_PIXEL = 1 << 20
 
@@ -61,7 +64,7 @@ def draw_skeleton(
 
     `camera` is the image's own (resized and cropped with it). Nearer bones cover farther ones. Keypoints that are
     not finite or not in front of the camera are left out with their bones. `thickness` in pixels follows the hand's
-    size in the image unless given; `colours` by finger, and "palm", replace the theme's.
+    distance unless given; `colours` by finger, and "palm", replace the theme's.
     """
     points = np.asarray(keypoints, dtype=np.float64)
     if points.shape != (len(KEYPOINT_NAMES), 3):
@@ -70,7 +73,7 @@ def draw_skeleton(
     pixels = camera.project(points)
     out = np.ascontiguousarray(image).copy()
     seen = np.isfinite(pixels.sum(axis=-1))
-    thickness = _bone_thickness(image, pixels[seen]) if thickness is None else thickness
+    thickness = _bone_thickness(image, camera, points[seen, 2]) if thickness is None else thickness
     for (a, b), part in _far_to_near(points, seen):
         _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
     return out
@@ -111,10 +114,11 @@ def _inner_contour(mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
     return mask & (inner == 0)
 
 
-def _bone_thickness(image: NDArray[np.uint8], pixels: NDArray[np.float64]) -> int:
-    """Pixels; a hand looks the same near and far, within what the image's size makes readable."""
-    extent = float(np.ptp(pixels, axis=0).max()) if len(pixels) else 0.0
-    return round(min(max(extent / 90, 1), 2 * _line_width(image)))
+def _bone_thickness(image: NDArray[np.uint8], camera: Camera, depths: NDArray[np.float64]) -> int:
+    """Pixels that BONE_BREADTH takes at the hand's distance, within what the image's size makes readable."""
+    thinnest = _line_width(image)
+    apparent = BONE_BREADTH * camera.fx / float(np.median(depths)) if len(depths) else 0.0
+    return round(min(max(apparent, thinnest), 3 * thinnest))
 
 
 def _line_width(image: NDArray[np.uint8]) -> int:

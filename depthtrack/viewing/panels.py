@@ -38,7 +38,7 @@ def paint(moment: Moment, layer: Layer, height: int, near: float, far: float) ->
     if layer == "hand" and mask is not None:
         image = spotlight(image, mask)
     if layer in ("mask", "hand", "overview") and mask is not None:
-        image = overlay_mask(image, mask, mask_colour(moment), opacity=0 if layer == "hand" else 0.4)
+        image = overlay_mask(image, mask, mask_colour(moment), _tint(moment, layer))
     if layer == "skeleton":
         image = dimmed(image)
     if layer in ("skeleton", "overview") and moment.keypoints is not None:
@@ -117,6 +117,13 @@ def _layer_caption(layer: Layer, moment: Moment) -> tuple[str, str, Rgb]:
     if layer == "skeleton":
         return "true skeleton", "" if moment.keypoints is not None else "not annotated", TEXT
     return layer, "", TEXT
+
+
+def _tint(moment: Moment, layer: Layer) -> float:
+    """Opacity of the silhouette: a contour alone around a lit hand, and little colour under a skeleton."""
+    if layer == "hand":
+        return 0.0
+    return 0.15 if layer == "overview" and moment.keypoints is not None else 0.4
 
 
 def _with_gaps(images: list[Image], gap: int, axis: int) -> list[Image]:

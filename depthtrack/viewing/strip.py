@@ -8,42 +8,38 @@ from numpy.typing import NDArray
 from depthtrack.errors import InputError
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.moments import Moment
-from depthtrack.viewing.panels import Layer, beside, blank, paint, smaller, stacked
+from depthtrack.viewing.panels import Layer, beside, blank, mask_colour, paint, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import FAINT_TEXT
+from depthtrack.viewing.theme import FAINT_TEXT, Rgb
 
 Image = NDArray[np.uint8]
 
-ROWS: tuple[tuple[Layer, str], ...] = (
-    ("colour", "colour"),
-    ("depth", "depth"),
-    ("hand", "hand"),
-    ("skeleton", "skeleton"),
-)
+ROWS: tuple[Layer, ...] = ("colour", "depth", "hand", "skeleton")
 LABEL_WIDTH = 30
 GAP = 4
+SMALLEST_SIDE = 32
+"""Pixels of a picture in which a hand can still be made out."""
 
 
 def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
     """A banner (h, w, 3) of `width` pixels: a column a moment, a row a view, close on the hand.
 
     Every moment is seen through a window of the same size, so that sizes compare. Rows with nothing to show are
-    left out. Raises InputError without any moment to show.
+    left out. Raises InputError without any moment to show, or with more than there is room for.
     """
     moments = list(moments)
     if not moments:
         raise InputError("a picture strip needs at least one readable frame")
     close = _close_on_the_hand(moments)
     near, far = _range_of_the_hand(close)
-    side = (width - LABEL_WIDTH - GAP * len(close)) // len(close)
-    rows = [
-        beside(
-            [_label(name, side), *(smaller(paint(moment, layer, 2 * side, near, far), side, side) for moment in close)],
-            GAP,
-        )
-        for layer, name in ROWS
-        if _has(close, layer)
-    ]
+    side = (width - LABEL_WIDTH) // len(close) - GAP
+    if side < SMALLEST_SIDE:
+        most = (width - LABEL_WIDTH) // (SMALLEST_SIDE + GAP)
+        raise InputError(f"a picture strip has room for {most} moments, found {len(close)}: choose fewer")
+    rows = []
+    for layer in (layer for layer in ROWS if _has(close, layer)):
+        pictures = [smaller(paint(moment, layer, 2 * side, near, far), side, side) for moment in close]
+        rows.append(beside([_label(*_name(close, layer), side), *pictures], GAP))
     return stacked(rows, GAP)
 
 
@@ -80,8 +76,16 @@ def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
     return near, far + 0.25 * (far - near)
 
 
-def _label(name: str, height: int) -> Image:
+def _name(moments: Sequence[Moment], layer: Layer) -> tuple[str, Rgb]:
+    """What a row is called, and in which colour."""
+    if layer != "hand":
+        return layer, FAINT_TEXT
+    masked = [moment for moment in moments if moment.mask is not None]
+    return ("hand" if masked[0].mask_is_true else "hand, estimated"), mask_colour(masked[0])
+
+
+def _label(name: str, colour: Rgb, height: int) -> Image:
     """The name of a row, written upwards."""
     bar = blank(height, LABEL_WIDTH)
-    put_text(bar, name, ((height - text_width(name, 16)) // 2, LABEL_WIDTH // 2), 16, FAINT_TEXT)
+    put_text(bar, name, ((height - text_width(name, 16)) // 2, LABEL_WIDTH // 2), 16, colour)
     return np.ascontiguousarray(np.rot90(bar))

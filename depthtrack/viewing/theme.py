@@ -11,7 +11,8 @@ NO_READING: Rgb = (7, 9, 13)
 """Depth pixels without a reading: darker than any depth."""
 
 TRUE_MASK: Rgb = (34, 211, 238)
-ESTIMATED_MASK: Rgb = (251, 146, 60)
+ESTIMATED_MASK: Rgb = (240, 80, 230)
+"""Neither is a colour of skin, of the depth scale's near end, or of the other."""
 
 PALM: Rgb = (226, 232, 240)
 FINGER_COLOURS: dict[str, Rgb] = {

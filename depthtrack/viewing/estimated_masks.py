@@ -1,0 +1,25 @@
+"""The hand as segmentation finds it, for pictures of recordings that know no true silhouette."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.observation.segmentation import Segmenter
+from depthtrack.observation.skin_colour import SkinModel
+from depthtrack.recording.sequence import Frame
+from depthtrack.viewing.moments import MaskEstimator
+
+
+def mask_estimator() -> MaskEstimator:
+    """An estimator for one pass over one recording, frames in their order: it follows the hand from frame to frame."""
+    segmenter = Segmenter(SkinModel.default())
+
+    def estimate(frame: Frame) -> NDArray[np.bool_] | None:
+        found = segmenter.segment(frame)
+        if found is None:
+            return None
+        mask = np.zeros(frame.camera.shape, dtype=np.bool_)
+        left, top, right, bottom = found.window
+        mask[top:bottom, left:right] = found.skin
+        return mask
+
+    return estimate
