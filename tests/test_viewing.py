@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import Frame, GroundTruth, open_sequence
-from depthtrack.viewing.contact_sheet import contact_sheet, save_png
+from depthtrack.viewing.contact_sheet import contact_sheet, save_picture
 from depthtrack.viewing.depth_colours import colour_scale, depth_range, depth_to_rgb
 from depthtrack.viewing.moments import Moment, evenly_chosen, moments, true_keypoints
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton, overlay_mask, spotlight
@@ -322,12 +323,22 @@ def test_text_stays_inside_the_image_and_is_as_wide_as_told() -> None:
 def test_a_picture_is_complete_or_absent(tmp_path: Path) -> None:
     (tmp_path / "taken.png").mkdir()
     with pytest.raises(InputError, match="cannot write"):
-        save_png(GREY, tmp_path / "taken.png")
+        save_picture(GREY, tmp_path / "taken.png")
     with pytest.raises(InputError, match="cannot write"):
-        save_png(GREY, tmp_path / "nowhere" / "a.png")
+        save_picture(GREY, tmp_path / "nowhere" / "a.png")
     with pytest.raises(InputError, match=r"\.png"):
-        save_png(GREY, tmp_path / "a.gif")
+        save_picture(GREY, tmp_path / "a.gif")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
+
+
+@pytest.mark.parametrize(("name", "error"), [("a.png", 0), ("a.jpg", 4)])
+def test_a_picture_reads_back_in_its_colours(tmp_path: Path, name: str, error: int) -> None:
+    image = np.full((40, 30, 3), (200, 100, 30), dtype=np.uint8)
+    save_picture(image, tmp_path / name)
+    found = cv2.imread(str(tmp_path / name))
+    assert found is not None
+    assert np.abs(found[..., ::-1].astype(int) - image).max() <= error
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 # Real recordings

@@ -28,9 +28,9 @@ class Command:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
     """Write a contact sheet: moments evenly chosen from the recording."""
-    strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
     """Write a banner close on the hand: a column a moment; colour, depth, hand and skeleton below each other."""
     video: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mp4")] = None
     """Write a video of the whole recording."""
@@ -103,17 +103,17 @@ class Command:
             print()
 
     def _write_sheet(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:
-        from depthtrack.viewing.contact_sheet import contact_sheet, describe, save_png
+        from depthtrack.viewing.contact_sheet import contact_sheet, describe, save_picture
 
         moments = self._chosen_moments(sequence, self.count or 12)
-        save_png(contact_sheet(moments, sequence.name, describe(sequence), near, far), path)
+        save_picture(contact_sheet(moments, sequence.name, describe(sequence), near, far), path)
         print(f"wrote the contact sheet {path}")
 
     def _write_strip(self, sequence: "Sequence", path: Path) -> None:
-        from depthtrack.viewing.contact_sheet import save_png
+        from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.strip import strip
 
-        save_png(strip(self._chosen_moments(sequence, self.count or 7)), path)
+        save_picture(strip(self._chosen_moments(sequence, self.count or 7)), path)
         print(f"wrote the strip {path}")
 
     def _write_video(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:

@@ -19,6 +19,7 @@ from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS,
 Image = NDArray[np.uint8]
 
 MARGIN = 20
+PICTURE_SETTINGS = {".png": (cv2.IMWRITE_PNG_COMPRESSION, 6), ".jpg": (cv2.IMWRITE_JPEG_QUALITY, 92)}
 
 
 def contact_sheet(
@@ -59,11 +60,12 @@ def frame_rate(sequence: Sequence) -> float | None:
     return float(1 / np.median(np.diff(times))) if len(times) > 1 else None
 
 
-def save_png(image: Image, path: Path) -> None:
-    """Write an RGB image, complete or not at all. Raises InputError when the name or the folder does not allow it."""
-    if path.suffix.lower() != ".png":
-        raise InputError(f"a picture must end in .png, found '{path.name}'")
-    ok, data = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
+def save_picture(image: Image, path: Path) -> None:
+    """Write an RGB image as .png or .jpg, complete or not at all. Raises InputError where that cannot be."""
+    settings = PICTURE_SETTINGS.get(path.suffix.lower())
+    if settings is None:
+        raise InputError(f"a picture must end in {' or '.join(PICTURE_SETTINGS)}, found '{path.name}'")
+    ok, data = cv2.imencode(path.suffix.lower(), np.ascontiguousarray(image[..., ::-1]), settings)
     if not ok:
         raise InputError(f"OpenCV cannot encode a picture of {image.shape[1]} x {image.shape[0]} pixels")
     aside = path.with_name(f".{path.name}.{os.getpid()}")
