@@ -1,0 +1,100 @@
+"""The spaces a swarm may fly in: the paper's 27 pose parameters, or the 26-dimensional tangent space of a pose."""
+
+from typing import Protocol
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.limits import LOWER, UPPER, within_limits
+from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, tangent_between
+
+Array = NDArray[np.float64]
+
+REACH = 0.5
+"""Half side of the box of positions (metres): wide enough that only a lost swarm meets it."""
+
+
+class Space(Protocol):
+    """Coordinates of poses for a swarm: dimensions, bounds, and the way to poses and back."""
+
+    lower: Array
+    upper: Array
+    fingers: slice
+
+    def poses(self, coordinates: Array) -> Array:
+        """Poses (N, 27) at coordinates (N, D)."""
+        ...
+
+    def coordinates(self, poses: Array) -> Array:
+        """Coordinates (N, D) of poses (N, 27)."""
+        ...
+
+
+class ParameterSpace:
+    """The pose vector itself (Oikonomidis et al. 2011, Sec. 2.4): 27 dimensions, the quaternion redundant."""
+
+    fingers = ANGLES
+
+    def __init__(self, reference: Array) -> None:
+        self.lower = np.concatenate([reference[:3] - REACH, np.full(4, -1.0), LOWER])
+        self.upper = np.concatenate([reference[:3] + REACH, np.full(4, 1.0), UPPER])
+        self._quaternion = reference[ORIENTATION]
+
+    def poses(self, coordinates: Array) -> Array:
+        # A quaternion of no length says nothing: it keeps the reference's orientation.
+        poses = coordinates.copy()
+        length = np.linalg.norm(poses[:, ORIENTATION], axis=1, keepdims=True)
+        usable = length > 1e-6
+        poses[:, ORIENTATION] = np.where(usable, poses[:, ORIENTATION] / np.where(usable, length, 1), self._quaternion)
+        return poses
+
+    def coordinates(self, poses: Array) -> Array:
+        # Of the two quaternions of a rotation, the one on the reference's side.
+        flip = np.sign(poses[:, ORIENTATION] @ self._quaternion)[:, None]
+        coordinates = poses.copy()
+        coordinates[:, ORIENTATION] *= np.where(flip == 0, 1, flip)
+        return coordinates
+
+
+class TangentSpace:
+    """Steps from a reference pose: 26 dimensions, a rotation vector in place of the quaternion."""
+
+    fingers = slice(6, TANGENT_SIZE)
+
+    def __init__(self, reference: Array) -> None:
+        self.reference = within_limits(reference)
+        room = np.concatenate([np.full(3, REACH), np.full(3, np.pi)])
+        self.lower = np.concatenate([-room, LOWER - self.reference[ANGLES]])
+        self.upper = np.concatenate([room, UPPER - self.reference[ANGLES]])
+
+    def poses(self, coordinates: Array) -> Array:
+        poses = np.empty((len(coordinates), POSE_SIZE))
+        retract_all(self.reference, coordinates, poses)
+        return poses
+
+    def coordinates(self, poses: Array) -> Array:
+        return tangent_between(np.broadcast_to(self.reference, poses.shape), poses)
+
+
+@numba.njit(cache=True)
+def retract_all(reference: Array, steps: Array, poses: Array) -> None:
+    """`pose.retract` of one reference (27,) by steps (N, 26), into poses (N, 27)."""
+    w, x, y, z = reference[3], reference[4], reference[5], reference[6]
+    for n in range(steps.shape[0]):
+        a, b, c = steps[n, 3], steps[n, 4], steps[n, 5]
+        angle = np.sqrt(a * a + b * b + c * c)
+        # sin(angle / 2) / angle, which tends to 1/2.
+        k = np.sin(angle / 2) / angle if angle > 1e-9 else 0.5
+        r, a, b, c = np.cos(angle / 2), k * a, k * b, k * c
+        poses[n, 0], poses[n, 1], poses[n, 2] = (
+            reference[0] + steps[n, 0],
+            reference[1] + steps[n, 1],
+            reference[2] + steps[n, 2],
+        )
+        poses[n, 3] = r * w - a * x - b * y - c * z
+        poses[n, 4] = r * x + a * w + b * z - c * y
+        poses[n, 5] = r * y - a * z + b * w + c * x
+        poses[n, 6] = r * z + a * y - b * x + c * w
+        for d in range(20):
+            poses[n, 7 + d] = reference[7 + d] + steps[n, 6 + d]

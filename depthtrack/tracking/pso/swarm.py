@@ -1,0 +1,138 @@
+"""Particle swarm optimisation in a box (Oikonomidis et al. 2011, Sec. 2.4): knows nothing of hands but their fingers.
+
+Constriction PSO after Clerc and Kennedy 2002, "nearest point" bounds after Helwig and Wanka 2007, and the partial
+randomisation after Yasuda et al. 2010 that keeps the fingers from collapsing into the first minimum met.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def constriction(cognitive: float, social: float) -> float:
+    """Clerc and Kennedy's factor w of Eq. (3): w = 2 / |2 - psi - sqrt(psi^2 - 4 psi)|, psi = c1 + c2 > 4."""
+    psi = cognitive + social
+    if psi <= 4:
+        raise InputError(f"the swarm's c1 + c2 must exceed 4 (Oikonomidis et al. 2011, Eq. 3), found {psi:g}")
+    return float(2 / abs(2 - psi - np.sqrt(psi * psi - 4 * psi)))
+
+
+@dataclass(frozen=True)
+class SwarmOptions:
+    """How a swarm searches.
+
+    `particles` x `generations` evaluations; `cognitive` c1, `social` c2 and `inertia` w of Eq. (3). Every
+    `randomise_every` generations (0: never), a share `randomise` of the particles each get one finger angle set
+    anew: uniformly over its range, or with probability `near_best` about the best known value, by a normal deviation
+    of `near_spread` radians.
+    """
+
+    particles: int = 64
+    generations: int = 25
+    cognitive: float = 2.8
+    social: float = 1.3
+    inertia: float = constriction(2.8, 1.3)
+    randomise_every: int = 3
+    randomise: float = 0.5
+    near_best: float = 0.0
+    near_spread: float = 0.15
+
+    def __post_init__(self) -> None:
+        if not (1 <= self.particles <= 100_000 and 1 <= self.generations <= 100_000):
+            raise InputError(
+                f"a swarm needs 1 to 100000 particles and generations, found {self.particles} x {self.generations}"
+            )
+        if not (self.randomise_every >= 0 and 0 <= self.randomise <= 1 and 0 <= self.near_best <= 1):
+            raise InputError(f"the swarm's shares must lie between 0 and 1, found {self}")
+
+
+class Optimum(NamedTuple):
+    """The best position (D,) a swarm met, and its energy."""
+
+    position: Array
+    energy: float
+
+
+def minimise(
+    score: Callable[[Array], Array],
+    particles: Array,
+    lower: Array,
+    upper: Array,
+    fingers: slice,
+    generator: np.random.Generator,
+    options: SwarmOptions,
+) -> Optimum:
+    """Let a swarm evolve from `particles` (N, D) within the box `lower`, `upper` (D,).
+
+    `score` gives energies (N,) of positions (N, D); `fingers` are the dimensions that may be randomised. The number
+    of evaluations is N times `options.generations`. The same generator state gives the same bits.
+    """
+    position = np.clip(particles, lower, upper)
+    velocity = np.zeros_like(position)
+    energy = score(position)
+    own_best, own_energy = position.copy(), energy.copy()
+    best = int(np.argmin(own_energy))
+    for generation in range(1, options.generations):
+        draws = generator.random((2, *position.shape))
+        weights = (options.cognitive, options.social, options.inertia)
+        advance(position, velocity, own_best, own_best[best], draws, lower, upper, *weights)
+        if options.randomise_every and generation % options.randomise_every == 0:
+            randomise(position, own_best[best], lower, upper, fingers, generator, options)
+        energy = score(position)
+        better = energy < own_energy
+        own_best[better], own_energy[better] = position[better], energy[better]
+        best = int(np.argmin(own_energy))
+    return Optimum(own_best[best].copy(), float(own_energy[best]))
+
+
+@numba.njit(cache=True)
+def advance(
+    position: Array,
+    velocity: Array,
+    own_best: Array,
+    best: Array,
+    draws: Array,
+    lower: Array,
+    upper: Array,
+    cognitive: float,
+    social: float,
+    inertia: float,
+) -> None:
+    """One step of Eq. (3) and (4), in place; a particle that would leave the box stops at its nearest point.
+
+    `position`, `velocity`, `own_best` (N, D); `best` (D,); `draws` (2, N, D) uniform in 0..1: r1 and r2.
+    """
+    for n in range(position.shape[0]):
+        for d in range(position.shape[1]):
+            x = position[n, d]
+            pull = cognitive * draws[0, n, d] * (own_best[n, d] - x) + social * draws[1, n, d] * (best[d] - x)
+            velocity[n, d] = inertia * (velocity[n, d] + pull)
+            position[n, d] = min(max(x + velocity[n, d], lower[d]), upper[d])
+
+
+def randomise(
+    position: Array,
+    best: Array,
+    lower: Array,
+    upper: Array,
+    fingers: slice,
+    generator: np.random.Generator,
+    options: SwarmOptions,
+) -> None:
+    """Disturb a share of the particles, each in one finger dimension drawn at random (Sec. 2.4), in place."""
+    count = round(options.randomise * len(position))
+    who = generator.permutation(len(position))[:count]
+    dimension = generator.integers(fingers.start, fingers.stop, count)
+    value = generator.uniform(lower[dimension], upper[dimension])
+    if options.near_best > 0:
+        near = best[dimension] + options.near_spread * generator.standard_normal(count)
+        value = np.where(generator.random(count) < options.near_best, near, value)
+    position[who, dimension] = np.clip(value, lower[dimension], upper[dimension])
