@@ -1,0 +1,212 @@
+"""From poses to impostors: one screen rectangle a primitive, with the matrix that takes a pixel back to its unit frame.
+
+A point of the ray through a pixel, at inverse depth w, is (dx, dy, 1, w) up to scale, and the inverse of the matrix
+that places a primitive takes it to the unit frame. Written in pixels (x, y) from an anchor inside the rectangle, and
+in the inverse depth beyond that of the primitive's middle, that map has columns of order one, so the fragment shader
+solves its quadratic in float32 without cancellation. Everything before the shader is float64.
+"""
+
+import math
+from typing import NamedTuple, Self
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.primitives import CYLINDER, Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.surface import NEAR
+
+Array = NDArray[np.float64]
+Window = NDArray[np.int64]
+
+VECTORS = 6
+"""An impostor is six 4-vectors: its rectangle in the atlas (left, top, right, bottom edges, pixels); the columns of
+its map that multiply x, y, 1 and w; and (w of its middle, 1 for a ball or 0 for a cylinder, anchor in the atlas)."""
+
+
+class HandTable(NamedTuple):
+    """What of a hand does not depend on its pose, as the kernels read it; metres.
+
+    `base_rotations` (5, 3, 3), `base_positions` (5, 3), `lengths` (5, 3), `mirror` of `HandModel`; `kinds` (N,),
+    `bodies` (N,), `T_body_unit` (N, 4, 4) of `Primitives`, and their inverses `T_unit_body`.
+    """
+
+    base_rotations: Array
+    base_positions: Array
+    lengths: Array
+    mirror: float
+    kinds: NDArray[np.int64]
+    bodies: NDArray[np.int64]
+    T_body_unit: Array
+    T_unit_body: Array
+
+    @classmethod
+    def of(cls, shape: HandShape) -> Self:
+        model, primitives = HandModel(shape), Primitives.of(shape)
+        base = model.base_transforms
+        return cls(
+            np.ascontiguousarray(base[:, :3, :3]),
+            np.ascontiguousarray(base[:, :3, 3]),
+            model.lengths,
+            shape.mirror,
+            primitives.kinds,
+            primitives.bodies,
+            primitives.T_body_unit,
+            np.linalg.inv(primitives.T_body_unit).astype(np.float64),
+        )
+
+
+@numba.njit(cache=True)
+def place_impostors(
+    poses: Array,
+    hand: HandTable,
+    intrinsics: tuple[float, float, float, float],
+    tile: tuple[int, int],
+    columns: int,
+    instances: NDArray[np.float32],
+    windows: Window,
+) -> int:
+    """Write the impostors of all poses (B, 27), tile by tile from the atlas' first corner; returns how many.
+
+    `intrinsics` fx, fy, cx, cy in pixels; `tile` (height, width); `columns` tiles make a row of the atlas.
+    `instances` (>= 37 B, 6, 4) receives what VECTORS says, primitives out of sight left out. `windows` (B, 4)
+    receives the pixels (u0, u1, v0, v1; ends excluded) of each tile that may be drawn.
+    """
+    rotations, positions = np.empty((BODY_COUNT, 3, 3)), np.empty((BODY_COUNT, 3))
+    T, M, map_ = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
+    window = np.empty(4, np.int64)
+    height, width = tile
+    fx, fy, cx, cy = intrinsics
+    count = 0
+    for n in range(poses.shape[0]):
+        body_transforms(poses[n], hand, rotations, positions)
+        left, top = n % columns * width, n // columns * height
+        windows[n, 0], windows[n, 1], windows[n, 2], windows[n, 3] = width, 0, height, 0
+        for k in range(hand.kinds.shape[0]):
+            body, is_cylinder = hand.bodies[k], hand.kinds[k] == CYLINDER
+            _compose(rotations[body], positions[body], hand.T_body_unit[k], T)
+            middle = _bounds(T, is_cylinder, intrinsics, tile, window)
+            u0, u1, v0, v1 = window
+            if middle <= 0.0 or u1 <= u0 or v1 <= v0:
+                continue
+            windows[n, 0], windows[n, 1] = min(windows[n, 0], u0), max(windows[n, 1], u1)
+            windows[n, 2], windows[n, 3] = min(windows[n, 2], v0), max(windows[n, 3], v1)
+            _uncompose(hand.T_unit_body[k], rotations[body], positions[body], M)
+            anchor_u, anchor_v, w = (u0 + u1) // 2, (v0 + v1) // 2, 1.0 / middle
+            dx, dy = (anchor_u - cx) / fx, (anchor_v - cy) / fy
+            for i in range(4):
+                map_[0, i] = M[i, 0] / fx
+                map_[1, i] = M[i, 1] / fy
+                map_[2, i] = M[i, 0] * dx + M[i, 1] * dy + M[i, 2] + M[i, 3] * w
+                map_[3, i] = M[i, 3]
+            out = instances[count]
+            out[0, 0], out[0, 1], out[0, 2], out[0, 3] = left + u0, top + v0, left + u1, top + v1
+            out[1:5] = map_
+            out[5, 0], out[5, 1] = w, 0.0 if is_cylinder else 1.0
+            out[5, 2], out[5, 3] = left + anchor_u + 0.5, top + anchor_v + 0.5
+            count += 1
+    return count
+
+
+@numba.njit(cache=True)
+def body_transforms(pose: Array, hand: HandTable, rotations: Array, positions: Array) -> None:
+    """`HandModel.transforms` of one pose: rotations (16, 3, 3) and positions (16, 3, metres) of the bodies."""
+    qw, qx, qy, qz = pose[3], pose[4], pose[5], pose[6]
+    s = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
+    palm = rotations[0]
+    palm[0, 0], palm[0, 1], palm[0, 2] = 1 - s * (qy * qy + qz * qz), s * (qx * qy - qw * qz), s * (qx * qz + qw * qy)
+    palm[1, 0], palm[1, 1], palm[1, 2] = s * (qx * qy + qw * qz), 1 - s * (qx * qx + qz * qz), s * (qy * qz - qw * qx)
+    palm[2, 0], palm[2, 1], palm[2, 2] = s * (qx * qz - qw * qy), s * (qy * qz + qw * qx), 1 - s * (qx * qx + qy * qy)
+    for i in range(3):
+        positions[0, i] = pose[i]
+    for finger in range(5):
+        first = 1 + 3 * finger
+        for i in range(3):
+            base = hand.base_positions[finger]
+            positions[first, i] = pose[i] + palm[i, 0] * base[0] + palm[i, 1] * base[1] + palm[i, 2] * base[2]
+            for j in range(3):
+                base = hand.base_rotations[finger, :, j]
+                rotations[first, i, j] = palm[i, 0] * base[0] + palm[i, 1] * base[1] + palm[i, 2] * base[2]
+        _turn(rotations[first], 0, 1, -hand.mirror * pose[7 + 4 * finger])
+        for phalanx in range(3):
+            here = rotations[first + phalanx]
+            _turn(here, 1, 2, pose[8 + 4 * finger + phalanx])
+            if phalanx < 2:
+                rotations[first + phalanx + 1] = here
+                for i in range(3):
+                    step = here[i, 1] * hand.lengths[finger, phalanx]
+                    positions[first + phalanx + 1, i] = positions[first + phalanx, i] + step
+
+
+@numba.njit(cache=True)
+def _turn(R: Array, a: int, b: int, angle: float) -> None:
+    """R times the rotation by `angle` from axis a towards axis b, in place."""
+    s, c = math.sin(angle), math.cos(angle)
+    for i in range(3):
+        R[i, a], R[i, b] = c * R[i, a] + s * R[i, b], c * R[i, b] - s * R[i, a]
+
+
+@numba.njit(cache=True)
+def _compose(R: Array, t: Array, T_body_unit: Array, T: Array) -> None:
+    """T_camera_unit = [R t; 0 1] T_body_unit."""
+    for j in range(4):
+        x, y, z, w = T_body_unit[0, j], T_body_unit[1, j], T_body_unit[2, j], T_body_unit[3, j]
+        for i in range(3):
+            T[i, j] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z + t[i] * w
+        T[3, j] = w
+
+
+@numba.njit(cache=True)
+def _uncompose(T_unit_body: Array, R: Array, t: Array, M: Array) -> None:
+    """T_unit_camera = T_unit_body [R t; 0 1]^-1, whose inverse is [R' -R't; 0 1]."""
+    for i in range(4):
+        x, y, z = T_unit_body[i, 0], T_unit_body[i, 1], T_unit_body[i, 2]
+        M[i, 3] = T_unit_body[i, 3]
+        for j in range(3):
+            M[i, j] = x * R[j, 0] + y * R[j, 1] + z * R[j, 2]
+            M[i, 3] -= M[i, j] * t[j]
+
+
+@numba.njit(cache=True)
+def _bounds(
+    T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], window: Window
+) -> float:
+    """Pixels (u0, u1, v0, v1; ends excluded) of the tile that a placed primitive may cover.
+
+    The image of a ball is bounded by the planes through the lens that touch it, and a cone's by those of its two
+    end discs. Returns the depth of the middle of what lies before NEAR, or 0 where nothing does.
+    """
+    fx, fy, cx, cy = intrinsics
+    height, width = tile
+    x_low, x_high, y_low, y_high = math.inf, -math.inf, math.inf, -math.inf
+    z_low, z_high = math.inf, -math.inf
+    for end in range(2 if is_cylinder else 1):
+        # Dual conic of the outline, in normalised image coordinates: sum of +- column column' of T.
+        w = T[3, 3] + end * T[3, 2]
+        cx_, cy_, cz_ = (T[0, 3] + end * T[0, 2]) / w, (T[1, 3] + end * T[1, 2]) / w, (T[2, 3] + end * T[2, 2]) / w
+        xx, yy, xz, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(2 if is_cylinder else 3):
+            x, y, z = T[0, j] / w, T[1, j] / w, T[2, j] / w
+            xx, yy, xz, yz, zz = xx + x * x, yy + y * y, xz + x * z, yz + y * z, zz + z * z
+        z_low, z_high = min(z_low, cz_ - math.sqrt(zz)), max(z_high, cz_ + math.sqrt(zz))
+        a = cz_ * cz_ - zz
+        if a > 0.0:
+            b = cx_ * cz_ - xz
+            root = math.sqrt(max(b * b - a * (cx_ * cx_ - xx), 0.0))
+            x_low, x_high = min(x_low, (b - root) / a), max(x_high, (b + root) / a)
+            b = cy_ * cz_ - yz
+            root = math.sqrt(max(b * b - a * (cy_ * cy_ - yy), 0.0))
+            y_low, y_high = min(y_low, (b - root) / a), max(y_high, (b + root) / a)
+    if z_high < NEAR:
+        return 0.0
+    if z_low < 0.01 * NEAR:  # reaches the lens' plane: no bound on its image
+        window[0], window[1], window[2], window[3] = 0, width, 0, height
+    else:
+        slack = 1e-6
+        window[0] = int(min(max(math.ceil(x_low * fx + cx - slack), 0.0), width))
+        window[1] = int(max(min(math.floor(x_high * fx + cx + slack) + 1.0, width), 0.0))
+        window[2] = int(min(max(math.ceil(y_low * fy + cy - slack), 0.0), height))
+        window[3] = int(max(min(math.floor(y_high * fy + cy + slack) + 1.0, height), 0.0))
+    return (max(z_low, NEAR) + z_high) / 2

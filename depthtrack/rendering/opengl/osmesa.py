@@ -1,0 +1,35 @@
+"""OSMesa contexts: Mesa's software renderer in plain memory, no driver and no display."""
+
+import ctypes
+from typing import Any
+
+from depthtrack.rendering.opengl.context import OpenGLError
+
+_SIDE = 4
+"""Of the framebuffer OSMesa insists on, pixels; everything is drawn into textures instead."""
+
+
+class OSMesaBinding:
+    """A context of OpenGL 3.3. Raises OpenGLError where OSMesa gives none."""
+
+    def __init__(self, osmesa: Any, gl: Any) -> None:
+        self._osmesa, self._type = osmesa, gl.GL_UNSIGNED_BYTE
+        self._memory = (ctypes.c_ubyte * (4 * _SIDE * _SIDE))()
+        attributes = (
+            *(osmesa.OSMESA_FORMAT, osmesa.OSMESA_RGBA),
+            *(osmesa.OSMESA_PROFILE, osmesa.OSMESA_CORE_PROFILE),
+            *(osmesa.OSMESA_CONTEXT_MAJOR_VERSION, 3, osmesa.OSMESA_CONTEXT_MINOR_VERSION, 3, 0),
+        )
+        self._context = osmesa.OSMesaCreateContextAttribs((ctypes.c_int * len(attributes))(*attributes), None)
+        if not self._context:
+            raise OpenGLError("OSMesa gives no OpenGL 3.3 core context: a newer libosmesa6 is needed")
+
+    def bind(self) -> None:
+        if not self._osmesa.OSMesaMakeCurrent(self._context, self._memory, self._type, _SIDE, _SIDE):
+            raise OpenGLError("OSMesa cannot make its context current")
+
+    def unbind(self) -> None:
+        self._osmesa.OSMesaMakeCurrent(None, None, self._type, 0, 0)
+
+    def destroy(self) -> None:
+        self._osmesa.OSMesaDestroyContext(self._context)

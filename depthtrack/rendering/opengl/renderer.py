@@ -1,0 +1,205 @@
+"""Draws tiles of hypotheses on one OpenGL context, and reduces them to the sums of Eq. (2): what all scorers share."""
+
+import ctypes
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.rendering.opengl.context import Context, Device, Platform, open_context
+from depthtrack.rendering.opengl.impostors import VECTORS
+from depthtrack.rendering.opengl.programs import Program
+from depthtrack.rendering.surface import NEAR
+
+Array32 = NDArray[np.float32]
+
+_BLOCK = 4
+"""Side of the blocks that one level of the pyramid sums; the shaders say the same."""
+_SIDE_SOFTWARE, _SIDE_HARDWARE = 1024, 2048
+"""Side of an atlas in pixels: what stays in a processor's cache, and what keeps a GPU busy."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Tiles of `height` x `width` pixels, `columns` a row, at most `capacity` of them in an atlas."""
+
+    height: int
+    width: int
+    columns: int
+    capacity: int
+
+    def rows(self, count: int) -> int:
+        """Rows that `count` tiles fill, the last perhaps in part."""
+        return -(-count // self.columns)
+
+    def extent(self, count: int) -> tuple[int, int]:
+        """(height, width) in pixels of the part of the atlas that `count` tiles fill."""
+        return self.rows(count) * self.height, min(count, self.columns) * self.width
+
+
+class Atlas:
+    """A square float texture to draw tiles into; create, use and delete it while the context is current."""
+
+    def __init__(self, gl: Any, side: int, internal: int, layout: int) -> None:
+        self.side = side
+        self.texture, self.framebuffer = _texture(gl), gl.glGenFramebuffers(1)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, internal, side, side, 0, layout, gl.GL_FLOAT, None)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self.framebuffer)
+        gl.glFramebufferTexture2D(gl.GL_FRAMEBUFFER, gl.GL_COLOR_ATTACHMENT0, gl.GL_TEXTURE_2D, self.texture, 0)
+        if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
+            raise InputError(f"this OpenGL driver cannot draw into float textures of {side} x {side}")
+
+    def delete(self, gl: Any) -> None:
+        gl.glDeleteFramebuffers(1, [self.framebuffer])
+        gl.glDeleteTextures(1, [self.texture])
+
+
+class Renderer:
+    """Programs, buffers and atlases of one context. Methods need the context current: `with renderer.context as gl`."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        with context as gl:
+            self._impostor = Program(gl, "impostor.vert", "impostor.frag")
+            self._compare = Program(gl, "cover.vert", "compare.frag")
+            self._reduce = Program(gl, "cover.vert", "reduce.frag")
+            self._empty_vertices, self._vertices = gl.glGenVertexArrays(2)
+            self._instances = gl.glGenBuffers(1)
+            self._describe_instances(gl)
+        self._atlases: list[Atlas] = []
+        self._pyramid: list[Atlas] = []
+        self._side = min(_SIDE_SOFTWARE if context.software else _SIDE_HARDWARE, context.max_side)
+
+    def grid(self, gl: Any, height: int, width: int) -> Grid:
+        """How tiles of a size are laid out; the atlases grow when a single one does not fit."""
+        if max(height, width) > self.context.max_side:
+            raise InputError(
+                f"{self.context.renderer} draws at most {self.context.max_side} pixels a side, "
+                f"found a region of {width} x {height}: reduce it"
+            )
+        self._side = max(self._side, height, width)
+        if not self._atlases or self._atlases[0].side < self._side:
+            for atlas in self._atlases + self._pyramid:
+                atlas.delete(gl)
+            # Two atlases: one is read back while the other is drawn.
+            self._atlases = [Atlas(gl, self._side, gl.GL_R32F, gl.GL_RED) for _ in range(2)]
+            self._pyramid = []
+        # Tiles narrower than a block still take one of the pyramid.
+        columns, rows = self._side // max(width, _BLOCK), self._side // max(height, _BLOCK)
+        columns, rows = max(columns, 1), max(rows, 1)
+        return Grid(height, width, columns, columns * rows)
+
+    def draw(self, gl: Any, which: int, grid: Grid, count: int, instances: Array32) -> None:
+        """Draw the impostors (N, 6, 4) of `count` tiles into atlas `which`; returns before it is done."""
+        atlas = self._atlases[which]
+        height, width = grid.extent(count)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, atlas.framebuffer)
+        gl.glViewport(0, 0, atlas.side, atlas.side)
+        gl.glEnable(gl.GL_SCISSOR_TEST)
+        gl.glScissor(0, 0, width, height)
+        gl.glClear(gl.GL_COLOR_BUFFER_BIT)
+        gl.glEnable(gl.GL_BLEND)
+        gl.glBlendEquation(gl.GL_MAX)
+        self._impostor.use(atlas_side=float(atlas.side), inverse_near=1 / NEAR)
+        gl.glBindVertexArray(self._vertices)
+        gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._instances)
+        gl.glBufferData(gl.GL_ARRAY_BUFFER, instances.nbytes, instances, gl.GL_STREAM_DRAW)
+        gl.glDrawArraysInstanced(gl.GL_TRIANGLE_STRIP, 0, 4, len(instances))
+        gl.glFlush()
+
+    def read(self, gl: Any, which: int, pixels: Array32) -> None:
+        """Inverse depth in 1/m of the first tiles of atlas `which` into `pixels` (rows, columns), once it is drawn."""
+        height, width = pixels.shape
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._atlases[which].framebuffer)
+        gl.glReadPixels(0, 0, width, height, gl.GL_RED, gl.GL_FLOAT, pixels)
+
+    def sum(
+        self, gl: Any, which: int, grid: Grid, count: int, observation: int, match_depth: float, clamp_depth: float
+    ) -> NDArray[np.float64]:
+        """Sums of Eq. (2) over the tiles of atlas `which`: (count, 3).
+
+        `observation` is a texture filled by `upload`; one level compares, the next ones add 4 x 4 texels
+        each, until one texel a tile is left (Sec. 2.5).
+        """
+        if not self._pyramid:
+            self._pyramid = [Atlas(gl, self._side, gl.GL_RGBA32F, gl.GL_RGBA) for _ in range(2)]
+        gl.glDisable(gl.GL_BLEND)
+        gl.glDisable(gl.GL_SCISSOR_TEST)
+        gl.glBindVertexArray(self._empty_vertices)
+        gl.glActiveTexture(gl.GL_TEXTURE1)
+        gl.glBindTexture(gl.GL_TEXTURE_2D, observation)
+        gl.glActiveTexture(gl.GL_TEXTURE0)
+        source, tile = self._atlases[which], (grid.width, grid.height)
+        program, uniforms = (
+            self._compare,
+            {"inverse_depth": 0, "observation": 1, "match_depth": match_depth, "clamp_depth": clamp_depth},
+        )
+        for level in range(32):
+            blocks = -(-tile[0] // _BLOCK), -(-tile[1] // _BLOCK)
+            target = self._pyramid[level % 2]
+            gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.framebuffer)
+            gl.glViewport(0, 0, min(count, grid.columns) * blocks[0], grid.rows(count) * blocks[1])
+            gl.glBindTexture(gl.GL_TEXTURE_2D, source.texture)
+            program.use(tile=tile, blocks=blocks, **uniforms)
+            gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3)
+            source, tile, program, uniforms = target, blocks, self._reduce, {"level": 0}
+            if tile == (1, 1):
+                break
+        rows, columns = grid.rows(count), min(count, grid.columns)
+        sums = np.empty((rows, columns, 4), np.float32)
+        gl.glReadPixels(0, 0, columns, rows, gl.GL_RGBA, gl.GL_FLOAT, sums)
+        return sums.reshape(-1, 4)[:count, :3].astype(np.float64)
+
+    def new_texture(self, gl: Any) -> int:
+        """A texture for `upload`, to be given back by `context.discard_texture`."""
+        return _texture(gl)
+
+    def upload(self, gl: Any, texture: int, observation: Array32) -> None:
+        """Fill a texture, whatever its size was, with depth (metres) and skin (0 or 1): (h, w, 2)."""
+        height, width, _ = observation.shape
+        gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RG32F, width, height, 0, gl.GL_RG, gl.GL_FLOAT, observation)
+
+    def _describe_instances(self, gl: Any) -> None:
+        gl.glBindVertexArray(self._vertices)
+        gl.glBindBuffer(gl.GL_ARRAY_BUFFER, self._instances)
+        size = VECTORS * 16
+        for vector in range(VECTORS):
+            gl.glEnableVertexAttribArray(vector)
+            gl.glVertexAttribPointer(vector, 4, gl.GL_FLOAT, False, size, ctypes.c_void_p(16 * vector))
+            gl.glVertexAttribDivisor(vector, 1)
+
+
+def _texture(gl: Any) -> int:
+    """A new texture, bound, read by texel only."""
+    texture = int(gl.glGenTextures(1))
+    gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, gl.GL_NEAREST)
+    gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MAG_FILTER, gl.GL_NEAREST)
+    return texture
+
+
+_shared: dict[tuple[Platform, Device], Renderer] = {}
+_shared_lock = threading.Lock()
+
+
+def shared_renderer(platform: Platform, device: Device = None) -> Renderer:
+    """The process' renderer for a device, opened at first use and kept until the process ends.
+
+    Scorers are cheap because contexts and compiled shaders are shared. Raises OpenGLError as `open_context` does.
+    """
+    with _shared_lock:
+        renderer = _shared.get((platform, device))
+        if renderer is None or renderer.context.closed:
+            renderer = _shared[platform, device] = Renderer(open_context(platform, device))
+        return renderer
+
+
+def release_renderers() -> None:
+    """Release every shared context now rather than at the end of the process; scorers on them are done for."""
+    with _shared_lock:
+        while _shared:
+            _shared.popitem()[1].context.close()

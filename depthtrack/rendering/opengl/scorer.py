@@ -1,0 +1,141 @@
+"""The `egl` and `osmesa` backends: hypotheses drawn as impostors, many tiles at once (Oikonomidis 2011, Sec. 2.5)."""
+
+import weakref
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.primitives import PRIMITIVE_COUNT
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import Objective, Terms
+from depthtrack.rendering.opengl.context import Context, Device, Platform
+from depthtrack.rendering.opengl.impostors import VECTORS, HandTable, place_impostors
+from depthtrack.rendering.opengl.renderer import Grid, Renderer, shared_renderer
+from depthtrack.rendering.opengl.sums import sum_tiles
+from depthtrack.rendering.scorer import ScorerBase, as_batch
+from depthtrack.rendering.target import Target
+
+Array = NDArray[np.float64]
+Sums = Literal["gpu", "cpu"]
+
+_PARTS, _SMALLEST_PART = 4, 16
+"""A software renderer gets a batch in parts, so that one is placed and another summed while a third is drawn."""
+
+
+class OpenGLScorer(ScorerBase):
+    """Scores hypotheses drawn by OpenGL; `renderer` and `software` tell what draws them.
+
+    `platform` is "egl" or "osmesa"; `device` as in `context.open_context`. `sums` says where Eq. (2) is summed: by
+    shaders ("gpu"), or by the CPU once tiles are read back ("cpu"), which is the default on a software renderer.
+    Scorers of one device share its context and may live together. Raises OpenGLError where OpenGL cannot be used.
+    """
+
+    def __init__(
+        self,
+        shape: HandShape,
+        objective: Objective | None = None,
+        platform: Platform = "egl",
+        sums: Sums | None = None,
+        device: Device = None,
+    ) -> None:
+        if platform not in ("egl", "osmesa"):
+            raise InputError(f"the OpenGL platform must be 'egl' or 'osmesa', found {platform!r}")
+        if sums not in (None, "gpu", "cpu"):
+            raise InputError(f"sums are taken by 'gpu' or 'cpu', found {sums!r}")
+        self.name: str = platform
+        self._objective = objective or Objective()
+        self._hand = HandTable.of(shape)
+        self._renderer: Renderer | None = shared_renderer(platform, device)
+        context = self._renderer.context
+        self.renderer, self.software = context.renderer, context.software
+        self.sums: Sums = sums or ("cpu" if context.software else "gpu")
+        self._textures: list[int] = []
+        self._instances = np.empty((0, VECTORS, 4), np.float32)
+        self._pixels = np.empty(0, np.float32)
+        self._release = weakref.finalize(self, _discard, context, self._textures)
+
+    def observe(self, target: Target) -> None:
+        camera = target.camera
+        self._intrinsics = camera.fx, camera.fy, camera.cx, camera.cy
+        self._skin = target.skin.astype(np.float32)
+        clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
+        self._empty = float(clamped), 0.0, float(np.count_nonzero(target.skin))
+        if self.sums == "gpu":
+            with self._open.context as gl:
+                if not self._textures:
+                    self._textures.append(self._open.new_texture(gl))
+                self._open.upload(gl, self._textures[0], np.stack([target.depth, self._skin], axis=-1))
+        self._target = target
+
+    def score(self, poses: ArrayLike) -> Array:
+        return self.terms(poses).energy
+
+    def terms(self, poses: ArrayLike) -> Terms:
+        batch, renderer = as_batch(poses), self._open
+        sums, windows = np.empty((len(batch), 3)), np.empty((len(batch), 4), np.int64)
+        with renderer.context as gl:
+            grid = renderer.grid(gl, *self.target.camera.shape)
+            size = self._part_size(grid, len(batch))
+            drawn: slice | None = None
+            for turn, start in enumerate(range(0, len(batch), size)):
+                part = slice(start, min(start + size, len(batch)))
+                self._draw(gl, turn % 2, grid, batch[part], windows[part])
+                if drawn is not None:
+                    self._sum(gl, 1 - turn % 2, grid, windows[drawn], sums[drawn])
+                drawn = part
+            if drawn is not None:
+                self._sum(gl, turn % 2, grid, windows[drawn], sums[drawn])
+        return Terms.of_sums(self._objective, batch, *sums.T)
+
+    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+        batch, renderer = as_batch(np.asarray(pose)[None]), self._open
+        with renderer.context as gl:
+            grid = renderer.grid(gl, *self.target.camera.shape)
+            self._draw(gl, 0, grid, batch, np.empty((1, 4), np.int64))
+            inverse_depth = self._read(gl, 0, grid, 1)
+        return np.divide(1, inverse_depth, out=np.zeros_like(inverse_depth), where=inverse_depth > 0)
+
+    def close(self) -> None:
+        self._renderer = None
+        self._release()
+
+    @property
+    def _open(self) -> Renderer:
+        if self._renderer is None:
+            raise RuntimeError("this scorer was closed")
+        return self._renderer
+
+    def _part_size(self, grid: Grid, count: int) -> int:
+        wanted = max(-(-count // _PARTS), _SMALLEST_PART) if self.software else count
+        return max(min(wanted, grid.capacity), 1)
+
+    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, windows: NDArray[np.int64]) -> None:
+        if len(self._instances) < len(poses) * PRIMITIVE_COUNT:
+            self._instances = np.empty((len(poses) * PRIMITIVE_COUNT, VECTORS, 4), np.float32)
+        tile = grid.height, grid.width
+        count = place_impostors(poses, self._hand, self._intrinsics, tile, grid.columns, self._instances, windows)
+        self._open.draw(gl, which, grid, len(poses), self._instances[:count])
+
+    def _read(self, gl: Any, which: int, grid: Grid, count: int) -> NDArray[np.float32]:
+        height, width = grid.extent(count)
+        if self._pixels.size < height * width:
+            self._pixels = np.empty(height * width, np.float32)
+        pixels = self._pixels[: height * width].reshape(height, width)
+        self._open.read(gl, which, pixels)
+        return pixels
+
+    def _sum(self, gl: Any, which: int, grid: Grid, windows: NDArray[np.int64], sums: Array) -> None:
+        o, target = self._objective, self.target
+        limits = o.match_depth, o.clamp_depth
+        if self.sums == "gpu":
+            sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], *limits)
+        else:
+            pixels = self._read(gl, which, grid, len(sums))
+            sum_tiles(pixels, grid.columns, windows, target.depth, self._skin, self._empty, *limits, sums)
+
+
+def _discard(context: Context, textures: list[int]) -> None:
+    while textures:
+        context.discard_texture(textures.pop())

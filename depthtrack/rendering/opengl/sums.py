@@ -1,0 +1,51 @@
+"""The sums of Eq. (2) over tiles read back from the renderer, on the CPU."""
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Array32 = NDArray[np.float32]
+
+
+# Sums may be reordered, so that they vectorise; 0 and infinity behave as IEEE says.
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
+def sum_tiles(
+    inverse_depth: Array32,
+    columns: int,
+    windows: NDArray[np.int64],
+    depth: Array32,
+    skin: Array32,
+    empty: tuple[float, float, float],
+    match_depth: float,
+    clamp_depth: float,
+    sums: NDArray[np.float64],
+) -> None:
+    """Write (B, 3) `sums`: min(|o_d - r_d|, d_M) in metres, o_s and r_m, o_s or r_m, over each of B tiles.
+
+    `inverse_depth` (rows, >= columns * w), 1/m, 0 where nothing is drawn: tiles of the size of `depth` (h, w; metres,
+    0 = missing) and `skin` (h, w; 0 or 1). Only `windows` (B, 4) can hold drawn pixels; `empty` are the sums of a tile
+    without any.
+    """
+    height, width = depth.shape
+    match_, clamp = np.float32(match_depth), np.float32(clamp_depth)
+    zero, one = np.float32(0.0), np.float32(1.0)
+    for n in range(windows.shape[0]):
+        left, top = n % columns * width, n // columns * height
+        u0, u1 = windows[n, 0], windows[n, 1]
+        sums[n, 0], sums[n, 1], sums[n, 2] = empty
+        for v in range(windows[n, 2], windows[n, 3]):
+            drawn_row = inverse_depth[top + v, left + u0 : left + u1]
+            depth_row, skin_row = depth[v, u0:u1], skin[v, u0:u1]
+            clamped, on_skin, off_skin = zero, zero, zero
+            for u in range(u1 - u0):
+                w, o, s = drawn_row[u], depth_row[u], skin_row[u]
+                drawn = w > zero
+                difference = abs(o - one / w)
+                change = min(difference, clamp) - min(o, clamp)
+                hit = one if drawn & ((difference < match_) | (o == zero)) else zero
+                clamped += change if drawn else zero
+                on_skin += hit * s
+                off_skin += hit - hit * s
+            sums[n, 0] += clamped
+            sums[n, 1] += on_skin
+            sums[n, 2] += off_skin

@@ -1,0 +1,116 @@
+"""A small scene on which a backend shows that it agrees with the oracle, and how fast it is.
+
+`python -m depthtrack.rendering.selfcheck NAME [OPTIONS as JSON]` prints the result as JSON, or {"error": ...}: run in
+a process of its own, a driver that crashes or hangs takes nobody else with it.
+"""
+
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import PRESETS
+from depthtrack.errors import DepthtrackError
+from depthtrack.hand.limits import within_limits
+from depthtrack.hand.pose import TANGENT_SIZE, make_pose, retract
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.backends import create_scorer
+from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.rendering.scorer import Scorer
+from depthtrack.rendering.target import Target
+
+HYPOTHESES, SIDE = 64, 64
+_SEED = 11
+"""The first from 0 to leave no pixel within half a micrometre of d_m, where float32 could decide either way."""
+ENERGY_TOLERANCE = 1e-3
+DEPTH_TOLERANCE = 1e-4  # metres
+SILHOUETTE_TOLERANCE = 1e-3  # of the silhouette's pixels
+
+
+@dataclass(frozen=True)
+class SelfCheck:
+    """How a backend did: largest differences from the oracle, and its best speed at 64 x 64.
+
+    `silhouette_pixels` differ, of `silhouette_total`; `depth_difference` is metres, where both drew.
+    """
+
+    renderer: str
+    software: bool
+    energy_difference: float
+    depth_difference: float
+    silhouette_pixels: int
+    silhouette_total: int
+    hypotheses_per_s: float
+
+    @property
+    def agrees(self) -> bool:
+        """Within the tolerances every backend is held to."""
+        return (
+            self.energy_difference <= ENERGY_TOLERANCE
+            and self.depth_difference <= DEPTH_TOLERANCE
+            and self.silhouette_pixels <= SILHOUETTE_TOLERANCE * self.silhouette_total
+        )
+
+
+def scene() -> tuple[HandShape, Target, NDArray[np.float64]]:
+    """A hand half a metre away, seen at 64 x 64 pixels, and 64 hypotheses around it."""
+    shape = HandShape()
+    truth = within_limits(make_pose([0, 0, 0.5], [0.1, 1, 0.2, 0.1], np.full(20, 0.3)))
+    rng = np.random.Generator(np.random.Philox(key=_SEED))
+    spread = np.repeat([0.005, 0.1, 0.1], [3, 3, 20])
+    poses = within_limits(retract(truth, rng.normal(size=(HYPOTHESES, TANGENT_SIZE)) * spread))
+    camera = PRESETS["kinect1"].crop(210, 135, 220, 220).resized(SIDE / 220)
+    blank = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    with OracleScorer(shape) as oracle:
+        oracle.observe(blank)
+        depth = oracle.render(truth)
+    return shape, Target(camera, depth > 0, depth), poses
+
+
+def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
+    """Hold a backend to the oracle on `scene`, and time it for about so long. Raises what `create_scorer` raises."""
+    shape, target, poses = scene()
+    with create_scorer(name, shape, **options) as scorer, OracleScorer(shape) as oracle:
+        scorer.observe(target)
+        oracle.observe(target)
+        energies = np.abs(scorer.score(poses) - oracle.score(poses))
+        drawn = np.stack([scorer.render(pose) for pose in poses])
+        true = np.stack([oracle.render(pose) for pose in poses])
+        both = (drawn > 0) & (true > 0)
+        return SelfCheck(
+            renderer=getattr(scorer, "renderer", "numba"),
+            software=getattr(scorer, "software", True),
+            energy_difference=float(energies.max()),
+            depth_difference=float(np.abs(drawn - true)[both].max(initial=0)),
+            silhouette_pixels=int(np.count_nonzero((drawn > 0) != (true > 0))),
+            silhouette_total=int(np.count_nonzero(true > 0)),
+            hypotheses_per_s=_speed(scorer, poses, seconds),
+        )
+
+
+def _speed(scorer: Scorer, poses: NDArray[np.float64], seconds: float) -> float:
+    """Hypotheses a second, by the best of the calls that fit: others' work on the machine only ever slows one."""
+    best, end = np.inf, time.perf_counter() + seconds
+    while (start := time.perf_counter()) < end:
+        scorer.score(poses)
+        best = min(best, time.perf_counter() - start)
+    return len(poses) / best
+
+
+def main() -> int:
+    """What a probing process runs; returns its exit code."""
+    name, *rest = sys.argv[1:]
+    try:
+        result: dict[str, Any] = asdict(self_check(name, **(json.loads(rest[0]) if rest else {})))
+    except DepthtrackError as error:
+        result = {"error": str(error)}
+    print(json.dumps(result))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

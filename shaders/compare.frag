@@ -1,0 +1,27 @@
+#version 330 core
+// The pixel operations of Oikonomidis et al. 2011, Eq. (2), summed over blocks of 4 x 4 pixels that end with the tile.
+
+uniform sampler2D inverse_depth;  // 1/m, 0 where nothing is drawn; tiles side by side
+uniform sampler2D observation;    // depth o_d in metres, 0 where missing; skin o_s, 0 or 1
+uniform ivec2 tile;               // pixels
+uniform ivec2 blocks;             // of a tile
+uniform float match_depth, clamp_depth;  // d_m, d_M, metres
+
+out vec4 sums;  // clamped difference in metres, o_s and r_m, o_s or r_m
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy), corner = at / blocks, first = at % blocks * 4;
+    ivec2 last = min(first + 4, tile);
+    sums = vec4(0.0);
+    for (int y = first.y; y < last.y; ++y) {
+        for (int x = first.x; x < last.x; ++x) {
+            vec2 observed = texelFetch(observation, ivec2(x, y), 0).rg;
+            float w = texelFetch(inverse_depth, corner * tile + ivec2(x, y), 0).r;
+            float difference = abs(observed.r - (w > 0.0 ? 1.0 / w : 0.0));
+            bool matched = w > 0.0 && (difference < match_depth || observed.r == 0.0);
+            sums.x += min(difference, clamp_depth);
+            sums.y += matched ? observed.g : 0.0;
+            sums.z += matched ? 1.0 : observed.g;
+        }
+    }
+}

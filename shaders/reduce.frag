@@ -1,0 +1,17 @@
+#version 330 core
+// One level of the reduction pyramid: the sum of every block of 4 x 4, blocks ending with their tile.
+
+uniform sampler2D level;
+uniform ivec2 tile;    // texels of a tile in `level`
+uniform ivec2 blocks;  // of a tile here
+
+out vec4 sums;
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy), corner = at / blocks, first = at % blocks * 4;
+    ivec2 last = min(first + 4, tile);
+    sums = vec4(0.0);
+    for (int y = first.y; y < last.y; ++y)
+        for (int x = first.x; x < last.x; ++x)
+            sums += texelFetch(level, corner * tile + ivec2(x, y), 0);
+}
