@@ -97,7 +97,7 @@ class Flesh:
     shape: HandShape
     bones: Array
     fingers: tuple[tuple[Cone, ...], ...]
-    palm: tuple[Cone, ...]
+    palm: tuple[tuple[Cone, ...], ...]
     muscles: tuple[Cone, ...]
     webs: tuple[Sheet, ...]
 
@@ -136,16 +136,17 @@ class Flesh:
 
     def palm_distance(self, points: Array) -> Array:
         """Signed distance (N,) to the palm without its muscles and webs."""
-        first, *others = (cone.distance(points) for cone in self.palm)
+        # The cones of one ray meet without a fillet, which would swell where they join.
+        first, *others = (np.minimum.reduce([cone.distance(points) for cone in ray]) for ray in self.palm)
         for other in others:
-            first = smooth_min(first, other, 0.12 * self.shape.palm_length)
-        return first
+            first = smooth_min(first, other, 0.1 * self.shape.palm_length)
+        return np.asarray(first)
 
     def bounds(self) -> tuple[Array, Array]:
         """Corners of a box that holds the hand."""
         # The palm's cones run on below the wrist, where they are cut off.
         whole = [*self.muscles, *(cone for finger in self.fingers for cone in finger)]
-        low, high = _box([*whole, *self.palm])
+        low, high = _box([*whole, *(cone for ray in self.palm for cone in ray)])
         low[1] = min(_box(whole)[0][1], self.shape.wrist[1])
         margin = 0.1 * self.shape.palm_length
         return low - margin, high + margin
@@ -175,26 +176,29 @@ def _finger(shape: HandShape, bones: Array, finger: int) -> list[Cone]:
     return cones
 
 
-def _palm(shape: HandShape) -> list[Cone]:
-    wrist, half = shape.wrist, shape.palm_thickness / 2
+def _palm(shape: HandShape) -> list[tuple[Cone, ...]]:
+    wrist, unit, thick = shape.wrist, shape.palm_length, shape.palm_thickness
     knuckles, radii = shape.bases[1:], shape.radii[1:, 0]
     # The outer knuckles' flesh reaches the breadth of the palm.
     left, right = knuckles[3, 0] - radii[3], knuckles[0, 0] + radii[0]
-    middle = (left + right) / 2
     stretch = shape.palm_breadth / (right - left)
-    cones = []
+    heads = knuckles + (knuckles - (left + right) / 2) * np.array([stretch - 1, 0, 0])
     wrist_radius = shape.wrist_thickness / 2
     spread = max(shape.wrist_breadth / 2 - wrist_radius, 0)
-    for knuckle, radius, side in zip(knuckles, radii, (1.0, 0.35, -0.35, -1.0), strict=True):
-        head = knuckle + np.array([(knuckle[0] - middle) * (stretch - 1), 0, 0])
-        root = wrist + np.array([side * spread, 0.1 * shape.palm_length, 0])
-        waist = 0.45 * root + 0.55 * head
-        thick = 0.55 * half + 0.45 * radius
-        cones += [Cone(root, waist, 0.9 * wrist_radius, thick), Cone(waist, head, thick, 0.92 * radius)]
+    rays: list[tuple[Cone, ...]] = []
+    for head, radius, side in zip(heads, radii, (1.0, 0.35, -0.35, -1.0), strict=True):
+        root = wrist + np.array([side * spread, 0.1 * unit, 0])
+        waist = 0.4 * root + 0.6 * head
+        rays.append(
+            (Cone(root, waist, 0.78 * wrist_radius, 0.42 * thick), Cone(waist, head, 0.42 * thick, 0.95 * radius))
+        )
     for side in (-1.0, 1.0):
-        end = wrist + np.array([side * spread, 0, 0])
-        cones.append(Cone(end - np.array([0, shape.palm_length / 4, 0]), end, wrist_radius, wrist_radius))
-    return cones
+        end = wrist + np.array([side * spread, -0.08 * unit, 0])
+        rays.append((Cone(end - np.array([0, 0.2 * unit, 0]), end, wrist_radius, wrist_radius),))
+    # The mounts: padding across the palmar side of the knuckles.
+    mounts = heads + np.array([0, -0.06 * unit, 0.12 * thick])
+    rays.append(tuple(Cone(mounts[i], mounts[i + 1], 0.33 * thick, 0.33 * thick) for i in range(3)))
+    return rays
 
 
 def _muscles(shape: HandShape, bones: Array) -> list[Cone]:
@@ -202,9 +206,9 @@ def _muscles(shape: HandShape, bones: Array) -> list[Cone]:
     thumb, length = bones[body_of(0, 0)], shape.lengths[0, 0]
     little = shape.bases[4]
     wrist = shape.wrist
-    carpus = wrist + np.array([0.06 * unit, 0.17 * unit, 0.25 * thick])
+    carpus = wrist + np.array([0.06 * unit, 0.2 * unit, 0.2 * thick])
     thenar = Cone(carpus, _at(thumb, (-0.1 * length, 0.62 * length, 0.1 * length)), 0.42 * thick, 0.36 * thick)
-    heel = np.array([0.55 * little[0], wrist[1] + 0.16 * unit, 0.22 * thick])
+    heel = np.array([0.55 * little[0], wrist[1] + 0.2 * unit, 0.16 * thick])
     edge = np.array([0.98 * little[0], little[1] - 0.2 * unit, 0.12 * thick])
     hypothenar = Cone(heel, edge, 0.42 * thick, 0.3 * thick)
     return [thenar, hypothenar]
