@@ -40,21 +40,15 @@ class Forearm:
     @cached_property
     def faces(self) -> NDArray[np.int64]:
         """(F, 3) triangles: the rings' walls, and a fan at either end."""
-        ring = np.arange(_SECTIONS)
-        here, there = ring, np.roll(ring, -1)
-        walls = [
-            np.concatenate(
-                [np.stack([a + here, b + here, b + there], -1), np.stack([a + here, b + there, a + there], -1)]
-            )
-            for a, b in zip(_SECTIONS * np.arange(_RINGS - 1), _SECTIONS * np.arange(1, _RINGS), strict=True)
-        ]
-        first, last = _SECTIONS * _RINGS, _SECTIONS * _RINGS + 1
-        end = _SECTIONS * (_RINGS - 1)
-        fans = [
-            np.stack([np.full(_SECTIONS, first), here, there], -1),
-            np.stack([end + here, np.full(_SECTIONS, last), end + there], -1),
-        ]
-        return np.concatenate(walls + fans)
+        here = np.arange(_SECTIONS)
+        there = np.roll(here, -1)
+        faces = []
+        for a in _SECTIONS * np.arange(_RINGS - 1):
+            b = a + _SECTIONS
+            faces += [(a + here, b + there, b + here), (a + here, a + there, b + there)]
+        hub, end = np.full(_SECTIONS, _SECTIONS * _RINGS), _SECTIONS * (_RINGS - 1)
+        faces += [(hub, there, here), (end + here, end + there, hub + 1)]
+        return np.concatenate([np.stack(corners, axis=-1) for corners in faces])
 
     def bend(self, T_camera_palm: Array, elbow: Array) -> Array:
         """Rotation vector (3,) of the wrist in the palm frame, that turns the forearm towards `elbow` (3,), metres."""

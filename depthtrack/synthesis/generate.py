@@ -1,7 +1,7 @@
 """Synthetic recordings: from a motion and a handful of options to frames with exact ground truth, and to a folder."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -177,7 +177,9 @@ class Synthesiser:
         longest = round((MAX_DURATION if duration is None else duration) * options.rate)
         count = (RANDOM_FRAMES if duration is None else longest) if options.frames is None else options.frames
         if not 1 <= count <= longest:
-            raise InputError(f"'{self.motion.name}' has {longest} frames at {options.rate:g} Hz; asked for {count}")
+            raise InputError(
+                f"'{self.motion.name}' at {options.rate:g} Hz can have 1 to {longest} frames, asked for {count}"
+            )
         return count
 
     def _poses(self) -> Array:
@@ -194,26 +196,24 @@ class Synthesiser:
         return generator(self.options.seed, frame, stream)
 
 
-def synthesise(
-    options: Synthesis,
+def write_recording(
+    made: Synthesiser,
     folder: Path,
     overwrite: bool = False,
     threads: int = 2,
-    progress: Callable[[Iterator[SyntheticFrame]], Iterator[SyntheticFrame]] = iter,
-) -> Synthesiser:
-    """Write the recording as a sequence folder, complete or not at all; `progress` wraps the stream of frames.
+    progress: Callable[[Iterator[SyntheticFrame]], Iterable[SyntheticFrame]] = iter,
+) -> None:
+    """Write a sequence folder, complete or not at all; `progress` wraps the stream of frames.
 
-    Raises InputError for options that cannot be, and for a folder that is there already unless `overwrite`.
+    Raises InputError for a folder that is there already, unless `overwrite`.
     """
-    made = Synthesiser(options)
-    # JPEG shares colour between neighbouring pixels, which would undo flips of single ones.
-    colour_format: Literal["png", "jpg"] = "png" if options.skin_flips > 0 else "jpg"
     with SequenceWriter(
         folder,
         made.sensor.camera,
-        hand=options.hand,
+        hand=made.options.hand,
         description=made.description(),
-        colour_format=colour_format,
+        # JPEG shares colour between neighbouring pixels, which would undo flips of single ones.
+        colour_format="png" if made.options.skin_flips > 0 else "jpg",
         overwrite=overwrite,
         threads=threads,
     ) as writer:
@@ -227,4 +227,3 @@ def synthesise(
                 pose=frame.pose,
                 joints=frame.joints,
             )
-    return made

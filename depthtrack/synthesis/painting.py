@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Self
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
+from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.scene import View
 
 Array = NDArray[np.float64]
@@ -82,8 +84,8 @@ class Painter:
         self._tone = tone
         self._noise = noise
         self._light = Light.sample(rng)
-        self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3))
-        self._phases = rng.uniform(0, 2 * np.pi, 6)
+        self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32)
+        self._phases = rng.uniform(0, 2 * np.pi, 6).astype(np.float32)
         self._T_rest_body = _at_rest(shape)
         still = backdrop.surface
         light = self._light.on(backdrop.albedo(rng), still.normal) * (still.depth > 0)[..., None]
@@ -99,12 +101,12 @@ class Painter:
         albedo = self._skin(points, normal, label, view.transforms)
         picture[v, u] = 255 * srgb_from_linear(self._light.on(albedo, normal, shine=True))
         if self._noise > 0:
-            picture += np.float32(self._noise) * rng.standard_normal(picture.shape, dtype=np.float32)
-        return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+            picture += np.float32(self._noise) * normal_noise(rng, picture.shape)
+        return np.asarray(cv2.convertScaleAbs(np.maximum(picture, 0)), dtype=np.uint8)
 
     def _skin(self, points: Array, normal: Array, label: NDArray[np.int16], transforms: Array) -> Array:
         """Albedo (N, 3) at camera-frame points (N, 3): it moves with the hand, for it depends on the point at rest."""
-        at_rest, inward = np.empty_like(points), np.empty(len(points))
+        at_rest, inward = np.empty(points.shape, dtype=np.float32), np.empty(len(points))
         for body in np.unique(label):
             here = label == body
             T = self._T_rest_body[body] @ np.linalg.inv(transforms[body])
@@ -126,8 +128,10 @@ def flip_skin(
     Oikonomidis et al. 2011, Fig. 2c: each pixel flips by itself. Flipped skin takes on the colour of something else,
     anything else that flips takes on skin's.
     """
-    flipped = rng.random(label.shape) < share
     skin = (label >= 0) & (label <= FACE)
+    if share == 0:
+        return colour, skin
+    flipped = rng.random(label.shape) < share
     out = colour.copy()
     lost, gained = flipped & skin, flipped & ~skin
     out[lost] = _NOT_SKIN[rng.integers(len(_NOT_SKIN), size=int(lost.sum()))]

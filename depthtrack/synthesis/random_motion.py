@@ -24,7 +24,7 @@ from depthtrack.synthesis.scene_frame import orientation
 
 Array = NDArray[np.float64]
 
-_LARGEST_OVERLAP = 0.0035
+_LARGEST_OVERLAP = 0.003
 _TRIES = 20
 _WANDER = ("right", "down", "away", "tilt", "nod", "turn")
 _SPREAD = np.radians([0, 13, 1, -9, -20])
@@ -102,7 +102,7 @@ class RandomMotion:
         for _ in range(_TRIES):
             candidate = self._draw(rng)
             # Between two held postures the interpolation runs along the straight line.
-            path = current + np.linspace(0.1, 1, 10)[:, None] * (candidate - current)
+            path = current + np.linspace(0, 1, 26)[1:, None] * (candidate - current)
             if clearance.penetration(_posed(path)).max() < _LARGEST_OVERLAP:
                 return candidate
         return current

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
+from depthtrack.synthesis.randomness import normal_noise
 
 
 @dataclass(frozen=True)
@@ -23,5 +24,5 @@ class Ideal:
 
 def with_gaussian_noise(depth: NDArray[np.float64], deviation: float, rng: np.random.Generator) -> NDArray[np.float64]:
     """Depth (h, w) with independent normal errors of `deviation` metres (Oikonomidis et al. 2011, Fig. 2c)."""
-    noisy = depth + deviation * rng.standard_normal(depth.shape)
+    noisy = depth + deviation * normal_noise(rng, depth.shape)
     return np.where(depth > 0, np.maximum(noisy, 0), 0)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
+from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 
 Array = NDArray[np.float64]
@@ -56,8 +57,8 @@ class Kinect1:
             theta,
             edges(surface.depth),
             shadow(surface.depth, self.camera, BASELINE),
-            rng.standard_normal((3, *shape)),
-            rng.random(shape),
+            normal_noise(rng, (3, *shape)),
+            rng.random(shape, dtype=np.float32),
             (self.nearest, self.farthest),
             out,
         )
@@ -85,8 +86,8 @@ def _read(
     theta: Array,
     edge: NDArray[np.bool_],
     dark: NDArray[np.bool_],
-    normal: Array,
-    uniform: Array,
+    wander: NDArray[np.float32],
+    uniform: NDArray[np.float32],
     reach: tuple[float, float],
     out: Array,
 ) -> None:
@@ -97,8 +98,8 @@ def _read(
             # Silhouettes waver: near one, a pixel may see what is beside it. Within a surface nothing moves.
             if edge[v, u] or z <= 0.0:
                 sigma = lateral_noise(angle if z > 0.0 else 0.0)
-                us = min(max(u + round(sigma * normal[0, v, u]), 0), width - 1)
-                vs = min(max(v + round(sigma * normal[1, v, u]), 0), height - 1)
+                us = min(max(u + round(sigma * wander[0, v, u]), 0), width - 1)
+                vs = min(max(v + round(sigma * wander[1, v, u]), 0), height - 1)
                 if abs(depth[vs, us] - z) > JUMP * z:
                     z, angle, blind = depth[vs, us], theta[vs, us], dark[vs, us]
             if z <= 0.0 or blind or uniform[v, u] < _dropout(edge[v, u], angle):
@@ -106,7 +107,7 @@ def _read(
             # One disparity step is worth z^2 / (8 f b); rounding to it adds a twelfth of a step squared.
             scale = STEPS * INFRARED_FOCAL * BASELINE
             sigma = axial_noise(z, angle) * scale / (z * z)
-            disparity = scale / z + math.sqrt(max(sigma * sigma - 1.0 / 12.0, 0.0)) * normal[2, v, u]
+            disparity = scale / z + math.sqrt(max(sigma * sigma - 1.0 / 12.0, 0.0)) * wander[2, v, u]
             z = scale / max(round(disparity), 1)
             if reach[0] <= z <= reach[1]:
                 out[v, u] = z

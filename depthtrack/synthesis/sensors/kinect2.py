@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
+from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence
 
 Array = NDArray[np.float64]
@@ -47,8 +48,8 @@ class Kinect2:
             surface.depth,
             incidence(surface, self.camera),
             edges(surface.depth),
-            rng.standard_normal(shape),
-            rng.random((2, *shape)),
+            normal_noise(rng, shape),
+            rng.random((2, *shape), dtype=np.float32),
             (self.nearest, self.farthest),
             out,
         )
@@ -67,8 +68,8 @@ def _read(
     depth: Array,
     theta: Array,
     edge: NDArray[np.bool_],
-    normal: Array,
-    uniform: Array,
+    error: NDArray[np.float32],
+    uniform: NDArray[np.float32],
     reach: tuple[float, float],
     out: Array,
 ) -> None:
@@ -78,7 +79,7 @@ def _read(
             z = depth[v, u]
             if z <= 0.0 or uniform[0, v, u] < _dropout(edge[v, u], theta[v, u]):
                 continue
-            z += axial_noise(z, theta[v, u]) * normal[v, u]
+            z += axial_noise(z, theta[v, u]) * error[v, u]
             if edge[v, u]:
                 z = _mixed(depth, v, u, z, uniform[1, v, u])
             if reach[0] <= z <= reach[1]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
+from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class RealSense:
     def read(self, surface: Surface, rng: np.random.Generator) -> Array:
         shape = surface.depth.shape
         disparity_noise, unevenness = SUBPIXEL * _smooth_noise(shape, rng), _smooth_noise(shape, rng)
-        chance = rng.random(shape)
+        chance = rng.random(shape, dtype=np.float32)
         depth, grown = _fattened(surface.depth, unevenness > 0.2)
 
         grazing = np.clip((incidence(surface, self.camera) - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0, 1)
@@ -73,7 +74,7 @@ class RealSense:
 
 def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """(h, w) normal noise of unit variance, alike over a matching window."""
-    white = rng.standard_normal(shape, dtype=np.float32)
+    white = normal_noise(rng, shape)
     size = 2 * math.ceil(3 * _WINDOW) + 1
     kernel = cv2.getGaussianKernel(size, _WINDOW)
     # Averaging shrinks the variance by the sum of the squared weights, in either direction.
