@@ -292,12 +292,15 @@ def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
     assert len(FolderSequence(out)) == 1
 
 
-def test_flipped_colours_survive_the_file(tmp_path: Path) -> None:
+def test_flipped_labels_and_their_colours_survive_the_file(tmp_path: Path) -> None:
     made = _made(frames=1, skin_flips=0.1)
     write_recording(made, tmp_path / "flipped")
-    colour = FolderSequence(tmp_path / "flipped")[0].colour
+    sequence = FolderSequence(tmp_path / "flipped")
+    colour = sequence[0].colour
     assert colour is not None
     np.testing.assert_array_equal(colour, made[0].colour)
+    np.testing.assert_array_equal(sequence.skin_mask(0), made[0].skin)
+    np.testing.assert_array_equal(sequence.hand_mask(0), made[0].mask)
 
 
 def test_the_command_says_what_it_needs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,7 @@
 depth.txt, depth/     timestamps and 16-bit PNGs             rgb.txt, rgb/   the same in colour, optional
 camera.json           intrinsics and depth scale             sequence.json   how it was made
 hand_poses.csv        27 pose values a timestamp             joints.csv      21 keypoints a timestamp
-hand.json             sizes of the hand                      hand_mask/, exact_depth/   PNGs named as in depth/
+hand.json             sizes of the hand                      hand_mask/, skin_mask/, exact_depth/   PNGs named as in depth/
 """
 
 import json
@@ -95,6 +95,14 @@ class FolderSequence:
     def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
         """See `Sequence`. Raises DamagedFrameError where the mask is there and cannot be read."""
         path = self._beside(index, "hand_mask")
+        return None if path is None else read_mask(path, self.camera.shape)
+
+    def skin_mask(self, index: int) -> NDArray[np.bool_] | None:
+        """Skin labels (h, w), right or wrong, that a synthetic recording brings in place of a colour segmentation's.
+
+        Raises DamagedFrameError where the mask is there and cannot be read.
+        """
+        path = self._beside(index, "skin_mask")
         return None if path is None else read_mask(path, self.camera.shape)
 
     def exact_depth(self, index: int) -> NDArray[np.float32] | None:
