@@ -1,0 +1,123 @@
+"""Finds the 15 finger joints of a hand among the joints of anybody's rig, by name and by place in the tree.
+
+Rigs agree on little but the fingers' names: `thumb.01.R` and `f_index.01.R` (Rigify), `finger2-1.R` (MakeHuman),
+`index_01_r` (Unreal), `mixamorig:RightHandIndex1` (Mixamo), `rightIndexProximal` (VRM, Unity),
+`index-finger-phalanx-proximal` (OpenXR, WebXR), `b_r_index1` (Oculus), `lindex0` (MANO's kin). So the name gives the
+finger and the side, and the last three joints of a finger that are no tips are its phalanges: a metacarpal, where a
+rig has one, comes before them.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.kinematics import JOINT_NAMES
+from depthtrack.hand.pose import FINGERS
+from depthtrack.hand.shape import Side
+
+_FINGER_WORDS = (("thumb",), ("index", "forefinger"), ("middle",), ("ring",), ("little", "pinky", "pinkie"))
+_PHALANX_WORDS = {"meta": 0, "carpal": 0, "prox": 1, "inter": 2, "medial": 2, "dist": 3}
+_SIDE_WORDS: tuple[tuple[Side, str], ...] = (("left", "l"), ("right", "r"))
+_TIP_WORDS = ("tip", "end", "nub", "null", "effector")
+_NOT_A_HAND = ("toe", "foot", "leg")
+
+
+def finger_joints(
+    names: Sequence[str], parents: NDArray[np.int64], loads: NDArray[np.float64], side: Side | None
+) -> NDArray[np.int64]:
+    """(5, 3) joints of the phalanges, from the palm outward.
+
+    `names` and `parents` (J,) describe the rig, `loads` (J,) how much skin each joint moves: a last joint that moves
+    none is a tip. Joints named for the other side than `side` are passed over. Raises InputError naming the fingers
+    that are not found, and when both hands are there and `side` is None.
+    """
+    sides = {s for name in names if finger_of(name) is not None and (s := side_of(name)) is not None}
+    if side is None and len(sides) == 2:
+        raise InputError("the rig holds both hands: say which one to read, side 'left' or 'right'")
+    found = np.empty((5, 3), dtype=np.int64)
+    missing = []
+    for finger in range(5):
+        chain = [
+            j
+            for j, name in enumerate(names)
+            if finger_of(name) == finger and not _is_tip(name) and (side is None or side_of(name) in (None, side))
+        ]
+        chain.sort(key=lambda j: (_depth(parents, j), *_rank(names[j])))
+        while len(chain) > 3 and loads[chain[-1]] == 0:
+            chain.pop()
+        if len(chain) < 3:
+            missing.append(f"{FINGERS[finger]} ({len(chain)} joints)")
+        else:
+            found[finger] = chain[-3:]
+    if missing:
+        raise InputError(
+            f"three joints a finger are needed, not found by name for: {', '.join(missing)}. Give a mapping from "
+            f"{JOINT_NAMES[1]}, ..., {JOINT_NAMES[-1]} to the rig's names, which are: {_shortened(names)}"
+        )
+    return found
+
+
+def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> NDArray[np.int64]:
+    """(5, 3) joints of the phalanges as a user names them, keyed by `kinematics.JOINT_NAMES`.
+
+    Raises InputError for keys that are missing or unknown and for joints that the rig does not have.
+    """
+    wanted = JOINT_NAMES[1:]
+    if unknown := sorted(set(mapping) - set(JOINT_NAMES)):
+        raise InputError(f"the mapping must name only {', '.join(JOINT_NAMES)}; found {', '.join(unknown)}")
+    if missing := [name for name in wanted if name not in mapping]:
+        raise InputError(f"the mapping must name a joint for every phalanx; missing are {', '.join(missing)}")
+    if absent := [str(joint) for joint in mapping.values() if joint not in names]:
+        raise InputError(f"the rig has no joint {', '.join(absent)}; it has {_shortened(names)}")
+    return np.array([names.index(mapping[name]) for name in wanted], dtype=np.int64).reshape(5, 3)
+
+
+def finger_of(name: str) -> int | None:
+    """Which finger a joint's name speaks of, 0 for the thumb; None for other joints."""
+    text = name.lower()
+    if any(word in text for word in _NOT_A_HAND):
+        return None
+    # "index-finger-middle" is a phalanx of the index finger: the first name counts.
+    places = [(text.find(word), f) for f, words in enumerate(_FINGER_WORDS) for word in words if word in text]
+    if places:
+        return min(places)[1]
+    numbered = re.search(r"finger[ _.-]?([1-5])(?!\d)", text)
+    return int(numbered[1]) - 1 if numbered else None
+
+
+def side_of(name: str) -> Side | None:
+    """The side a joint's name speaks of."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
+    words = re.findall(r"[a-z]+", spaced)
+    fingers = "|".join(word for words in _FINGER_WORDS for word in words)
+    for side, letter in _SIDE_WORDS:
+        glued = rf"(?:{side}|(?:^|[^a-z]){letter})_?(?:hand|{fingers})"
+        if side in words or letter in words or re.search(glued, name.lower()):
+            return side
+    return None
+
+
+def _is_tip(name: str) -> bool:
+    words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    return any(word in words for word in _TIP_WORDS)
+
+
+def _depth(parents: NDArray[np.int64], joint: int) -> int:
+    depth = 0
+    while (joint := int(parents[joint])) >= 0:
+        depth += 1
+    return depth
+
+
+def _rank(name: str) -> tuple[int, list[int], str]:
+    """Order of the joints of a finger where the tree does not give it: by word, number, letter."""
+    text = name.lower()
+    word = next((rank for word, rank in _PHALANX_WORDS.items() if word in text), 2 if "middle" in text[6:] else 0)
+    return word, [int(number) for number in re.findall(r"\d+", text)], text
+
+
+def _shortened(names: Sequence[str]) -> str:
+    return ", ".join(names[:40]) + (" ..." if len(names) > 40 else "")
