@@ -3,7 +3,8 @@
 depth.txt, depth/     timestamps and 16-bit PNGs             rgb.txt, rgb/   the same in colour, optional
 camera.json           intrinsics and depth scale             sequence.json   how it was made
 hand_poses.csv        27 pose values a timestamp             joints.csv      21 keypoints a timestamp
-hand.json             sizes of the hand                      hand_mask/, skin_mask/, exact_depth/   PNGs named as in depth/
+hand.json             sizes of the hand
+hand_mask/, skin_mask/, exact_depth/                         PNGs named as in depth/
 """
 
 import json
