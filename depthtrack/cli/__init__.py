@@ -22,6 +22,8 @@ COMMANDS = {
     "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
+    "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring, in hypotheses a second"),
+    "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),
 }
 
 
