@@ -1,0 +1,45 @@
+"""The loop over a recording: observe, start or follow, write down; takes up an interrupted run where it stood."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from depthtrack.observation.observation import Observer
+from depthtrack.recording.run import RunRow, RunWriter
+from depthtrack.recording.sequence import Sequence
+from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
+
+
+def track_sequence(
+    sequence: Sequence, observer: Observer, tracker: Tracker, run: RunWriter, start_pose: np.ndarray | None = None
+) -> Iterator[RunRow]:
+    """Track every frame and append it to the run; yields each row as it is done.
+
+    Frames that the run already holds are observed again, which costs little and brings the observer to where it
+    was, but not tracked again. `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
+    starts by itself.
+    """
+    done = list(run.rows)
+    tracker.recall([_estimate(row) for row in done])
+    awaiting_start = start_pose is not None and all(row.pose is None for row in done)
+    for number, frame in enumerate(sequence):
+        begun = time.perf_counter()
+        observation = observer.observe(frame)
+        observe_ms = 1e3 * (time.perf_counter() - begun)
+        if number < len(done):
+            continue
+        if observation is None:
+            estimate = ABSENT
+            tracker.recall([estimate])
+        elif awaiting_start:
+            estimate, awaiting_start = tracker.start(observation, start_pose), False
+        else:
+            estimate = tracker.track(observation)
+        row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
+        run.append(row, {"segment": observe_ms, **estimate.stage_ms})
+        yield row
+
+
+def _estimate(row: RunRow) -> Estimate:
+    return Estimate(row.pose, row.energy, row.confidence, Status(row.status))

@@ -1,0 +1,156 @@
+"""The PSO tracker: one swarm a frame, around the last pose and where it was heading (Oikonomidis 2011, Sec. 2.4)."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.hand.pose import POSE_SIZE, retract, tangent_between
+from depthtrack.hand.shape import HandShape
+from depthtrack.observation.observation import Observation
+from depthtrack.rendering.backends import create_scorer
+from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.target import Target
+from depthtrack.tracking.pso.search import SearchOptions, find_pose, refine
+from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
+from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
+from depthtrack.tracking.tracker import Estimate, Status
+
+Array = NDArray[np.float64]
+Variant = Literal["default", "paper"]
+
+
+@dataclass(frozen=True)
+class PsoOptions:
+    """How the PSO tracker works; the same options and observations give the same bits on any number of threads.
+
+    `variant` "paper" is Oikonomidis et al. 2011: 27 raw parameters, the swarm around the last solution, w of Eq. (3),
+    fingers randomised over their whole range. "default" flies in the tangent space, half of the swarm around the
+    linear prediction, damps more and randomises half of the fingers near the best: each measured to help.
+    `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
+    `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
+    """
+
+    variant: Variant = "default"
+    particles: int = 64
+    generations: int = 25
+    seed: int = 0
+    renderer: str = "raster"
+    threads: int = 1
+    resolution: int | None = None
+    spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
+    lost_energy: float = 16.0
+    objective: Objective = field(default_factory=Objective)
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+    @property
+    def swarm(self) -> SwarmOptions:
+        """The swarm of each frame."""
+        if self.variant == "paper":
+            return SwarmOptions(self.particles, self.generations, inertia=constriction(2.8, 1.3))
+        return SwarmOptions(self.particles, self.generations, inertia=0.6, near_best=0.5)
+
+
+class PsoTracker:
+    """Follows a hand by rendering hypotheses: see `tracker.Tracker`."""
+
+    name = "pso"
+    stages = ("observe", "swarm")
+
+    def __init__(self, shape: HandShape, options: PsoOptions | None = None) -> None:
+        self.options = options = options or PsoOptions()
+        if options.variant not in ("default", "paper"):
+            raise InputError(f"no PSO variant '{options.variant}': choose default or paper")
+        threads = {"threads": options.threads} if options.renderer == "raster" else {}
+        self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
+        self._pose: Array | None = None
+        self._velocity = np.zeros(26)
+
+    def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
+        """Begin on this frame, from a pose (27,) refined by a swarm, or by searching."""
+        begun = time.perf_counter()
+        self._observe(observation)
+        observed = time.perf_counter()
+        generator = self._generator(observation)
+        if pose is None:
+            found, energy = find_pose(self._scorer, observation.centre, generator, self.options.search)
+        else:
+            given = np.asarray(pose, dtype=np.float64)
+            if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
+                raise InputError(f"a start pose must be {POSE_SIZE} finite numbers, found shape {given.shape}")
+            found, energy = refine(self._scorer, given, self.options.spread, self.options.swarm, generator)
+        return self._settle(found, energy, Status.STARTED, begun, observed)
+
+    def track(self, observation: Observation) -> Estimate:
+        """Follow the hand into the next frame; searches where the track was lost or there is none."""
+        if self._pose is None:
+            return self.start(observation)
+        begun = time.perf_counter()
+        self._observe(observation)
+        observed = time.perf_counter()
+        generator, options = self._generator(observation), self.options
+        space = self._space(self._pose)
+        found = minimise(
+            lambda x: self._scorer.score(space.poses(x)),
+            self._population(space, self._pose, generator),
+            space.lower,
+            space.upper,
+            space.fingers,
+            generator,
+            options.swarm,
+        )
+        return self._settle(space.poses(found.position[None])[0], found.energy, Status.TRACKED, begun, observed)
+
+    def recall(self, estimates: Sequence[Estimate]) -> None:
+        """Take up a track after the estimates of all frames so far: the last two poses are what it remembers."""
+        self._pose, self._velocity = None, np.zeros(26)
+        for estimate in estimates[-2:]:
+            self._remember(estimate)
+
+    def close(self) -> None:
+        self._scorer.close()
+
+    def _observe(self, observation: Observation) -> None:
+        target = Target(observation.camera, observation.skin, observation.depth)
+        if self.options.resolution is not None:
+            target = target.reduced(self.options.resolution)
+        self._scorer.observe(target)
+
+    def _space(self, reference: Array) -> Space:
+        return ParameterSpace(reference) if self.options.variant == "paper" else TangentSpace(reference)
+
+    def _population(self, space: Space, last: Array, generator: np.random.Generator) -> Array:
+        """The first generation: perturbations of the last pose and, by default, of its linear prediction."""
+        count = self.options.particles
+        centres = np.tile(last, (count, 1))
+        if self.options.variant == "default":
+            centres[1::2] = retract(last, self._velocity)
+        steps = generator.standard_normal((count, 26)) * np.repeat(self.options.spread, [3, 3, 20])
+        steps[:2] = 0  # the centres themselves take part
+        return space.coordinates(retract(centres, steps))
+
+    def _generator(self, observation: Observation) -> np.random.Generator:
+        """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""
+        return np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
+
+    def _settle(self, pose: Array, energy: float, status: Status, begun: float, observed: float) -> Estimate:
+        confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
+        if energy > self.options.lost_energy:
+            status = Status.LOST
+        stage_ms = {"observe": 1e3 * (observed - begun), "swarm": 1e3 * (time.perf_counter() - observed)}
+        estimate = Estimate(pose, energy, confidence, status, stage_ms)
+        self._remember(estimate)
+        return estimate
+
+    def _remember(self, estimate: Estimate) -> None:
+        """Pose and velocity for the next frame, from estimates alone: a resumed run sees what this one did."""
+        if estimate.pose is None or estimate.status is Status.LOST:
+            self._pose, self._velocity = None, np.zeros(26)
+            return
+        moving = self._pose is not None and estimate.status is Status.TRACKED
+        self._velocity = tangent_between(self._pose, estimate.pose) if moving else np.zeros(26)
+        self._pose = estimate.pose

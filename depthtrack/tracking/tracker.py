@@ -1,0 +1,67 @@
+"""The tracker protocol: start on a frame, then one call a frame. PSO and IK differ behind it, nowhere else."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.observation.observation import Observation
+
+
+class Status(StrEnum):
+    """What became of a frame."""
+
+    TRACKED = "tracked"
+    """Followed from the frame before."""
+    STARTED = "started"
+    """Found from the observation alone, or set by a given pose."""
+    LOST = "lost"
+    """The best pose found does not explain the observation; the tracker starts again on the next frame."""
+    ABSENT = "absent"
+    """No hand was observed."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a tracker says of one frame.
+
+    `pose` (27,), None when no hand was observed; `energy` of Eq. (1) of Oikonomidis et al. 2011 (NaN without a pose);
+    `confidence` 0 to 1: the agreement of the rendered hand with the observed one (1 less the skin term of Eq. 2);
+    `stage_ms` milliseconds spent in each stage of the tracker.
+    """
+
+    pose: NDArray[np.float64] | None
+    energy: float
+    confidence: float
+    status: Status
+    stage_ms: dict[str, float] = field(default_factory=dict)
+
+
+ABSENT = Estimate(None, float("nan"), 0.0, Status.ABSENT)
+
+
+class Tracker(Protocol):
+    """Follows one hand. What it knows of the past is what its estimates say, so that a run can be resumed."""
+
+    name: str
+    stages: tuple[str, ...]
+    """Keys of `Estimate.stage_ms`."""
+
+    def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
+        """Begin on this frame: refine a given pose (27,), or find one from the observation alone."""
+        ...
+
+    def track(self, observation: Observation) -> Estimate:
+        """Follow the hand into the next frame; starts by itself where there is nothing to follow."""
+        ...
+
+    def recall(self, estimates: Sequence[Estimate]) -> None:
+        """Take up a track after these estimates of all frames so far, as if they had been made just now."""
+        ...
+
+    def close(self) -> None:
+        """Free what the tracker holds."""
+        ...
