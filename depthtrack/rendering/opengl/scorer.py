@@ -20,7 +20,7 @@ from depthtrack.rendering.target import Target
 Array = NDArray[np.float64]
 Sums = Literal["gpu", "cpu"]
 
-_PARTS, _SMALLEST_PART = 4, 16
+_PARTS, _SMALLEST_PART = 2, 16
 """A software renderer gets a batch in parts, so that one is placed and another summed while a third is drawn."""
 
 
@@ -58,7 +58,8 @@ class OpenGLScorer(ScorerBase):
 
     def observe(self, target: Target) -> None:
         camera = target.camera
-        self._intrinsics = camera.fx, camera.fy, camera.cx, camera.cy
+        # Floats, whatever the camera file held: one compiled kernel serves all.
+        self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._skin = target.skin.astype(np.float32)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty = float(clamped), 0.0, float(np.count_nonzero(target.skin))

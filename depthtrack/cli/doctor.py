@@ -1,0 +1,109 @@
+"""`depthtrack doctor`: what works on this machine, and what to install for what does not."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from depthtrack.errors import DepthtrackError, InputError
+
+if TYPE_CHECKING:
+    from depthtrack.rendering.doctor import Machine, Outcome
+
+
+@dataclass(frozen=True)
+class Command:
+    """Tell what works here: versions, processor, and every renderer, held to the oracle and timed.
+
+    Each renderer is tried in a process of its own, for drivers may crash or hang. EGL and OSMesa are optional: the
+    default renderer needs neither.
+    """
+
+    time_limit: float = 60.0
+    """Seconds a renderer may take to start, compile and answer."""
+    json: bool = False
+    """Print JSON, in SI units, instead of text."""
+
+    def run(self) -> None:
+        from dataclasses import asdict
+        from json import dumps
+
+        from tqdm import tqdm
+
+        from depthtrack.rendering.doctor import Machine, examine
+
+        if not 0 < self.time_limit <= 3600:
+            raise InputError(f"--time-limit must lie between 0 and 3600 seconds, found {self.time_limit:g}")
+        machine = Machine.here()
+        outcomes = examine(
+            self.time_limit,
+            progress=lambda trials: tqdm(trials, unit="renderer", delay=1, leave=False, disable=None),
+        )
+        if self.json:
+            rows = [{**asdict(outcome), "works": outcome.works} for outcome in outcomes]
+            print(dumps({"machine": asdict(machine), "renderers": rows}, indent=2))
+        else:
+            print(_text(machine, outcomes))
+        default = outcomes[0]
+        if not default.works:
+            raise DepthtrackError(f"the default renderer, {default.trial.label}, does not work here: {default.problem}")
+
+
+def _text(machine: "Machine", outcomes: "list[Outcome]") -> str:
+    """Aligned lines for people, depth in millimetres."""
+    libraries = [f"{name} {version}" for name, version in machine.libraries.items() if version]
+    absent = [name for name, version in machine.libraries.items() if version is None]
+    vectors = ", ".join(name for name, has in (("AVX2", machine.avx2), ("AVX-512", machine.avx512)) if has)
+    lines = [
+        f"{'depthtrack':<13}{machine.depthtrack} on Python {machine.python}, {machine.system}",
+        f"{'processor':<13}{machine.processor}, {machine.threads} threads, {vectors or 'neither AVX2 nor AVX-512'}",
+        *_wrapped("libraries", libraries),
+        *_wrapped("not installed", absent),
+        "",
+        *_table(outcomes),
+        "",
+        "Speed: 64 hypotheses of 64 x 64 pixels, kinematics and objective included, best of many calls.",
+        "Differences: the largest from the float64 ray caster over the same 64.",
+    ]
+    problems = [outcome for outcome in outcomes if not outcome.works]
+    for outcome in problems:
+        lines += ["", *_wrapped(outcome.trial.label, (outcome.problem or "").split(" "), indent=17, separator=" ")]
+    return "\n".join(lines)
+
+
+def _table(outcomes: "list[Outcome]") -> list[str]:
+    head = ("renderer", "works", "hypotheses/s", "energy", "depth", "silhouette", "drawn by")
+    rows = [head, *(_row(outcome) for outcome in outcomes)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    aligned = [
+        [
+            cell.ljust(width) if k in (0, 1, 6) else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        for row in rows
+    ]
+    return ["  ".join(row).rstrip() for row in aligned]
+
+
+def _row(outcome: "Outcome") -> tuple[str, ...]:
+    check = outcome.check
+    if check is None:
+        return outcome.trial.label, "no", "", "", "", "", ""
+    return (
+        outcome.trial.label,
+        "yes" if outcome.works else "no",
+        f"{check.hypotheses_per_s:,.0f}",
+        f"{check.energy_difference:.1g}",
+        f"{1000 * check.depth_difference:.1g} mm",
+        f"{check.silhouette_pixels} px",
+        f"{check.renderer}, {'software' if check.software else 'hardware'}",
+    )
+
+
+def _wrapped(label: str, words: list[str], indent: int = 13, separator: str = ", ", width: int = 110) -> list[str]:
+    """Words after a label, on as many lines as they need, indented alike; nothing where there are none."""
+    lines: list[str] = []
+    for word in words:
+        if not lines or indent + len(lines[-1]) + len(separator) + len(word) > width:
+            lines.append(word)
+        else:
+            lines[-1] += separator + word
+    return [f"{label if i == 0 else '':<{indent}}{line}" for i, line in enumerate(lines)]

@@ -1,0 +1,100 @@
+"""Hands seen in ordinary and absurd ways, held to the oracle: for EGL in the tests' process, for OSMesa in its own."""
+
+import numpy as np
+
+from depthtrack.camera import Camera
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.opengl.context import Platform
+from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
+from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.rendering.target import Target
+from tests.test_raster import KINECT, random_poses, random_shape, target_of, window_on
+
+OBJECTIVE = Objective()
+BOTH_SUMS: tuple[Sums, Sums] = ("cpu", "gpu")
+ABSURD = {
+    "behind": ((0.0, 0.0, -0.6), 0.05),
+    "around the lens": ((0.0, 0.0, 0.0), 0.08),
+    "1 cm from the lens": ((0.0, 0.0, 0.01), 0.005),
+    "reaching past the lens": ((0.0, 0.0, 0.1), 0.05),
+    "at the border": ((0.24, 0.18, 0.5), 0.03),
+    "outside": ((3.0, 0.0, 0.5), 0.1),
+}
+
+
+def agree(platform: Platform, shape: HandShape, target: Target, poses: np.ndarray, objective: Objective) -> None:
+    """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3, by either way to sum.
+
+    The energies are compared where no match hangs on the last bits of a depth: such readings are taken out first.
+    """
+    oracle = OracleScorer(shape, objective)
+    oracle.observe(target)
+    true = np.stack([oracle.render(pose) for pose in poses])
+    margin = np.abs(np.abs(true - target.depth) - objective.match_depth)
+    undecided = ((margin < 1e-5) & (true > 0)).any(axis=0)
+    target = Target(target.camera, target.skin, np.where(undecided, 0, target.depth))
+    oracle.observe(target)
+    expected = oracle.terms(poses)
+    for sums in BOTH_SUMS:
+        with OpenGLScorer(shape, objective, platform, sums) as scorer:
+            scorer.observe(target)
+            terms, drawn = scorer.terms(poses), np.stack([scorer.render(pose) for pose in poses])
+        both, wrong = (drawn > 0) & (true > 0), (drawn > 0) != (true > 0)
+        assert np.count_nonzero(wrong) <= 1e-3 * np.count_nonzero(true)
+        assert np.abs(drawn - true)[both].max(initial=0) < 1e-4
+        same = ~wrong.any(axis=(1, 2))
+        np.testing.assert_allclose(terms.energy[same], expected.energy[same], atol=1e-3)
+        np.testing.assert_allclose(terms.depth[same], expected.depth[same], atol=1e-3)
+        np.testing.assert_allclose(terms.skin[same], expected.skin[same], atol=1e-6)
+        np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
+
+
+def window(platform: Platform, seed: int, reduced: int | None) -> None:
+    """A window on the hand half a metre away, native or reduced."""
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
+    agree(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
+
+
+def any_camera(platform: Platform, seed: int) -> None:
+    """Any image size, field of view and principal point; hands near and far, mostly partly outside."""
+    rng = np.random.default_rng(seed)
+    width, height = (int(n) for n in rng.integers(1, 200, 2))
+    focal = rng.uniform(0.5, 2) * max(width, height)
+    camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *rng.uniform(-0.5, 1.5, 2) * [width, height])
+    shape, poses = random_shape(rng), random_poses(rng, 4, (0, 0, rng.uniform(0.1, 2.5)), 0.2)
+    agree(platform, shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
+
+
+def absurd(platform: Platform, name: str, seed: int) -> None:
+    """Where a view makes little sense, it is still defined; behind the lens and outside the image, nothing shows."""
+    rng, (centre, spread) = np.random.default_rng(seed), ABSURD[name]
+    camera = KINECT.resized(0.25)
+    shape, poses = random_shape(rng), random_poses(rng, 6, centre, spread)
+    target = target_of(shape, random_poses(rng, 1, (0, 0, 0.4), 0)[0], camera, rng)
+    agree(platform, shape, target, poses, OBJECTIVE)
+    if name in ("behind", "outside"):
+        with OpenGLScorer(shape, platform=platform) as scorer:
+            scorer.observe(target)
+            assert not any(scorer.render(pose).any() for pose in poses)
+
+
+def overhanging(platform: Platform) -> None:
+    """A window that hangs over the image's corner, and one larger than the image."""
+    rng = np.random.default_rng(7)
+    shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
+    full = target_of(shape, poses[0], KINECT.resized(0.5), rng)
+    for left, top, width, height in ((250, 190, 150, 150), (-40, -30, 400, 300), (-200, -200, 64, 64)):
+        agree(platform, shape, full.window(left, top, width, height), poses, OBJECTIVE)
+
+
+def energies_and_depth(platform: Platform, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of a batch around one observation, for comparing platforms bit by bit."""
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 20, (0, 0, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng).reduced(64)
+    with OpenGLScorer(shape, platform=platform) as scorer:
+        scorer.observe(target)
+        return scorer.score(poses), scorer.render(poses[1])
