@@ -54,11 +54,11 @@ class Skin:
         Every vertex goes to the weighted mean of where the bodies take it (Schroeder et al. 2014, Eq. 2).
         """
         moved = (np.asarray(transforms, dtype=np.float64) @ self.T_body_rest)[..., :3, :]
-        blended = self.weights @ moved.reshape(*moved.shape[:-3], BODY_COUNT, 12)
-        rows = [blended[..., 4 * i : 4 * i + 3] for i in range(3)]
-        return np.stack(
-            [np.einsum("...vj,vj->...v", row, self.rest) + blended[..., 4 * i + 3] for i, row in enumerate(rows)], -1
-        )
+        batch = moved.shape[:-3]
+        by_body = np.moveaxis(moved, -3, 0).reshape(BODY_COUNT, -1)
+        blended = (self._sparse_weights @ by_body).reshape(-1, *batch, 3, 4)
+        rest = self.rest.reshape(-1, *(1,) * len(batch), 1, 3)
+        return np.moveaxis(np.sum(blended[..., :3] * rest, axis=-1) + blended[..., 3], 0, -2)
 
     def at(self, pose: ArrayLike) -> Array:
         """Vertices (..., V, 3) in the camera frame of poses (..., 27)."""
@@ -80,6 +80,10 @@ class Skin:
     def face_bodies(self) -> NDArray[np.int64]:
         """(F,) body that moves each face most."""
         return np.asarray(self.weights[self.faces].sum(axis=1).argmax(axis=-1), dtype=np.int64)
+
+    @cached_property
+    def _sparse_weights(self) -> csr_array:
+        return csr_array(self.weights)
 
     @cached_property
     def _faces_around(self) -> csr_array:
