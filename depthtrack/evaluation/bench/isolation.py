@@ -1,7 +1,7 @@
 """Work in a fresh process, item by item: a driver that crashes, hangs or claims the whole process harms nobody else."""
 
 import multiprocessing
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
@@ -14,7 +14,9 @@ class ProcessFailureError(DepthtrackError):
     """What ran in a process of its own raised, died or fell silent; the message says which."""
 
 
-def in_own_process(function: Callable[..., Iterable[Item]], *arguments: object, patience: float) -> Iterator[Item]:
+def in_own_process(
+    function: Callable[..., Iterable[Item]], *arguments: object, patience: float
+) -> Generator[Item, None, None]:
     """What `function(*arguments)` yields, computed in a fresh (spawned) process as it is asked for.
 
     Function, arguments and items must be picklable. Raises the DepthtrackError that it raised, and ProcessFailureError

@@ -196,7 +196,7 @@ def as_text(report: ScoreReport) -> str:
             f"{machine.cpu}, {machine.cores} cores{busy}",
             "hypotheses a second, from pose to energy:",
             "",
-            *aligned([head, *lines], left=3),
+            *(aligned([head, *lines], left=3) if lines else ["nothing could run"]),
             "",
             *notes.values(),
             *(f"{absent.backend}: {absent.reason}" for absent in report.absent),
