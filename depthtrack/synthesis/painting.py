@@ -12,7 +12,7 @@ from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
-from depthtrack.synthesis.randomness import normal_noise
+from depthtrack.synthesis.randomness import coarse_normal_noise
 from depthtrack.synthesis.scene import View
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Painter:
         self._T_rest_body = _at_rest(shape)
         still = backdrop.surface
         light = self._light.on(backdrop.albedo(rng), still.normal) * (still.depth > 0)[..., None]
-        self._background = (255 * srgb_from_linear(light)).astype(np.float32)
+        self._background = np.rint(255 * srgb_from_linear(light)).astype(np.uint8)
 
     def paint(self, view: View, rng: np.random.Generator) -> Colour:
         """RGB (h, w, 3) of a view."""
@@ -99,23 +99,21 @@ class Painter:
         label, normal = surface.label[v, u], surface.normal[v, u]
         points = self._camera.unproject(np.stack([u, v], axis=-1), surface.depth[v, u])
         albedo = self._skin(points, normal, label, view.transforms)
-        picture[v, u] = 255 * srgb_from_linear(self._light.on(albedo, normal, shine=True))
-        if self._noise > 0:
-            picture += np.float32(self._noise) * normal_noise(rng, picture.shape)
-        return np.asarray(cv2.convertScaleAbs(np.maximum(picture, 0)), dtype=np.uint8)
+        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.on(albedo, normal, shine=True)))
+        if self._noise == 0:
+            return picture
+        noise = self._noise * coarse_normal_noise(rng, picture.shape)
+        return np.asarray(cv2.add(picture, np.rint(noise), dtype=cv2.CV_8U), dtype=np.uint8)
 
     def _skin(self, points: Array, normal: Array, label: NDArray[np.int16], transforms: Array) -> Array:
         """Albedo (N, 3) at camera-frame points (N, 3): it moves with the hand, for it depends on the point at rest."""
-        at_rest, inward = np.empty(points.shape, dtype=np.float32), np.empty(len(points))
-        for body in np.unique(label):
-            here = label == body
-            T = self._T_rest_body[body] @ np.linalg.inv(transforms[body])
-            at_rest[here] = points[here] @ T[:3, :3].T + T[:3, 3]
-            inward[here] = normal[here] @ transforms[body, :3, 2]
+        T = (self._T_rest_body @ np.linalg.inv(transforms))[label]
+        at_rest = np.einsum("nij,nj->ni", T[:, :3, :3], points) + T[:, :3, 3]
+        inward = np.einsum("nj,nj->n", transforms[label, :3, 2], normal)
         # From the back (0) to the palm's side (1), over the fingers' edges.
         palmar = np.clip(0.5 + 1.2 * inward, 0, 1)[:, None]
         albedo = self._tone.back + (palmar**2 * (3 - 2 * palmar)) * (self._tone.palm - self._tone.back)
-        blotches = np.sin(at_rest @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
+        blotches = np.sin(at_rest.astype(np.float32) @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
         # Blood under the skin takes away green and blue rather than red.
         return np.asarray(albedo * (1 + blotches[:, None] * np.array([0.02, 0.045, 0.045])))
 

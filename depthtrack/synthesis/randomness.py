@@ -3,6 +3,7 @@
 from enum import IntEnum
 from functools import cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
@@ -33,10 +34,16 @@ def generator(seed: int, frame: int, stream: Stream) -> np.random.Generator:
 
 def normal_noise(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Standard normal numbers for images, three times as fast as the generator's own: 65536 equally likely values."""
-    return _quantiles()[rng.integers(0, 1 << 16, shape, dtype=np.uint16)]
+    return _quantiles(1 << 16).take(rng.integers(0, 1 << 16, shape, dtype=np.uint16))
+
+
+def coarse_normal_noise(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """The same of 256 values, up to 2.9 deviations, for what is rounded to a few levels; three times as fast again."""
+    drawn = rng.integers(0, 1 << 8, shape, dtype=np.uint8)
+    return np.asarray(cv2.LUT(drawn, _quantiles(1 << 8)), dtype=np.float32)
 
 
 @cache
-def _quantiles() -> NDArray[np.float32]:
-    values = ndtri((np.arange(1 << 16) + 0.5) / (1 << 16))
+def _quantiles(count: int) -> NDArray[np.float32]:
+    values = ndtri((np.arange(count) + 0.5) / count)
     return np.asarray(values / values.std(), dtype=np.float32)

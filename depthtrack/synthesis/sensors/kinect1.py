@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
-from depthtrack.synthesis.randomness import normal_noise
+from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 
 Array = NDArray[np.float64]
@@ -57,7 +57,8 @@ class Kinect1:
             theta,
             edges(surface.depth),
             shadow(surface.depth, self.camera, BASELINE),
-            normal_noise(rng, (3, *shape)),
+            coarse_normal_noise(rng, (2, *shape)),
+            normal_noise(rng, shape),
             rng.random(shape, dtype=np.float32),
             (self.nearest, self.farthest),
             out,
@@ -87,6 +88,7 @@ def _read(
     edge: NDArray[np.bool_],
     dark: NDArray[np.bool_],
     wander: NDArray[np.float32],
+    error: NDArray[np.float32],
     uniform: NDArray[np.float32],
     reach: tuple[float, float],
     out: Array,
@@ -107,7 +109,7 @@ def _read(
             # One disparity step is worth z^2 / (8 f b); rounding to it adds a twelfth of a step squared.
             scale = STEPS * INFRARED_FOCAL * BASELINE
             sigma = axial_noise(z, angle) * scale / (z * z)
-            disparity = scale / z + math.sqrt(max(sigma * sigma - 1.0 / 12.0, 0.0)) * wander[2, v, u]
+            disparity = scale / z + math.sqrt(max(sigma * sigma - 1.0 / 12.0, 0.0)) * error[v, u]
             z = scale / max(round(disparity), 1)
             if reach[0] <= z <= reach[1]:
                 out[v, u] = z
