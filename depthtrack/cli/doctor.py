@@ -53,10 +53,10 @@ def _text(machine: "Machine", outcomes: "list[Outcome]") -> str:
     absent = [name for name, version in machine.libraries.items() if version is None]
     vectors = ", ".join(name for name, has in (("AVX2", machine.avx2), ("AVX-512", machine.avx512)) if has)
     lines = [
-        f"{'depthtrack':<13}{machine.depthtrack} on Python {machine.python}, {machine.system}",
-        f"{'processor':<13}{machine.processor}, {machine.threads} threads, {vectors or 'neither AVX2 nor AVX-512'}",
-        *_wrapped("libraries", libraries),
-        *_wrapped("not installed", absent),
+        f"{'depthtrack':<15}{machine.depthtrack} on Python {machine.python}, {machine.system}",
+        f"{'processor':<15}{machine.processor}, {machine.threads} threads, {vectors or 'neither AVX2 nor AVX-512'}",
+        *_wrapped("libraries", _listed(libraries)),
+        *_wrapped("not installed", _listed(absent)),
         "",
         *_table(outcomes),
         "",
@@ -65,7 +65,7 @@ def _text(machine: "Machine", outcomes: "list[Outcome]") -> str:
     ]
     problems = [outcome for outcome in outcomes if not outcome.works]
     for outcome in problems:
-        lines += ["", *_wrapped(outcome.trial.label, (outcome.problem or "").split(" "), indent=17, separator=" ")]
+        lines += ["", *_wrapped(outcome.trial.label, (outcome.problem or "").split(), indent=17)]
     return "\n".join(lines)
 
 
@@ -98,12 +98,16 @@ def _row(outcome: "Outcome") -> tuple[str, ...]:
     )
 
 
-def _wrapped(label: str, words: list[str], indent: int = 13, separator: str = ", ", width: int = 110) -> list[str]:
+def _listed(items: list[str]) -> list[str]:
+    return [f"{item}," for item in items[:-1]] + items[-1:]
+
+
+def _wrapped(label: str, words: list[str], indent: int = 15, width: int = 110) -> list[str]:
     """Words after a label, on as many lines as they need, indented alike; nothing where there are none."""
     lines: list[str] = []
     for word in words:
-        if not lines or indent + len(lines[-1]) + len(separator) + len(word) > width:
-            lines.append(word)
+        if lines and indent + len(lines[-1]) + 1 + len(word) <= width:
+            lines[-1] += f" {word}"
         else:
-            lines[-1] += separator + word
+            lines.append(word)
     return [f"{label if i == 0 else '':<{indent}}{line}" for i, line in enumerate(lines)]

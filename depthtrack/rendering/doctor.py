@@ -43,7 +43,7 @@ class Machine:
             depthtrack=depthtrack.__version__,
             python=platform.python_version(),
             system=f"{platform.system()} {platform.release()} {platform.machine()}",
-            processor=binding.get_host_cpu_name(),
+            processor=_model_name() or binding.get_host_cpu_name(),
             threads=available_threads(),
             avx2=bool(features.get("avx2")),
             avx512=bool(features.get("avx512f")),
@@ -141,6 +141,15 @@ def _outcome(trial: Trial, code: int, printed: str, complaints: str) -> Outcome:
 def available_threads() -> int:
     """How many threads this process may run at once."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _model_name() -> str | None:
+    """The processor's name for people, where the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return None
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), None)
 
 
 def _version(name: str) -> str | None:

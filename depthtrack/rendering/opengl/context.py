@@ -72,10 +72,10 @@ class Context:
             self.version = _text(gl.glGetString(gl.GL_VERSION))
             self.max_side = int(gl.glGetIntegerv(gl.GL_MAX_TEXTURE_SIZE))
         self.software = any(name in self.renderer.lower() for name in _SOFTWARE_RENDERERS)
+        atexit.register(self.close)
 
     def __enter__(self) -> Any:
-        if self._process != os.getpid():
-            raise OpenGLError(_FORKED)
+        self.require_own_process()
         self._lock.acquire()
         if self._depth == 0:
             try:
@@ -107,6 +107,12 @@ class Context:
             with self._lock:
                 self.closed = True
                 self._binding.destroy()
+                atexit.unregister(self.close)
+
+    def require_own_process(self) -> None:
+        """Raise OpenGLError in a forked child."""
+        if self._process != os.getpid():
+            raise OpenGLError(_FORKED)
 
     def _require_open(self) -> None:
         if self.closed:
@@ -125,14 +131,11 @@ def open_context(platform: Platform, device: Device = None) -> Context:
         from depthtrack.rendering.opengl.osmesa import OSMesaBinding
 
         osmesa, gl = load("osmesa")
-        context = Context(gl, OSMesaBinding(osmesa, gl))
-    else:
-        from depthtrack.rendering.opengl.egl import Egl, open_egl
+        return Context(gl, OSMesaBinding(osmesa, gl))
+    from depthtrack.rendering.opengl.egl import Egl, open_egl
 
-        *modules, gl = load("egl")
-        context = open_egl(Egl(*modules), device, lambda binding: Context(gl, binding))
-    atexit.register(context.close)
-    return context
+    *modules, gl = load("egl")
+    return open_egl(Egl(*modules), device, lambda binding: Context(gl, binding))
 
 
 _load_lock = threading.Lock()

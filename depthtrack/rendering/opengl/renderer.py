@@ -195,6 +195,7 @@ def shared_renderer(platform: Platform, device: Device = None) -> Renderer:
         renderer = _shared.get((platform, device))
         if renderer is None or renderer.context.closed:
             renderer = _shared[platform, device] = Renderer(open_context(platform, device))
+        renderer.context.require_own_process()
         return renderer
 
 
