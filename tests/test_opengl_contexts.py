@@ -274,3 +274,11 @@ import depthtrack.rendering.backends, depthtrack.rendering.opengl.scorer, deptht
 print(sorted(name for name in sys.modules if name.split(".")[0] == "OpenGL"))
 """
     assert in_a_new_process(code) == "[]"
+
+
+def test_a_driver_s_error_is_told_by_name() -> None:
+    shared = shared_renderer("egl")
+    with pytest.raises(OpenGLError, match="failed with OpenGL error 1280"), shared.context as gl:
+        gl.glEnable(0xBAD)
+    with shared.context as gl:
+        assert gl.glGetError() == 0

@@ -67,6 +67,7 @@ class Context:
         self._lock, self._depth, self._process = threading.RLock(), 0, os.getpid()
         self._doomed: list[int] = []
         self.closed = False
+        self.renderer = "OpenGL"
         with self:
             self.renderer = _text(gl.glGetString(gl.GL_RENDERER))
             self.version = _text(gl.glGetString(gl.GL_VERSION))
@@ -96,6 +97,10 @@ class Context:
         if self._depth == 0:
             self._binding.unbind()
         self._lock.release()
+        if isinstance(error, self._gl.GLError):
+            is_full = error.err == self._gl.GL_OUT_OF_MEMORY
+            what = "is out of memory: reduce the region" if is_full else f"failed with OpenGL error {error.err}"
+            raise OpenGLError(f"{self.renderer} {what}") from error
 
     def discard_texture(self, name: int) -> None:
         """Delete a texture when the context is next current: safe from any thread and from a destructor."""
@@ -163,6 +168,8 @@ def load(platform: Platform) -> list[Any]:
             # Child processes choose for themselves.
             if before is None:
                 del os.environ[_VARIABLE]
+            else:
+                os.environ[_VARIABLE] = before
         _loaded_in = os.getpid()
         return modules
 

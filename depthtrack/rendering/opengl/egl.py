@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from depthtrack.rendering.opengl.context import Binding, Context, Device, OpenGLError
+from depthtrack.rendering.opengl.context import INSTALL, Binding, Context, Device, OpenGLError
 
 _PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
 _PLATFORM_SURFACELESS = 0x31DD  # EGL_PLATFORM_SURFACELESS_MESA
@@ -90,10 +90,8 @@ def open_egl(egl: Egl, device: Device, context_of: Callable[[Binding], Context])
         found.append(f"{name}: {context.renderer}")
         context.close()
     missing = {"gpu": "finds no GPU", "software": "finds no software renderer"}.get(str(device), "gives no OpenGL 3.3")
-    raise OpenGLError(
-        f"EGL {missing}; tried {', '.join(found) or 'nothing, for it lists no device'}. Mesa's drivers come with  "
-        "apt-get install libgl1-mesa-dri , a GPU's own with its vendor's EGL driver"
-    )
+    mend = "a GPU needs its vendor's EGL driver" if device == "gpu" else f"run  {INSTALL['egl']}"
+    raise OpenGLError(f"EGL {missing}; tried {', '.join(found) or 'nothing, for it lists no device'}: {mend}")
 
 
 def list_devices(egl: Egl) -> list[EglDevice]:

@@ -66,7 +66,7 @@ class Renderer:
             self._impostor = Program(gl, "impostor.vert", "impostor.frag")
             self._compare = Program(gl, "cover.vert", "compare.frag")
             self._reduce = Program(gl, "cover.vert", "reduce.frag")
-            self._empty_vertices, self._vertices = gl.glGenVertexArrays(2)
+            self._no_vertices, self._vertices = gl.glGenVertexArrays(2)
             self._instances = gl.glGenBuffers(1)
             self._describe_instances(gl)
         self._atlases: list[Atlas] = []
@@ -82,11 +82,11 @@ class Renderer:
             )
         self._side = max(self._side, height, width)
         if not self._atlases or self._atlases[0].side < self._side:
-            for atlas in self._atlases + self._pyramid:
+            outgrown, self._atlases, self._pyramid = self._atlases + self._pyramid, [], []
+            for atlas in outgrown:
                 atlas.delete(gl)
             # Two atlases: one is read back while the other is drawn.
             self._atlases = [Atlas(gl, self._side, gl.GL_R32F, gl.GL_RED) for _ in range(2)]
-            self._pyramid = []
         # Tiles narrower than a block still take one of the pyramid.
         columns, rows = self._side // max(width, _BLOCK), self._side // max(height, _BLOCK)
         columns, rows = max(columns, 1), max(rows, 1)
@@ -121,37 +121,44 @@ class Renderer:
     ) -> NDArray[np.float64]:
         """Sums of Eq. (2) over the tiles of atlas `which`: (count, 3).
 
-        `observation` is a texture filled by `upload`; one level compares, the next ones add 4 x 4 texels
-        each, until one texel a tile is left (Sec. 2.5).
+        `observation` is a texture filled by `upload`. The first level of the pyramid compares, the next ones add, until
+        one texel a tile is left (Sec. 2.5).
         """
         if not self._pyramid:
-            self._pyramid = [Atlas(gl, self._side, gl.GL_RGBA32F, gl.GL_RGBA) for _ in range(2)]
+            # Blocks take at most 2/5 of an atlas' side, for tiles of 5 pixels.
+            self._pyramid = [Atlas(gl, self._side // 2, gl.GL_RGBA32F, gl.GL_RGBA) for _ in range(2)]
         gl.glDisable(gl.GL_BLEND)
         gl.glDisable(gl.GL_SCISSOR_TEST)
-        gl.glBindVertexArray(self._empty_vertices)
+        gl.glBindVertexArray(self._no_vertices)
         gl.glActiveTexture(gl.GL_TEXTURE1)
         gl.glBindTexture(gl.GL_TEXTURE_2D, observation)
         gl.glActiveTexture(gl.GL_TEXTURE0)
-        source, tile = self._atlases[which], (grid.width, grid.height)
-        program, uniforms = (
-            self._compare,
-            {"inverse_depth": 0, "observation": 1, "match_depth": match_depth, "clamp_depth": clamp_depth},
-        )
-        for level in range(32):
-            blocks = -(-tile[0] // _BLOCK), -(-tile[1] // _BLOCK)
-            target = self._pyramid[level % 2]
-            gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.framebuffer)
-            gl.glViewport(0, 0, min(count, grid.columns) * blocks[0], grid.rows(count) * blocks[1])
-            gl.glBindTexture(gl.GL_TEXTURE_2D, source.texture)
-            program.use(tile=tile, blocks=blocks, **uniforms)
-            gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3)
-            source, tile, program, uniforms = target, blocks, self._reduce, {"level": 0}
-            if tile == (1, 1):
-                break
-        rows, columns = grid.rows(count), min(count, grid.columns)
+        tiles, (level, spare) = (min(count, grid.columns), grid.rows(count)), self._pyramid
+        self._compare.use(inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth)
+        size = self._add_blocks(gl, self._compare, self._atlases[which], level, tiles, (grid.width, grid.height))
+        while size != (1, 1):
+            self._reduce.use(level=0)
+            size = self._add_blocks(gl, self._reduce, level, spare, tiles, size)
+            level, spare = spare, level
+        columns, rows = tiles
         sums = np.empty((rows, columns, 4), np.float32)
         gl.glReadPixels(0, 0, columns, rows, gl.GL_RGBA, gl.GL_FLOAT, sums)
         return sums.reshape(-1, 4)[:count, :3].astype(np.float64)
+
+    def _add_blocks(
+        self, gl: Any, program: Program, source: Atlas, target: Atlas, tiles: tuple[int, int], size: tuple[int, int]
+    ) -> tuple[int, int]:
+        """Run a program that turns each 4 x 4 block of `tiles` (columns, rows) of `size` (width, height) into a texel.
+
+        Returns the size of a tile in `target`, whose framebuffer stays bound.
+        """
+        blocks = -(-size[0] // _BLOCK), -(-size[1] // _BLOCK)
+        gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, target.framebuffer)
+        gl.glViewport(0, 0, tiles[0] * blocks[0], tiles[1] * blocks[1])
+        gl.glBindTexture(gl.GL_TEXTURE_2D, source.texture)
+        program.use(tile=size, blocks=blocks)
+        gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3)
+        return blocks
 
     def new_texture(self, gl: Any) -> int:
         """A texture for `upload`, to be given back by `context.discard_texture`."""
