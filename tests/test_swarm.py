@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, normalised, retract, tangent_between
+from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, advance, constriction, minimise, randomise
 
@@ -97,6 +99,19 @@ def test_the_tangent_kernel_is_retract(seed: int) -> None:
     found = TangentSpace(reference).poses(steps)
     found[:, 3:7] = normalised(found[:, 3:7])
     np.testing.assert_allclose(found, retract(np.broadcast_to(reference, (6, 27)), steps), atol=1e-12)
+
+
+@given(seed=seeds)
+def test_the_visible_centroid_is_the_mean_of_the_points(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    camera = Camera(20, 10, 30.0, 31.0, 9.0, 4.0)
+    depth = np.where(rng.random(camera.shape) < 0.4, rng.uniform(0.2, 1, camera.shape), 0).astype(np.float32)
+    depth[0, 0] = 0.5
+    v, u = np.nonzero(depth)
+    expected = camera.unproject(np.stack([u, v], axis=-1), depth[v, u]).mean(axis=0)
+    intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+    np.testing.assert_allclose(visible_centroid(depth, intrinsics), expected, atol=1e-9)
+    assert np.isnan(visible_centroid(np.zeros_like(depth), intrinsics)).all()
 
 
 def test_a_quaternion_of_no_length_keeps_the_reference() -> None:

@@ -21,6 +21,11 @@ class Scorer(Protocol):
 
     name: str
 
+    @property
+    def target(self) -> Target:
+        """The observation last set by `observe`. Raises RuntimeError before that."""
+        ...
+
     def observe(self, target: Target) -> None:
         """Set what the next calls score against; its camera is the one hypotheses are seen with."""
         ...

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import POSE_SIZE, retract, tangent_between
+from depthtrack.hand.pose import POSE_SIZE, POSITION, retract, tangent_between
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.target import Target
+from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.search import SearchOptions, find_pose, refine
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
@@ -29,8 +30,9 @@ class PsoOptions:
     """How the PSO tracker works; the same options and observations give the same bits on any number of threads.
 
     `variant` "paper" is Oikonomidis et al. 2011: 27 raw parameters, the swarm around the last solution, w of Eq. (3),
-    fingers randomised over their whole range. "default" flies in the tangent space, half of the swarm around the
-    linear prediction, damps more and randomises half of the fingers near the best: each measured to help.
+    fingers randomised over their whole range. "default" flies in the tangent space; a third of the swarm each starts
+    around the last pose, its linear prediction, and the last pose moved onto the observed hand, the wider the faster
+    the hand; it damps more and randomises half of the fingers near the best. Each was measured to help.
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
     """
@@ -124,14 +126,26 @@ class PsoTracker:
         return ParameterSpace(reference) if self.options.variant == "paper" else TangentSpace(reference)
 
     def _population(self, space: Space, last: Array, generator: np.random.Generator) -> Array:
-        """The first generation: perturbations of the last pose and, by default, of its linear prediction."""
+        """The first generation: perturbations of the last pose and, by default, of where the hand may have gone."""
         count = self.options.particles
-        centres = np.tile(last, (count, 1))
+        centres, spread = np.tile(last, (count, 1)), np.repeat(self.options.spread, [3, 3, 20])
         if self.options.variant == "default":
-            centres[1::2] = retract(last, self._velocity)
-        steps = generator.standard_normal((count, 26)) * np.repeat(self.options.spread, [3, 3, 20])
-        steps[:2] = 0  # the centres themselves take part
+            centres[1::3] = retract(last, self._velocity)
+            centres[2::3, POSITION] += self._drift(last)
+            # What moved fast may as well have stopped, or turned: look as far as half of its last step.
+            spread = np.hypot(spread, 0.5 * self._velocity)
+        steps = generator.standard_normal((count, 26)) * spread
+        steps[:3] = 0  # the centres themselves take part
         return space.coordinates(retract(centres, steps))
+
+    def _drift(self, last: Array) -> Array:
+        """How far (3, metres) the observed hand lies from the last pose, as seen through the same camera."""
+        camera = self._scorer.target.camera
+        intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+        seen, expected = (
+            visible_centroid(depth, intrinsics) for depth in (self._scorer.target.depth, self._scorer.render(last))
+        )
+        return seen - expected if np.isfinite(seen + expected).all() else np.zeros(3)
 
     def _generator(self, observation: Observation) -> np.random.Generator:
         """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""

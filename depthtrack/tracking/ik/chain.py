@@ -1,0 +1,120 @@
+"""The hand's kinematic chain as the solver needs it: compiled, one pose at a time.
+
+`HandModel` says the same for batches, slowly; the tests hold this file to it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+
+
+class Chain(NamedTuple):
+    """Constants of a hand: `base` (5, 3, 4) T_palm_base with all angles zero, `lengths` (5, 3) m, `mirror` +1 or -1."""
+
+    base: Array
+    lengths: Array
+    mirror: float
+
+    @staticmethod
+    def of(shape: HandShape) -> "Chain":
+        """The chain of a hand of these sizes."""
+        model = HandModel(shape)
+        base = np.ascontiguousarray(model.base_transforms[:, :3])
+        return Chain(base, np.ascontiguousarray(model.lengths), shape.mirror)
+
+
+class Bodies(NamedTuple):
+    """A posed hand, camera frame: `T` (16, 3, 4) T_camera_body; `axes` and `origins` (20, 3) of the angles' hinges."""
+
+    T: Array
+    axes: Array
+    origins: Array
+
+    @staticmethod
+    def empty() -> "Bodies":
+        """Room for `place`."""
+        return Bodies(np.zeros((BODY_COUNT, 3, 4)), np.zeros((20, 3)), np.zeros((20, 3)))
+
+    @staticmethod
+    def at(chain: Chain, pose: Array) -> "Bodies":
+        """The hand in a pose (27,)."""
+        bodies = Bodies.empty()
+        place(chain, np.ascontiguousarray(pose, dtype=np.float64), bodies)
+        return bodies
+
+
+@numba.njit(cache=True, nogil=True)
+def place(chain: Chain, pose: Array, bodies: Bodies) -> None:
+    """Move the bodies to `pose` (27,): Eq. (1) of Schroeder et al. 2014."""
+    T, axes, origins = bodies.T, bodies.axes, bodies.origins
+    _rotation(pose[3], pose[4], pose[5], pose[6], T[0])
+    for i in range(3):
+        T[0, i, 3] = pose[i]
+    base, lengths = chain.base, chain.lengths
+    for finger in range(5):
+        first = 1 + 3 * finger
+        angle = pose[7 + 4 * finger]
+        c, s = math.cos(angle), -chain.mirror * math.sin(angle)
+        for i in range(3):
+            # Columns of T_palm_base Rz(-mirror abduction), in the camera frame.
+            x = T[0, i, 0] * base[finger, 0, 0] + T[0, i, 1] * base[finger, 1, 0] + T[0, i, 2] * base[finger, 2, 0]
+            y = T[0, i, 0] * base[finger, 0, 1] + T[0, i, 1] * base[finger, 1, 1] + T[0, i, 2] * base[finger, 2, 1]
+            z = T[0, i, 0] * base[finger, 0, 2] + T[0, i, 1] * base[finger, 1, 2] + T[0, i, 2] * base[finger, 2, 2]
+            p = T[0, i, 0] * base[finger, 0, 3] + T[0, i, 1] * base[finger, 1, 3] + T[0, i, 2] * base[finger, 2, 3]
+            T[first, i, 0] = x * c + y * s
+            T[first, i, 1] = y * c - x * s
+            T[first, i, 2] = z
+            T[first, i, 3] = p + T[0, i, 3]
+            axes[4 * finger, i] = -chain.mirror * z
+            origins[4 * finger, i] = T[first, i, 3]
+        for k in range(3):
+            body, hinge = first + k, 4 * finger + 1 + k
+            angle = pose[7 + hinge]
+            c, s = math.cos(angle), math.sin(angle)
+            for i in range(3):
+                y, z = T[body, i, 1], T[body, i, 2]
+                T[body, i, 1] = y * c + z * s
+                T[body, i, 2] = z * c - y * s
+                axes[hinge, i] = T[body, i, 0]
+                origins[hinge, i] = T[body, i, 3]
+                if k < 2:
+                    T[body + 1, i, 0] = T[body, i, 0]
+                    T[body + 1, i, 1] = T[body, i, 1]
+                    T[body + 1, i, 2] = T[body, i, 2]
+                    T[body + 1, i, 3] = T[body, i, 3] + T[body, i, 1] * lengths[finger, k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _rotation(w: float, x: float, y: float, z: float, out: Array) -> None:
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    out[0, 0], out[0, 1], out[0, 2] = 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
+    out[1, 0], out[1, 1], out[1, 2] = s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)
+    out[2, 0], out[2, 1], out[2, 2] = s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)
+
+
+@numba.njit(cache=True, nogil=True)
+def step(pose: Array, tangent: Array, out: Array) -> None:
+    """`pose.retract`: the pose (27,) reached by a tangent step (26,), written to `out` (27,)."""
+    for i in range(3):
+        out[i] = pose[i] + tangent[i]
+    x, y, z = tangent[3], tangent[4], tangent[5]
+    angle = math.sqrt(x * x + y * y + z * z)
+    sinc = math.sin(angle / 2) / angle if angle > 1e-9 else 0.5
+    w, x, y, z = math.cos(angle / 2), sinc * x, sinc * y, sinc * z
+    qw, qx, qy, qz = pose[3], pose[4], pose[5], pose[6]
+    rw = w * qw - x * qx - y * qy - z * qz
+    rx = w * qx + x * qw + y * qz - z * qy
+    ry = w * qy - x * qz + y * qw + z * qx
+    rz = w * qz + x * qy - y * qx + z * qw
+    scale = (1.0 if rw >= 0 else -1.0) / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)
+    out[3], out[4], out[5], out[6] = rw * scale, rx * scale, ry * scale, rz * scale
+    for i in range(20):
+        out[7 + i] = pose[7 + i] + tangent[6 + i]

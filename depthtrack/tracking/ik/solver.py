@@ -1,0 +1,205 @@
+"""Damped Gauss-Newton on fixed correspondences (Schroeder et al. 2014, Sec. IV-A and IV-B), compiled.
+
+The inner iterations see the observation only through its moments, so they are nearly free.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.tracking.ik.chain import Bodies, Chain, place, step
+from depthtrack.tracking.ik.moments import Moments, energy, normal_equations
+from depthtrack.tracking.ik.space import Space
+
+Array = NDArray[np.float64]
+
+
+class Damping(NamedTuple):
+    """What holds the solution back.
+
+    `posture` lambda of Eq. (4), m^2 / rad^2, on each finger angle or synergy; `pose` on translation (unitless) and
+    rotation (m^2 / rad^2), only to keep the system solvable. `precision` (20, 20) and `rest` (20,): a pull towards
+    likely postures, m^2 / rad^2. `avoid_limits`: whether damping grows towards the limits (Sec. IV-B).
+    """
+
+    posture: float
+    pose: float
+    precision: Array
+    rest: Array
+    avoid_limits: bool
+
+
+class Solution(NamedTuple):
+    """Working state of one frame: `pose` (27,), `coordinates` (l,) of its angles, and `slope` (l,), |dH/dtheta| of the
+    joint limit function one step before."""
+
+    pose: Array
+    coordinates: Array
+    slope: Array
+
+
+@numba.njit(cache=True, nogil=True)
+def limit_slope(x: float, low: float, high: float) -> float:
+    """|dH/dx| for H = (high - low)^2 / ((high - x) (x - low)), the joint limit function of Sec. IV-B."""
+    room = max((high - x) * (x - low), 1e-9)
+    return (high - low) ** 2 * abs(2 * x - high - low) / (room * room)
+
+
+@numba.njit(cache=True, nogil=True)
+def solve(
+    chain: Chain, moments: Moments, space: Space, damping: Damping, iterations: int, bodies: Bodies, state: Solution
+) -> float:
+    """Move `state` to lessen Eq. (3), by at most `iterations` steps; returns the final energy (m^2).
+
+    `bodies` are left where the final pose puts them.
+    """
+    pose, coordinates, slope = state.pose, state.coordinates, state.slope
+    count = coordinates.shape[0]
+    size = 6 + count
+    H, gradient = np.empty((26, 26)), np.empty(26)
+    A, b, tangent = np.empty((size, size)), np.empty(size), np.empty(26)
+    trial, trial_coordinates = np.empty(27), np.empty(count)
+    place(chain, pose, bodies)
+    for _ in range(iterations):
+        current = normal_equations(moments, bodies, H, gradient) + _add_prior(pose, damping, H, gradient)
+        _reduce(H, gradient, space, A, b)
+        for i in range(3):
+            A[i, i] += damping.pose
+            A[3 + i, 3 + i] += damping.pose * 1e-2
+        for i in range(count):
+            here = limit_slope(coordinates[i], space.lower[i], space.upper[i])
+            scale = 1.0 + here if damping.avoid_limits and here >= slope[i] else 1.0
+            slope[i] = here
+            A[6 + i, 6 + i] += damping.posture * scale
+            # At its limit and pushed beyond, a parameter takes no part.
+            push = -b[6 + i]
+            if (coordinates[i] <= space.lower[i] and push < 0) or (coordinates[i] >= space.upper[i] and push > 0):
+                A[6 + i, :] = 0.0
+                A[:, 6 + i] = 0.0
+                A[6 + i, 6 + i] = 1.0
+                b[6 + i] = 0.0
+        if not cholesky_solve(A, b):
+            break
+        length, improved = 1.0, False
+        for _ in range(8):
+            largest = 0.0
+            for i in range(6):
+                tangent[i] = -length * b[i]
+            for i in range(count):
+                moved = coordinates[i] - length * b[6 + i]
+                trial_coordinates[i] = min(max(moved, space.lower[i]), space.upper[i])
+            _tangent_angles(space, pose, trial_coordinates, tangent)
+            for i in range(26):
+                largest = max(largest, abs(tangent[i]))
+            step(pose, tangent, trial)
+            place(chain, trial, bodies)
+            if energy(moments, bodies) + _prior(trial, damping) < current:
+                improved = True
+                break
+            length *= 0.5
+        if not improved:
+            place(chain, pose, bodies)
+            break
+        pose[:] = trial
+        coordinates[:] = trial_coordinates
+        if largest < 1e-6:
+            break
+    return energy(moments, bodies) + _prior(pose, damping)
+
+
+@numba.njit(cache=True, nogil=True)
+def _tangent_angles(space: Space, pose: Array, coordinates: Array, tangent: Array) -> None:
+    """The change of the angles that leads to `coordinates`."""
+    for j in range(20):
+        if space.full:
+            tangent[6 + j] = coordinates[j] - pose[7 + j]
+        else:
+            angle = space.mean[j]
+            for i in range(coordinates.shape[0]):
+                angle += space.basis[j, i] * coordinates[i]
+            tangent[6 + j] = angle - pose[7 + j]
+
+
+@numba.njit(cache=True, nogil=True)
+def _reduce(H: Array, gradient: Array, space: Space, A: Array, b: Array) -> None:
+    """Normal equations of the space's parameters: J_PC = J M, Eq. (8)."""
+    if space.full:
+        A[:] = H
+        b[:] = gradient
+        return
+    B, count = space.basis, space.basis.shape[1]
+    A[:6, :6] = H[:6, :6]
+    b[:6] = gradient[:6]
+    HB = np.zeros((26, count))
+    for i in range(26):
+        for j in range(20):
+            h = H[i, 6 + j]
+            for k in range(count):
+                HB[i, k] += h * B[j, k]
+    for k in range(count):
+        for i in range(6):
+            A[i, 6 + k] = A[6 + k, i] = HB[i, k]
+    A[6:, 6:] = 0.0
+    b[6:] = 0.0
+    for j in range(20):
+        for i in range(count):
+            b[6 + i] += B[j, i] * gradient[6 + j]
+            for k in range(count):
+                A[6 + i, 6 + k] += B[j, i] * HB[6 + j, k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _prior(pose: Array, damping: Damping) -> float:
+    """Half the squared distance, by `precision`, of the angles from rest."""
+    total = 0.0
+    for i in range(20):
+        row = 0.0
+        for j in range(20):
+            row += damping.precision[i, j] * (pose[7 + j] - damping.rest[j])
+        total += row * (pose[7 + i] - damping.rest[i])
+    return 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_prior(pose: Array, damping: Damping, H: Array, gradient: Array) -> float:
+    total = 0.0
+    for i in range(20):
+        row = 0.0
+        for j in range(20):
+            H[6 + i, 6 + j] += damping.precision[i, j]
+            row += damping.precision[i, j] * (pose[7 + j] - damping.rest[j])
+        gradient[6 + i] += row
+        total += row * (pose[7 + i] - damping.rest[i])
+    return 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True)
+def cholesky_solve(A: Array, b: Array) -> bool:
+    """Solve A x = b for symmetric positive definite A (n, n), in place: A is spent and b becomes x. False if A is not."""
+    n = b.shape[0]
+    for j in range(n):
+        d = A[j, j]
+        for k in range(j):
+            d -= A[j, k] * A[j, k]
+        if not d > 1e-14:
+            return False
+        d = np.sqrt(d)
+        A[j, j] = d
+        for i in range(j + 1, n):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            A[i, j] = s / d
+    for i in range(n):
+        s = b[i]
+        for k in range(i):
+            s -= A[i, k] * b[k]
+        b[i] = s / A[i, i]
+    for i in range(n - 1, -1, -1):
+        s = b[i]
+        for k in range(i + 1, n):
+            s -= A[k, i] * b[k]
+        b[i] = s / A[i, i]
+    return True

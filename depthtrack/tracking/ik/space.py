@@ -1,0 +1,33 @@
+"""The parameters a solver moves: all 26, or the global pose and a few synergies (Schroeder et al. 2014, Sec. V-A)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.limits import LOWER, UPPER
+
+Array = NDArray[np.float64]
+
+
+class Space(NamedTuple):
+    """Finger angles as `mean` (20,) + `basis` (20, l) @ coordinates (l,): Eq. (6) and (7), less the global pose, which
+    no basis changes. `lower`, `upper` (l,) are the coordinates' limits; `full` tells the plain angles (basis: I)."""
+
+    basis: Array
+    mean: Array
+    lower: Array
+    upper: Array
+    full: bool
+
+    def project(self, angles: Array) -> Array:
+        """Coordinates (l,) of the nearest angles that the space holds, moved within the limits."""
+        return np.clip((angles - self.mean) @ self.basis, self.lower, self.upper)
+
+    def angles(self, coordinates: Array) -> Array:
+        """Angles (20,) at coordinates (l,)."""
+        return self.mean + self.basis @ coordinates
+
+
+FULL = Space(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER), True)
+"""All twenty angles within the hand's limits."""
