@@ -58,7 +58,7 @@ class HandTable(NamedTuple):
         )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def place_impostors(
     poses: Array,
     hand: HandTable,
@@ -183,21 +183,22 @@ def _bounds(
     x_low, x_high, y_low, y_high = math.inf, -math.inf, math.inf, -math.inf
     z_low, z_high = math.inf, -math.inf
     for end in range(2 if is_cylinder else 1):
-        # Dual conic of the outline, in normalised image coordinates: sum of +- column column' of T.
+        # Centre, and the sums of products of the axes: what bounds a ball's outline, or a disc's.
         w = T[3, 3] + end * T[3, 2]
-        cx_, cy_, cz_ = (T[0, 3] + end * T[0, 2]) / w, (T[1, 3] + end * T[1, 2]) / w, (T[2, 3] + end * T[2, 2]) / w
+        px, py, pz = (T[0, 3] + end * T[0, 2]) / w, (T[1, 3] + end * T[1, 2]) / w, (T[2, 3] + end * T[2, 2]) / w
         xx, yy, xz, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0
         for j in range(2 if is_cylinder else 3):
             x, y, z = T[0, j] / w, T[1, j] / w, T[2, j] / w
             xx, yy, xz, yz, zz = xx + x * x, yy + y * y, xz + x * z, yz + y * z, zz + z * z
-        z_low, z_high = min(z_low, cz_ - math.sqrt(zz)), max(z_high, cz_ + math.sqrt(zz))
-        a = cz_ * cz_ - zz
+        z_low, z_high = min(z_low, pz - math.sqrt(zz)), max(z_high, pz + math.sqrt(zz))
+        a = pz * pz - zz
         if a > 0.0:
-            b = cx_ * cz_ - xz
-            root = math.sqrt(max(b * b - a * (cx_ * cx_ - xx), 0.0))
+            # The planes (x - s z = 0) that touch it solve a s^2 - 2 b s + c = 0; likewise for y.
+            b = px * pz - xz
+            root = math.sqrt(max(b * b - a * (px * px - xx), 0.0))
             x_low, x_high = min(x_low, (b - root) / a), max(x_high, (b + root) / a)
-            b = cy_ * cz_ - yz
-            root = math.sqrt(max(b * b - a * (cy_ * cy_ - yy), 0.0))
+            b = py * pz - yz
+            root = math.sqrt(max(b * b - a * (py * py - yy), 0.0))
             y_low, y_high = min(y_low, (b - root) / a), max(y_high, (b + root) / a)
     if z_high < NEAR:
         return 0.0

@@ -8,7 +8,7 @@ Array32 = NDArray[np.float32]
 
 
 # Sums may be reordered, so that they vectorise; 0 and infinity behave as IEEE says.
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
 def sum_tiles(
     inverse_depth: Array32,
     columns: int,
