@@ -21,6 +21,8 @@ COMMANDS = {
     "synth": CommandEntry("depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"),
     "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
+    "track": CommandEntry("depthtrack.cli.track", "track the hand through a recording, into a run folder"),
+    "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
     "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring, in hypotheses a second"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),

@@ -131,7 +131,7 @@ class HandShape:
     def from_json(cls, path: Path) -> Self:
         """Read `hand.json`. Raises InputError naming what is missing or out of range."""
         try:
-            return cls._from_fields(json.loads(path.read_text(encoding="utf-8")))
+            return cls.from_fields(json.loads(path.read_text(encoding="utf-8")))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         except (OSError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
@@ -142,7 +142,8 @@ class HandShape:
             ) from error
 
     @classmethod
-    def _from_fields(cls, fields: dict[str, Any]) -> Self:
+    def from_fields(cls, fields: dict[str, Any]) -> Self:
+        """From the parsed JSON; whatever is wrong with it raises KeyError, TypeError, ValueError or InputError."""
         fingers = [fields["fingers"][finger] for finger in FINGERS]
         return cls(
             side=cast(Side, fields["side"]),

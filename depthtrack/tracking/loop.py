@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
@@ -12,9 +13,14 @@ from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
 
 
 def track_sequence(
-    sequence: Sequence, observer: Observer, tracker: Tracker, run: RunWriter, start_pose: np.ndarray | None = None
+    sequence: Sequence,
+    observer: Observer,
+    tracker: Tracker,
+    run: RunWriter,
+    start_pose: np.ndarray | None = None,
+    count: int | None = None,
 ) -> Iterator[RunRow]:
-    """Track every frame and append it to the run; yields each row as it is done.
+    """Track every frame, or the first `count` of them, and append it to the run; yields each row as it is done.
 
     Frames that the run already holds are observed again, which costs little and brings the observer to where it
     was, but not tracked again. `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
@@ -23,7 +29,7 @@ def track_sequence(
     done = list(run.rows)
     tracker.recall([_estimate(row) for row in done])
     awaiting_start = start_pose is not None and all(row.pose is None for row in done)
-    for number, frame in enumerate(sequence):
+    for number, frame in enumerate(islice(sequence, count)):
         begun = time.perf_counter()
         observation = observer.observe(frame)
         observe_ms = 1e3 * (time.perf_counter() - begun)

@@ -1,0 +1,130 @@
+"""`depthtrack track`: a recording's hand, frame by frame, into a run folder."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from depthtrack.hand.shape import HandShape
+    from depthtrack.recording import Sequence
+
+
+@dataclass(frozen=True)
+class Command:
+    """Track the hand through a recording and write its pose in every frame to a run folder.
+
+    A run that was interrupted goes on with --resume, and ends with the same poses as one that was not.
+    """
+
+    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
+    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
+    """Run folder to write."""
+    tracker: Literal["pso"] = "pso"
+    """How to track: pso renders hypotheses (Oikonomidis et al. 2011)."""
+    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
+    """Sizes of the hand; unless given, the recording's own, or the average adult's right hand."""
+    start: Literal["auto", "truth"] = "auto"
+    """Begin by searching, or from the recording's true pose of its first frame."""
+    frames: int | None = None
+    """Only the first so many frames."""
+    resume: bool = False
+    """Go on with the run that the folder holds."""
+    seed: int = 0
+    """Chooses the random numbers: the same seed gives the same poses."""
+    threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Threads of the tracker; as many as there are cores unless given. Poses do not depend on it."""
+    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+
+    variant: Literal["default", "paper"] = "default"
+    """The swarm as we measured it best, or as the paper has it."""
+    particles: int = 64
+    """Particles of the swarm."""
+    generations: int = 25
+    """Generations of the swarm, every frame."""
+    resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
+    """Longest side of the region that hypotheses are rendered at; the sensor's own unless given."""
+    renderer: Literal["raster", "egl", "osmesa", "oracle"] = "raster"
+    """What renders and scores the hypotheses."""
+
+    def run(self) -> None:
+        import os
+        from contextlib import closing
+
+        from tqdm import tqdm
+
+        from depthtrack.observation.observation import Observer
+        from depthtrack.recording.run import RunWriter
+        from depthtrack.tracking.loop import track_sequence
+        from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
+
+        sequence = self.recording.open()
+        hand = self._hand(sequence)
+        threads = self.threads or len(os.sched_getaffinity(0))
+        options = PsoOptions(
+            variant=self.variant,
+            particles=self.particles,
+            generations=self.generations,
+            seed=self.seed,
+            renderer=self.renderer,
+            threads=threads,
+            resolution=self.resolution,
+        )
+        start_pose = self._start_pose(sequence)
+        observer = Observer.for_sequence(sequence, self.skin_model)
+        count = len(sequence) if self.frames is None else min(self.frames, len(sequence))
+        with (
+            closing(PsoTracker(hand, options)) as tracker,
+            RunWriter(self.out, self._configuration(hand, sequence), ("segment", *tracker.stages), self.resume) as run,
+            tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
+        ):
+            for row in track_sequence(sequence, observer, tracker, run, start_pose, count):
+                bar.update()
+                bar.set_postfix_str(row.status)
+        lost = sum(row.status in ("lost", "absent") for row in run.rows)
+        print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
+        print(f"see how good they are:  depthtrack evaluate {self.out}")
+
+    def _hand(self, sequence: "Sequence") -> "HandShape":
+        from depthtrack.hand.shape import HandShape
+
+        if self.hand is not None:
+            return HandShape.from_json(self.hand)
+        truth = sequence.ground_truth
+        return truth.hand if truth is not None and truth.hand is not None else HandShape()
+
+    def _start_pose(self, sequence: "Sequence") -> "np.ndarray | None":
+        if self.start == "auto":
+            return None
+        truth = sequence.ground_truth
+        row = None if truth is None else truth.at(float(sequence.timestamps[0]))
+        if truth is None or truth.poses is None or row is None:
+            raise InputError(f"{self.recording.path} knows no true pose of its first frame: use --start auto")
+        return truth.poses[row]
+
+    def _configuration(self, hand: "HandShape", sequence: "Sequence") -> dict[str, Any]:
+        import json
+        import platform
+        from importlib.metadata import version
+
+        names = ("tracker", "start", "frames", "seed", "variant", "particles", "generations", "resolution", "renderer")
+        return {
+            "sequence": str(self.recording.path.resolve()),
+            **{name: getattr(self, name) for name in names},
+            "skin_model": None if self.skin_model is None else str(self.skin_model.resolve()),
+            "on_damage": self.recording.on_damage,
+            "threads": self.threads,
+            "camera": asdict(sequence.camera),
+            "hand": json.loads(hand.to_json()),
+            "versions": {
+                "python": platform.python_version(),
+                **{name: version(name) for name in ("depthtrack", "numpy", "numba")},
+            },
+        }

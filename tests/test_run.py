@@ -1,0 +1,114 @@
+"""The run folder: what is written comes back bit for bit, whenever the writer is killed."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.run import Run, RunRow, RunWriter, read_rows
+
+CONFIGURATION = {"tracker": "pso", "seed": 3, "hand": json.loads(HandShape().to_json()), "threads": 2}
+STAGES = ("segment", "swarm")
+
+
+def row(index: int, seed: int = 0) -> RunRow:
+    rng = np.random.default_rng([seed, index])
+    if index % 4 == 3:
+        return RunRow(index, index / 30, "absent", float("nan"), 0.0, None)
+    return RunRow(index, index / 30, "tracked", rng.random(), rng.random(), rng.normal(size=27))
+
+
+def write(folder: Path, count: int, resume: bool = False) -> None:
+    with RunWriter(folder, CONFIGURATION, STAGES, resume) as run:
+        for index in range(len(run.rows), count):
+            run.append(row(index), {"segment": 1.5, "swarm": 10.0 + index})
+
+
+def test_what_is_written_comes_back_bit_for_bit(tmp_path: Path) -> None:
+    write(tmp_path / "run", 9)
+    run = Run.load(tmp_path / "run")
+    assert run.configuration == CONFIGURATION
+    assert run.index.tolist() == list(range(9))
+    assert run.status[3] == "absent"
+    for index in range(9):
+        expected = row(index)
+        assert run.timestamps[index] == expected.timestamp
+        if expected.pose is None:
+            assert np.isnan(run.poses[index]).all()
+            assert np.isnan(run.energy[index])
+        else:
+            np.testing.assert_array_equal(run.poses[index], expected.pose)
+            assert run.energy[index] == expected.energy
+    np.testing.assert_allclose(run.stage_ms["swarm"], 10.0 + np.arange(9))
+
+
+@given(kept=st.floats(0, 1), timings_kept=st.floats(0, 1))
+def test_a_run_cut_anywhere_is_readable_and_goes_on_to_the_same_end(
+    tmp_path_factory: pytest.TempPathFactory, kept: float, timings_kept: float
+) -> None:
+    whole, cut = tmp_path_factory.mktemp("whole") / "run", tmp_path_factory.mktemp("cut") / "run"
+    write(whole, 8)
+    write(cut, 8)
+    for name, share in (("poses.csv", kept), ("timings.csv", timings_kept)):
+        data = (cut / name).read_bytes()
+        header = data.index(b"\n") + 1
+        # Timings are written first, so at least as many of their rows are there.
+        (cut / name).write_bytes(data[: header + round(share * (len(data) - header))])
+    rows = read_rows(cut)
+    for found in rows:
+        expected = row(found.index)
+        assert (found.pose is None) == (expected.pose is None)
+        np.testing.assert_array_equal(found.pose, expected.pose)
+    write(cut, 8, resume=True)
+    assert (cut / "poses.csv").read_bytes() == (whole / "poses.csv").read_bytes()
+
+
+def test_an_existing_run_is_not_overwritten(tmp_path: Path) -> None:
+    write(tmp_path / "run", 2)
+    with pytest.raises(InputError, match="--resume"):
+        write(tmp_path / "run", 4)
+    assert len(read_rows(tmp_path / "run")) == 2
+
+
+def test_a_run_goes_on_only_with_its_own_options(tmp_path: Path) -> None:
+    write(tmp_path / "run", 2)
+    with pytest.raises(InputError, match="seed = 3, not 4"):
+        RunWriter(tmp_path / "run", {**CONFIGURATION, "seed": 4}, STAGES, resume=True)
+    RunWriter(tmp_path / "run", {**CONFIGURATION, "threads": 1}, STAGES, resume=True).close()
+
+
+def test_resuming_nothing_begins_a_run(tmp_path: Path) -> None:
+    write(tmp_path / "run", 3, resume=True)
+    assert len(Run.load(tmp_path / "run").index) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("run.json", "{", "holds no run"),
+        ("run.json", "[]", "JSON object"),
+        ("poses.csv", "index\n1\n", "columns"),
+        ("poses.csv", None, "cannot read"),
+    ],
+)
+def test_damaged_runs_are_refused_in_one_sentence(tmp_path: Path, name: str, text: str | None, message: str) -> None:
+    write(tmp_path / "run", 2)
+    if text is None:
+        (tmp_path / "run" / name).unlink()
+    else:
+        (tmp_path / "run" / name).write_text(text)
+    with pytest.raises(InputError, match=message):
+        Run.load(tmp_path / "run")
+
+
+def test_a_row_that_is_no_frame_is_named(tmp_path: Path) -> None:
+    write(tmp_path / "run", 2)
+    path = tmp_path / "run" / "poses.csv"
+    path.write_text(path.read_text().replace("tracked,0", "tracked,x", 1))
+    with pytest.raises(InputError, match="line 2"):
+        Run.load(tmp_path / "run")
