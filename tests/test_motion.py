@@ -1,6 +1,8 @@
 """Motions: natural, within anatomy, and what their files say."""
 
+import contextlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
 from depthtrack.synthesis.clearance import Clearance, _closest
 from depthtrack.synthesis.motion import KeyframedMotion, load_motion
-from depthtrack.synthesis.motion_file import motion_names, shared_postures
+from depthtrack.synthesis.motion_file import find_motion, motion_names, read_table, shared_postures
+from depthtrack.synthesis.random_motion import RandomMotion
 from depthtrack.synthesis.scene_frame import mirrored, orientation
 from depthtrack.synthesis.viewpoint import Viewpoint
 
@@ -206,6 +209,13 @@ _GOOD_KEY = '{ at = 1, posture = "open" }'
         ('about = "x"\nlike = "everyday"\nspeed = 0', "speed must be a number from"),
         ('about = "x"\n[random]\npostures = ["nothing"]', "must be a list of some of"),
         ('about = "x"\n[postures.p]\nthumb = [0, 0, 0, 0]', "posture 'p' must give"),
+        ('about = "x"\nkeys = [ { at = 1, posture = "open" }, { at = 1.0000001, tilt = 5 } ]', "1 ms apart"),
+        (f'about = "x"\nkeys = [ {{ at = 1, posture = "open", tilt = {"9" * 400} }} ]', "from -720 to 720"),
+        (f'about = "x"\nkeys = [ {{ at = 1, posture = "open", tilt = 0x{"f" * 9999} }} ]', "too long to show"),
+        (f"keys = {'9' * 9999}", "cannot read the motion file"),
+        ('about = "x"\n[random]\npostures = [["open"]]', "must be a list of some of"),
+        ('about = "x"\npostures = 3\nkeys = []', "must be a table"),
+        ('about = "x"\nrandom = 3', "must be a table"),
         ("this is no TOML", "cannot read the motion file"),
         ("#" * 1_100_000, "at most 1 MiB"),
     ],
@@ -220,6 +230,29 @@ def test_what_is_wrong_with_a_motion_file_is_said(tmp_path: Path, text: str, com
 def test_an_unknown_motion_is_answered_with_the_known_ones() -> None:
     with pytest.raises(InputError, match="everyday, fast, grasp, random, signs"):
         load_motion("evryday")
+
+
+_ODD = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=3)) | st.recursive(
+    st.integers(), lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2)
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(name=st.sampled_from(["grasp", "random"]), data=st.data())
+def test_a_motion_file_with_any_entry_replaced_is_read_or_refused(name: str, data: st.DataObject) -> None:
+    table = read_table(find_motion(name))
+    place: Any = table
+    while True:
+        keys = sorted(place) if isinstance(place, dict) else list(range(len(place)))
+        key = data.draw(st.sampled_from(keys))
+        if not isinstance(place[key], dict | list) or not place[key] or data.draw(st.booleans()):
+            break
+        place = place[key]
+    place[key] = data.draw(_ODD)
+    kind = RandomMotion if "random" in table else KeyframedMotion
+    with contextlib.suppress(InputError):
+        poses = kind.from_table(name, table, "here").poses(np.linspace(0, 2, 5), 0)
+        assert np.all(np.isfinite(poses))
 
 
 @settings(max_examples=30)

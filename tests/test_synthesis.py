@@ -243,6 +243,8 @@ def test_frames_and_rate_choose_how_much_of_the_motion_is_sampled() -> None:
         ({"distance": 5.0}, "between 0.2 and 3 m"),
         ({"distance": float("nan")}, "between 0.2 and 3 m"),
         ({"viewpoint": 8}, "0 to 7"),
+        ({"background": "forest"}, "none, wall, room"),
+        ({"model": "robot"}, "primitives, skin"),
         ({"depth_noise": -0.001}, "depth noise"),
         ({"skin_flips": 1.5}, "skin flips"),
         ({"rate": 0.0}, "frame rate"),

@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,9 @@ class Synthesis:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for name, kind in (("background", BackgroundKind), ("model", HandKind), ("sensor", SensorName)):
+            if getattr(self, name) not in get_args(kind):
+                raise InputError(f"{name} must be one of {', '.join(get_args(kind))}, found {getattr(self, name)!r}")
         if not 0 <= self.depth_noise <= 0.5:
             raise InputError(f"depth noise must lie between 0 and 500 mm, found {self.depth_noise * 1000:g} mm")
         if not 0 <= self.skin_flips <= 1:

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 MAX_DURATION = 3600.0
 """Longest motion, in seconds: an hour at 30 Hz is 100,000 frames."""
 _MAX_KEYS = 10_000
+_SHORTEST = 0.001
 _CHANNELS = ("position", "tilt", "nod", "turn", *FINGERS)
 
 
@@ -79,7 +80,7 @@ class KeyframedMotion:
     def from_table(cls, name: str, table: dict[str, Any], where: str) -> "KeyframedMotion":
         """Build from a parsed motion file; `where` names it in error messages. Raises InputError."""
         motion_file.check_names(table, ("about", "keys", "postures", "elbow"), where)
-        postures = motion_file.shared_postures(table.get("postures", {}), where)
+        postures = motion_file.shared_postures(table, where)
         keys = motion_file.tables(table, "keys", _MAX_KEYS, where)
         channels: dict[str, tuple[list[float], list[Array]]] = {channel: ([], []) for channel in _CHANNELS}
         last = -1.0
@@ -87,8 +88,8 @@ class KeyframedMotion:
             place = f"{where}, key {n + 1}"
             motion_file.check_names(key, ("at", "posture", *_CHANNELS), place)
             at = motion_file.number(key, "at", 0, MAX_DURATION, place)
-            if at <= last:
-                raise InputError(f"{place}: keys must be in order of time, found {at:g} s after {last:g} s")
+            if at < last + _SHORTEST:
+                raise InputError(f"{place}: keys must be in order of time, 1 ms apart; found {at:g} s after {last:g} s")
             last = at
             for channel, value in _values(key, postures, place).items():
                 channels[channel][0].append(at)

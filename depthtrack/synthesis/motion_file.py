@@ -4,7 +4,7 @@ import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +43,14 @@ def read_table(path: Path) -> dict[str, Any]:
         if len(data) > _MAX_BYTES:
             raise InputError(f"{path} must be a motion file of at most 1 MiB, found a larger one")
         return tomllib.loads(data.decode("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read the motion file {path}: {error}") from error
 
 
-def check_names(table: Mapping[str, Any], known: Iterable[str], where: str) -> None:
+def check_names(entries: Mapping[str, Any], known: Iterable[str], where: str) -> None:
     """Refuse entries that mean nothing, which are mostly misspelt ones."""
     known = list(known)
-    for name in table:
+    for name in entries:
         if name not in known:
             raise InputError(f"{where}: there is no '{name}'; use {', '.join(known)}")
 
@@ -63,46 +63,55 @@ def numbers(value: Any, count: int, bound: float, where: str) -> Array:
     return np.array(value, dtype=np.float64)
 
 
-def number(table: Mapping[str, Any], name: str, low: float, high: float, where: str) -> float:
-    """A number of the table between `low` and `high`, or an InputError."""
-    value = table.get(name)
-    if not (_is_number(value) and low <= float(value) <= high):  # type: ignore[arg-type]
+def number(entries: Mapping[str, Any], name: str, low: float, high: float, where: str) -> float:
+    """A number of the entries between `low` and `high`, or an InputError."""
+    value = entries.get(name)
+    if not (_is_number(value) and low <= value <= high):
         raise InputError(f"{where}: {name} must be a number from {low:g} to {high:g}, found {_short(value)}")
-    return float(value)  # type: ignore[arg-type]
+    return float(value)
 
 
-def text(table: Mapping[str, Any], name: str, where: str) -> str:
-    """A line of text of the table, or an InputError."""
-    value = table.get(name)
+def text(entries: Mapping[str, Any], name: str, where: str) -> str:
+    """A line of text of the entries, or an InputError."""
+    value = entries.get(name)
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{where}: {name} must be a line of text, found {_short(value)}")
     return value
 
 
-def tables(table: Mapping[str, Any], name: str, most: int, where: str) -> list[dict[str, Any]]:
+def table(parent: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    """A table within the table, or an InputError."""
+    value = parent.get(name)
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: [{name}] must be a table, found {_short(value)}")
+    return value
+
+
+def tables(entries: Mapping[str, Any], name: str, most: int, where: str) -> list[dict[str, Any]]:
     """A list of 1 to `most` tables, or an InputError."""
-    value = table.get(name)
+    value = entries.get(name)
     if not isinstance(value, list) or not 1 <= len(value) <= most or not all(isinstance(v, dict) for v in value):
         raise InputError(f"{where}: {name} must be a list of 1 to {most} tables, found {_short(value)}")
     return value
 
 
-def posture(table: Mapping[str, Any], where: str) -> dict[str, Array]:
-    """Finger angles (4,) in radians of each finger that the table names. Raises InputError outside the joint limits."""
+def posture(entries: Mapping[str, Any], where: str) -> dict[str, Array]:
+    """Finger angles (4,) in radians of each finger among the entries. Raises InputError outside the joint limits."""
     angles = {}
     for finger in FINGERS:
-        if finger in table:
-            angles[finger] = np.radians(numbers(table[finger], 4, 180, f"{where}, {finger} in degrees"))
+        if finger in entries:
+            angles[finger] = np.radians(numbers(entries[finger], 4, 180, f"{where}, {finger} in degrees"))
             _check_limits(finger, angles[finger], where)
     return angles
 
 
-def shared_postures(more: Mapping[str, Any], where: str) -> dict[str, Array]:
-    """Angles (20,) by posture name: those of `postures.toml`, and `more` of a motion's own."""
+def shared_postures(motion: Mapping[str, Any], where: str) -> dict[str, Array]:
+    """Angles (20,) by posture name: those of `postures.toml`, and of the motion's own table of them if it has one."""
+    own = table(motion, "postures", where) if "postures" in motion else {}
     path = resource_folder("sequences") / POSTURES_FILE
     postures = {}
-    for source, table in ((str(path), read_table(path)), (where, more)):
-        for name, fingers in table.items():
+    for source, shapes in ((str(path), read_table(path)), (where, own)):
+        for name, fingers in shapes.items():
             place = f"{source}, posture '{name}'"
             if not isinstance(fingers, dict) or set(fingers) != set(FINGERS):
                 raise InputError(f"{place} must give {', '.join(FINGERS)} and nothing else, found {_short(fingers)}")
@@ -110,9 +119,9 @@ def shared_postures(more: Mapping[str, Any], where: str) -> dict[str, Array]:
     return postures
 
 
-def elbow(table: Mapping[str, Any], where: str) -> Array:
+def elbow(entries: Mapping[str, Any], where: str) -> Array:
     """(3,) metres: where the forearm comes from, of somebody who faces the camera unless the file says otherwise."""
-    return numbers(table.get("elbow", [-50, 260, 110]), 3, 2000, f"{where}: elbow in mm") / 1000
+    return numbers(entries.get("elbow", [-50, 260, 110]), 3, 2000, f"{where}: elbow in mm") / 1000
 
 
 def _check_limits(finger: str, angles: Array, where: str) -> None:
@@ -125,10 +134,14 @@ def _check_limits(finger: str, angles: Array, where: str) -> None:
         )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _is_number(value: object) -> TypeGuard[float]:
+    # Comparing, unlike isfinite, also takes whole numbers that are too large for a float.
+    return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
 
 
 def _short(value: object) -> str:
-    shown = repr(value)
+    try:
+        shown = repr(value)
+    except (ValueError, RecursionError):  # Python refuses to write out whole numbers of thousands of digits
+        return "something too long to show"
     return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -54,15 +54,13 @@ class RandomMotion:
     def from_table(cls, name: str, table: dict[str, Any], where: str) -> "RandomMotion":
         """Build from a parsed motion file; `where` names it in error messages. Raises InputError."""
         motion_file.check_names(table, ("about", "random", "postures", "elbow"), where)
-        postures = motion_file.shared_postures(table.get("postures", {}), where)
-        options = table["random"]
-        if not isinstance(options, dict):
-            raise InputError(f"{where}: [random] must be a table, found {options!r}")
+        postures = motion_file.shared_postures(table, where)
+        options = motion_file.table(table, "random", where)
         motion_file.check_names(
             options, ("postures", "drawn", "hold", "move", "wander", *_WANDER), f"{where}, [random]"
         )
         names = options.get("postures")
-        if not isinstance(names, list) or not names or any(n not in postures for n in names):
+        if not isinstance(names, list) or not names or any(not isinstance(n, str) or n not in postures for n in names):
             raise InputError(f"{where}, [random]: postures must be a list of some of {', '.join(postures)}")
         ranges = np.array([_range(options, n, -720, 720, where) for n in _WANDER])
         return cls(
