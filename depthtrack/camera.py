@@ -35,10 +35,9 @@ class Camera:
             if not (isinstance(side, int) and 1 <= side <= MAX_SIDE):
                 raise InputError(f"camera {name} must be a whole number from 1 to {MAX_SIDE} pixels, found {side!r}")
         for name in ("fx", "fy"):
-            focal = getattr(self, name)
-            # Between a 170 degree and a 0.5 degree field of view: outside it, units or columns were mixed up.
-            if not (_is_number(focal) and 0.04 <= focal / max(self.width, self.height) <= 120):
-                raise InputError(f"camera {name} must be a focal length in pixels, found {focal!r}")
+            # A window of a few pixels has any ratio of focal length to side; `from_dict` is stricter with files.
+            if not (_is_number(getattr(self, name)) and 1e-3 <= getattr(self, name) <= 1e6):
+                raise InputError(f"camera {name} must be a focal length in pixels, found {getattr(self, name)!r}")
         for name in ("cx", "cy"):
             # A window of an image may lie far from the principal point, so only nonsense is refused.
             if not (_is_number(getattr(self, name)) and abs(getattr(self, name)) <= 4 * MAX_SIDE):
@@ -106,9 +105,15 @@ class Camera:
         if not isinstance(fields, dict) or any(name not in fields for name in required):
             raise InputError(f"{where} must be a JSON object with {', '.join(required)} (and depth_scale)")
         try:
-            return cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
+            camera = cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
+        # Between a 170 degree and a 0.5 degree field of view: outside it, units or columns were mixed up.
+        if not all(0.04 <= focal / max(camera.shape) <= 120 for focal in (camera.fx, camera.fy)):
+            raise InputError(
+                f"{where}: fx and fy must be focal lengths in pixels, found {camera.fx:g} and {camera.fy:g}"
+            )
+        return camera
 
 
 def _is_number(value: object) -> bool:

@@ -1,5 +1,6 @@
 """The command line: parse, call, print. One module a command; none is imported before it is asked for."""
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,18 +33,11 @@ COMMANDS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code: 0 done, 2 the user's mistake or a bad file, 130 interrupted."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    if not arguments or arguments[0] in ("-h", "--help", "help"):
-        print(_overview())
-        return 0
-    if arguments[0] in ("-V", "--version"):
-        print(f"depthtrack {__version__}")
-        return 0
-    name, *rest = arguments
-    if name not in COMMANDS:
-        print(f"depthtrack: no command '{name}'; choose one of {', '.join(COMMANDS)}", file=sys.stderr)
-        return 2
+    name = arguments[0] if arguments else "--help"
     try:
-        _parse(name, rest).run()
+        code = _run(name, arguments[1:])
+        sys.stdout.flush()
+        return code
     except DepthtrackError as error:
         print(f"depthtrack {name}: {error}", file=sys.stderr)
         return 2
@@ -51,13 +45,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"depthtrack {name}: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader of our output (head, less) went away; what remains cannot be delivered.
-        sys.stderr.close()
+        # The reader of our output (head, less) went away: what remains, Python's last flush included, is dropped.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
         # A full disk, a folder without permission: nothing of ours is wrong, and the reason says what to do.
         print(f"depthtrack {name}: {error.filename or 'input or output'}: {error.strerror or error}", file=sys.stderr)
         return 2
+
+
+def _run(name: str, arguments: list[str]) -> int:
+    if name in ("-h", "--help", "help"):
+        print(_overview())
+    elif name in ("-V", "--version"):
+        print(f"depthtrack {__version__}")
+    elif name in COMMANDS:
+        _parse(name, arguments).run()
+    else:
+        raise DepthtrackError(f"no such command; choose one of {', '.join(COMMANDS)}")
     return 0
 
 
