@@ -1,0 +1,24 @@
+"""The rigid motion between corresponding points, in closed form."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def rigid_alignment(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> tuple[Array, Array]:
+    """Rotation (..., 3, 3) and translation (..., 3) that bring `source` (..., N, 3) closest to `target` (..., N, 3).
+
+    Least squares, weighted by `weights` (..., N), of which some must be positive: Horn, "Closed-form solution of
+    absolute orientation", JOSA A 4(4), 1987, solved by the SVD of Kabsch, Acta Cryst. A32, 1976. Never a reflection.
+    """
+    p, q = np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64)
+    w = np.ones(q.shape[:-1]) if weights is None else np.asarray(weights, dtype=np.float64)
+    w = w / np.sum(w, axis=-1, keepdims=True)
+    p_mean, q_mean = (np.einsum("...n,...ni->...i", w, points) for points in (p, q))
+    covariance = np.einsum("...n,...ni,...nj->...ij", w, q - q_mean[..., None, :], p - p_mean[..., None, :])
+    U, _, Vt = np.linalg.svd(covariance)
+    # The direction of least spread carries the sign, so that the determinant is +1.
+    U[..., :, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[..., None]
+    R = U @ Vt
+    return R, q_mean - np.einsum("...ij,...j->...i", R, p_mean)
