@@ -61,7 +61,7 @@ class PsoTracker:
     """Follows a hand by rendering hypotheses: see `tracker.Tracker`."""
 
     name = "pso"
-    stages = ("observe", "swarm")
+    stages: tuple[str, ...] = ("observe", "swarm")
 
     def __init__(self, shape: HandShape, options: PsoOptions | None = None) -> None:
         self.options = options = options or PsoOptions()
@@ -165,6 +165,8 @@ class PsoTracker:
         if estimate.pose is None or estimate.status is Status.LOST:
             self._pose, self._velocity = None, np.zeros(26)
             return
-        moving = self._pose is not None and estimate.status is Status.TRACKED
-        self._velocity = tangent_between(self._pose, estimate.pose) if moving else np.zeros(26)
+        if self._pose is not None and estimate.status is Status.TRACKED:
+            self._velocity = tangent_between(self._pose, estimate.pose)
+        else:
+            self._velocity = np.zeros(26)
         self._pose = estimate.pose
