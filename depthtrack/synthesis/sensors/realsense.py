@@ -62,8 +62,7 @@ class RealSense:
         depth, grown = _fattened(surface.depth, unevenness > 0.2)
 
         grazing = np.clip((incidence(surface, self.camera) - _GRAZING[0]) / (_GRAZING[1] - _GRAZING[0]), 0, 1)
-        dropout = np.where(grown, 0, grazing)
-        dropout[edges(depth)] = np.maximum(dropout, _EDGE_DROPOUT)[edges(depth)]
+        dropout = np.maximum(np.where(grown, 0, grazing), _EDGE_DROPOUT * edges(depth))
         failed = (chance < dropout) | shadow(depth, self.camera, BASELINE)
 
         focal_baseline = self.camera.fx * BASELINE
@@ -72,13 +71,13 @@ class RealSense:
         return np.where((depth > 0) & ~failed & (read >= self.nearest) & (read <= self.farthest), read, 0)
 
 
-def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float32]:
     """(h, w) normal noise of unit variance, alike over a matching window."""
     white = normal_noise(rng, shape)
     size = 2 * math.ceil(3 * _WINDOW) + 1
     kernel = cv2.getGaussianKernel(size, _WINDOW)
     # Averaging shrinks the variance by the sum of the squared weights, in either direction.
-    return np.asarray(cv2.sepFilter2D(white, cv2.CV_64F, kernel, kernel) / np.sum(kernel**2))
+    return np.asarray(cv2.sepFilter2D(white, cv2.CV_32F, kernel, kernel / np.sum(kernel**2)), dtype=np.float32)
 
 
 def _fattened(depth: Array, where: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
