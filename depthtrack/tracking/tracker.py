@@ -59,7 +59,10 @@ class Tracker(Protocol):
         ...
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
-        """Take up a track after these estimates of all frames so far, as if they had been made just now."""
+        """Hear of frames that were estimated before, or had no hand, as if they had been tracked just now.
+
+        A new tracker that recalls the estimates of all frames so far goes on exactly as the one that made them.
+        """
         ...
 
     def close(self) -> None:

@@ -1,6 +1,7 @@
 """The PSO tracker: one swarm a frame, around the last pose and where it was heading (Oikonomidis 2011, Sec. 2.4)."""
 
 import time
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -24,6 +25,8 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 
+_USUAL_FRAMES = 30
+
 
 @dataclass(frozen=True)
 class PsoOptions:
@@ -35,6 +38,8 @@ class PsoOptions:
     the hand; it damps more and randomises half of the fingers near the best. Each was measured to help.
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
+    A track counts as lost below `lost_confidence`, or where its energy exceeds both `lost_energy` and twice what was
+    usual over the last second: a hand of other sizes than the model's has a high energy all the time.
     """
 
     variant: Variant = "default"
@@ -45,7 +50,8 @@ class PsoOptions:
     threads: int = 1
     resolution: int | None = None
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
-    lost_energy: float = 16.0
+    lost_confidence: float = 0.6
+    lost_energy: float = 12.0
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
 
@@ -71,6 +77,7 @@ class PsoTracker:
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
         self._pose: Array | None = None
         self._velocity = np.zeros(26)
+        self._usual: deque[float] = deque(maxlen=_USUAL_FRAMES)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by a swarm, or by searching."""
@@ -108,9 +115,8 @@ class PsoTracker:
         return self._settle(space.poses(found.position[None])[0], found.energy, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
-        """Take up a track after the estimates of all frames so far: the last two poses are what it remembers."""
-        self._pose, self._velocity = None, np.zeros(26)
-        for estimate in estimates[-2:]:
+        """Take up a track after these estimates, as if they had been made just now."""
+        for estimate in estimates:
             self._remember(estimate)
 
     def close(self) -> None:
@@ -153,12 +159,16 @@ class PsoTracker:
 
     def _settle(self, pose: Array, energy: float, status: Status, begun: float, observed: float) -> Estimate:
         confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
-        if energy > self.options.lost_energy:
+        if confidence < self.options.lost_confidence or energy > self._highest_energy():
             status = Status.LOST
         stage_ms = {"observe": 1e3 * (observed - begun), "swarm": 1e3 * (time.perf_counter() - observed)}
         estimate = Estimate(pose, energy, confidence, status, stage_ms)
         self._remember(estimate)
         return estimate
+
+    def _highest_energy(self) -> float:
+        """Above this, a pose does not explain the hand."""
+        return max(self.options.lost_energy, 2 * float(np.median(self._usual))) if self._usual else np.inf
 
     def _remember(self, estimate: Estimate) -> None:
         """Pose and velocity for the next frame, from estimates alone: a resumed run sees what this one did."""
@@ -170,3 +180,4 @@ class PsoTracker:
         else:
             self._velocity = np.zeros(26)
         self._pose = estimate.pose
+        self._usual.append(estimate.energy)
