@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# The first call of a kernel compiles it, and a loaded machine is slow: time limits of single examples mean nothing here.
+# A first call compiles, and a loaded machine is slow: time limits of single examples mean nothing here.
 settings.register_profile("depthtrack", deadline=None, max_examples=30, derandomize=True)
 settings.load_profile("depthtrack")
 

@@ -16,8 +16,9 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, evaluate
-from depthtrack.rendering.opengl.context import OpenGLError, open_context
+from depthtrack.rendering.opengl.context import OpenGLError
 from depthtrack.rendering.opengl.impostors import HandTable, body_transforms, place_impostors
+from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.opengl.sums import sum_tiles
 from depthtrack.rendering.raycast import raycast

@@ -16,8 +16,9 @@ import pytest
 from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.opengl import context, programs
-from depthtrack.rendering.opengl.context import OpenGLError, open_context
+from depthtrack.rendering.opengl import context, opening, programs
+from depthtrack.rendering.opengl.context import OpenGLError
+from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.renderer import release_renderers, shared_renderer
 from depthtrack.rendering.opengl.scorer import OpenGLScorer
 from depthtrack.rendering.target import Target
@@ -217,7 +218,7 @@ def test_a_second_platform_in_one_process_is_refused() -> None:
 def test_a_contradicting_variable_is_refused_and_ours_is_not_left_behind() -> None:
     code = """
 from depthtrack.errors import DepthtrackError
-from depthtrack.rendering.opengl.context import open_context
+from depthtrack.rendering.opengl.opening import open_context
 try:
     open_context("egl")
 except DepthtrackError as error:
@@ -233,8 +234,8 @@ except DepthtrackError as error:
 def test_a_missing_library_names_its_package(
     platform: context.Platform, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(context, "_loads", lambda name: False)
-    monkeypatch.setattr(context, "_refuse_contradictions", lambda platform: None)
+    monkeypatch.setattr(opening, "_loads", lambda name: False)
+    monkeypatch.setattr(opening, "_refuse_contradictions", lambda platform: None)
     with pytest.raises(OpenGLError, match=f"apt-get install {package}"):
         open_context(platform)
 

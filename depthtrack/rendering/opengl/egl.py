@@ -70,7 +70,7 @@ class EglBinding:
 
 
 def open_egl(egl: Egl, device: Device, context_of: Callable[[Binding], Context]) -> Context:
-    """The first context that works on the device asked for, as `context.open_context` describes.
+    """The first context that works on the device asked for, as `opening.open_context` describes.
 
     A missing vendor driver falls back to software silently, so what was asked for is checked on the renderer.
     """

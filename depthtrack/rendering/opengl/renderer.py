@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.rendering.opengl.context import Context, Device, Platform, open_context
+from depthtrack.rendering.opengl.context import Context, Device, Platform
 from depthtrack.rendering.opengl.impostors import VECTORS
+from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.programs import Program
 from depthtrack.rendering.surface import NEAR
 

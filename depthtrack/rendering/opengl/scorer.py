@@ -27,7 +27,7 @@ _PARTS, _SMALLEST_PART = 2, 16
 class OpenGLScorer(ScorerBase):
     """Scores hypotheses drawn by OpenGL; `renderer` and `software` tell what draws them.
 
-    `platform` is "egl" or "osmesa"; `device` as in `context.open_context`. `sums` says where Eq. (2) is summed: by
+    `platform` is "egl" or "osmesa"; `device` as in `opening.open_context`. `sums` says where Eq. (2) is summed: by
     shaders ("gpu"), or by the CPU once tiles are read back ("cpu"), which is the default on a software renderer.
     Scorers of one device share its context and may live together. Raises OpenGLError where OpenGL cannot be used.
     """
