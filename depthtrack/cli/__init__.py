@@ -24,7 +24,9 @@ COMMANDS = {
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
     "track": CommandEntry("depthtrack.cli.track", "track the hand through a recording, into a run folder"),
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
+    "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
+    "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat the papers' experiments, our figures beside theirs"),
     "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring, in hypotheses a second"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),
 }

@@ -47,15 +47,21 @@ def fit_poses(model: HandModel, keypoints: ArrayLike, iterations: int = 60) -> F
     """Poses that bring the model's keypoints closest to `keypoints` (N, 21, 3), metres, camera frame.
 
     From a relaxed hand, aligned rigidly, by damped Gauss-Newton steps with step halving (Eq. 3-5), each projected
-    onto the joint limits (Bertsekas, "Projected Newton methods", SIAM J. Control and Optimization 20(2), 1982).
+    onto the joint limits (Bertsekas, "Projected Newton methods", SIAM J. Control and Optimization 20(2), 1982). Hands
+    with unknown finger joints are fitted from a fist as well, and the better pose is kept.
     """
     targets = np.asarray(keypoints, dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES), 3)
     poses, residuals = np.full((len(targets), POSE_SIZE), np.nan), np.full(len(targets), np.nan)
     known = is_known(targets)
     usable = np.flatnonzero(known.sum(axis=-1) >= 3)
-    for chunk in np.array_split(usable, -(-len(usable) // _CHUNK) or 1):
-        fitted, cost = _fit(model, np.where(known[chunk, :, None], targets[chunk], 0), known[chunk], iterations)
-        poses[chunk], residuals[chunk] = fitted, np.sqrt(2 * cost / known[chunk].sum(axis=-1))
+    filled = np.where(known[..., None], targets, 0)
+    with_gaps = usable[~known[usable, 1:].all(axis=-1)]
+    for start, hands in (("relaxed", usable), ("fist", with_gaps)):
+        for chunk in np.array_split(hands, -(-len(hands) // _CHUNK) or 1):
+            fitted, cost = _fit(model, POSTURES[start], filled[chunk], known[chunk], iterations)
+            residual = np.sqrt(2 * cost / known[chunk].sum(axis=-1))
+            better = ~(residual >= residuals[chunk])  # than another start, or than none
+            poses[chunk[better]], residuals[chunk[better]] = fitted[better], residual[better]
     return FittedPoses(poses, residuals)
 
 
@@ -64,9 +70,11 @@ def is_known(points: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(points).all(axis=-1), dtype=np.bool_)
 
 
-def _fit(model: HandModel, targets: Array, known: NDArray[np.bool_], iterations: int) -> tuple[Array, Array]:
-    """Poses (B, 27) and the error term of Eq. (3) (B,)."""
-    poses = _first_poses(model, targets, known)
+def _fit(
+    model: HandModel, start: Array, targets: Array, known: NDArray[np.bool_], iterations: int
+) -> tuple[Array, Array]:
+    """Poses (B, 27) and the error term of Eq. (3) (B,), from finger angles `start` (20,)."""
+    poses = _first_poses(model, start, targets, known)
     costs = _cost(model, poses, targets, known)
     active = np.arange(len(poses))
     for _ in range(iterations):
@@ -78,13 +86,13 @@ def _fit(model: HandModel, targets: Array, known: NDArray[np.bool_], iterations:
     return poses, costs
 
 
-def _first_poses(model: HandModel, targets: Array, known: NDArray[np.bool_]) -> Array:
-    """The relaxed hand, brought to the targets by its palm alone as far as they show it."""
-    relaxed = make_pose(np.zeros(3), (1, 0, 0, 0), POSTURES["relaxed"])
+def _first_poses(model: HandModel, start: Array, targets: Array, known: NDArray[np.bool_]) -> Array:
+    """The hand with these angles, brought to the targets by its palm alone as far as they show it."""
+    upright = make_pose(np.zeros(3), (1, 0, 0, 0), start)
     weights = np.full(len(KEYPOINT_NAMES), _FINGERS_SAY)
     weights[IN_PALM] = 1
-    R, t = rigid_alignment(model.keypoints(relaxed), targets, weights * known)
-    return make_pose(t, quaternion_from_matrix(R), POSTURES["relaxed"])
+    R, t = rigid_alignment(model.keypoints(upright), targets, weights * known)
+    return make_pose(t, quaternion_from_matrix(R), start)
 
 
 def _newton_steps(model: HandModel, poses: Array, targets: Array, known: NDArray[np.bool_]) -> Array:

@@ -1,0 +1,1 @@
+"""Databases of hand postures: one file a format, all read into a `PostureSet`."""

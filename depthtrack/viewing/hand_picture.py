@@ -1,0 +1,49 @@
+"""A hand in a posture, shaded, its fingers in their colours."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.hand.pose import FINGERS, make_pose, quaternion_exp, quaternion_product
+from depthtrack.hand.skin import Skin
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.viewing.panels import smaller
+from depthtrack.viewing.theme import FINGER_COLOURS, PALM, SURFACE
+
+Image = NDArray[np.uint8]
+
+_DISTANCE = 1.0
+"""Metres to the hand: far enough that a picture shows little perspective."""
+_REACH = 0.22
+"""Metres that a picture spans, of a hand of scale 1."""
+_TURN = np.radians(-50)
+"""Away from the view into the palm, towards the thumb's side, from which flexion shows best."""
+_LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
+_AMBIENT = 0.3
+_FINER = 3
+"""Rendered so many times larger, then averaged: smooth edges."""
+_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.float64)
+"""(16, 3) RGB of the bodies."""
+
+
+def hand_picture(skin: Skin, angles: ArrayLike, size: int) -> Image:
+    """Square RGB picture (size, size, 3) of the hand with these finger angles (20,), seen from the thumb's side."""
+    side = size * _FINER
+    focal = side * _DISTANCE / (_REACH * skin.shape.scale)
+    camera = Camera(side, side, focal, focal, side / 2, side / 2)
+    vertices = skin.at(make_pose([0, 0, _DISTANCE], _orientation(skin.shape.mirror), angles))
+    # The hand in the middle of the picture, wherever its fingers are.
+    vertices[:, :2] -= (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2
+    surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
+    hit = surface.label >= 0
+    picture = np.empty((side, side, 3), dtype=np.uint8)
+    picture[:] = SURFACE
+    light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)
+    picture[hit] = _COLOURS[surface.label[hit]] * light[:, None]
+    return smaller(picture, size, size)
+
+
+def _orientation(mirror: float) -> NDArray[np.float64]:
+    """Quaternion of a palm with the fingers up, turned from facing the camera towards the thumb's side."""
+    facing = quaternion_exp([np.pi, 0, 0])
+    return quaternion_product(quaternion_exp([0, _TURN * mirror, 0]), facing)
