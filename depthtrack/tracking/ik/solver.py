@@ -177,7 +177,7 @@ def _add_prior(pose: Array, damping: Damping, H: Array, gradient: Array) -> floa
 
 @numba.njit(cache=True, nogil=True)
 def cholesky_solve(A: Array, b: Array) -> bool:
-    """Solve A x = b for symmetric positive definite A (n, n), in place: A is spent and b becomes x. False if A is not."""
+    """Solve A x = b in place: A (n, n) is spent and b becomes x. False unless A is symmetric positive definite."""
     n = b.shape[0]
     for j in range(n):
         d = A[j, j]
