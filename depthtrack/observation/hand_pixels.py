@@ -1,10 +1,17 @@
 """From nodes back to pixels: which pixels of a frame belong to the hand that was found on the grid."""
 
+import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.observation.grid import MAX_JUMP, Depth
+from depthtrack.observation.grid import MAX_JUMP, Depth, Grid, Mask
+from depthtrack.observation.palm import HAND_REACH, TIP_TO_WRIST, Palm
+from depthtrack.observation.view import View, disc
+from depthtrack.observation.window import Window
+from depthtrack.observation.wrist import WristPlane
+
+Labels = NDArray[np.uint8]
 
 ELSEWHERE, HAND, ARM, BESIDE = 0, 1, 2, 4
 """Labels of nodes, one bit each; BESIDE is what hangs together with the hand and is neither hand nor arm."""
@@ -13,32 +20,105 @@ NOTHING, MISSING, OTHER, READING = 0, 1, 2, 3
 """Kinds of pixels: far from the hand; without a reading, beside the hand; a reading of what hangs together with the
 hand; a reading of the hand."""
 
+DILATION = 5 / 640
+"""Radius r of the circular dilation of Oikonomidis et al. 2011, Sec. 2.1, as a share of the image's width."""
+
+ROOM = 0.04
+"""Metres around the hand that the region of interest leaves for hypotheses to move in."""
+
+
+def label_hand(view: View, palm: Palm, arm: Mask | None, wrist: WristPlane | None) -> Labels:
+    """ELSEWHERE, HAND, ARM or BESIDE (rows, columns) for every node; `arm` (rows, columns) are the arm's."""
+    surface = view.surface
+    hand = (surface.depth > 0) & palm.paths.reached(TIP_TO_WRIST)
+    # Fingertips cut off by what the hand holds, or by fingers in front, are pieces of surface within its reach.
+    pieces, _ = surface.within(~hand).surfaces()
+    nodes = np.flatnonzero(pieces >= 0)
+    points, piece = surface.points[nodes], pieces.ravel()[nodes]
+    inside = np.linalg.norm(points - palm.centre, axis=1) < HAND_REACH
+    if wrist is not None:
+        inside &= (points - wrist.point) @ wrist.normal < 0
+    sizes = np.bincount(piece)
+    whole = np.bincount(piece, inside, sizes.size) > 0.9 * sizes
+    hand.flat[nodes[whole[piece]]] = True
+    labels = np.where(palm.paths.reached(), np.uint8(BESIDE), np.uint8(ELSEWHERE))
+    labels[hand] = HAND
+    if arm is not None:
+        labels[arm] = ARM
+    return labels
+
+
+def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Window, Mask, Mask]:
+    """The region of interest in the frame, with the hand's silhouette and its readings (h, w) in it.
+
+    Within r of the outline of its readings, where depth is least sure, colour decides what is hand; farther inside,
+    depth alone does, so that shadows and highlights leave no holes; where readings are missing in between, colour
+    does. Readings count up to r outside that silhouette.
+    """
+    blocks = _blocks_around(view.grid, labels)
+    stride, window, frame = view.grid.stride, view.window, view.frame
+    roi = Window(
+        window.left + blocks.left * stride,
+        window.top + blocks.top * stride,
+        min(window.left + blocks.right * stride, window.right),
+        min(window.top + blocks.bottom * stride, window.bottom),
+    )
+    plane = (0.0, 0.0, 0.0, 0.0) if wrist is None else (*wrist.normal.tolist(), float(wrist.normal @ wrist.point))
+    lens = (frame.camera.fx, frame.camera.fy, frame.camera.cx, frame.camera.cy)
+    kinds = np.empty((roi.height, roi.width), dtype=np.uint8)
+    sort_pixels(frame.depth, tuple(roi), view.grid.depth, labels, tuple(blocks), stride, lens, plane, kinds)
+    readings = kinds == READING
+    if view.skin is None:
+        return roi, readings, readings
+    skin = view.skin[roi.top - window.top : roi.bottom - window.top, roi.left - window.left : roi.right - window.left]
+    r = max(1, round(DILATION * frame.camera.width))
+    inside = cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0
+    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc((r + 1) // 2)) > 0
+    silhouette = (readings & inside) | ((skin > 0) & closed & (kinds != OTHER))
+    return roi, silhouette, readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
+
+
+def _blocks_around(grid: Grid, labels: Labels) -> Window:
+    """The hand's nodes, and ROOM around them."""
+    hand = labels == HAND
+    room = 1 + round(ROOM * grid.focal[0] / float(grid.depth[hand].mean()))
+    rows, columns = np.flatnonzero(hand.any(axis=1)), np.flatnonzero(hand.any(axis=0))
+    return Window(
+        max(int(columns[0]) - room, 0),
+        max(int(rows[0]) - room, 0),
+        min(int(columns[-1]) + 1 + room, labels.shape[1]),
+        min(int(rows[-1]) + 1 + room, labels.shape[0]),
+    )
+
 
 @numba.njit(cache=True)
-def hand_pixels(
+def sort_pixels(
     depth: Depth,
+    roi: tuple[int, int, int, int],
     nodes: Depth,
-    labels: NDArray[np.uint8],
+    labels: Labels,
+    blocks: tuple[int, int, int, int],
     stride: int,
     lens: tuple[float, float, float, float],
     plane: tuple[float, float, float, float],
     out: NDArray[np.uint8],
 ) -> None:
-    """Kind of every pixel of `depth` (h, w; metres), into `out` (h, w).
+    """Kind of every pixel in the window `roi` of a depth image (h, w; metres), into `out`.
 
-    `nodes` and `labels` (rows, columns) are the grid's. A reading belongs to the node, of its own block and those
-    around it, whose depth is nearest to its own, if that is within MAX_JUMP: to hand or arm if there are any. A pixel
-    without a reading belongs to the nearest block. Where arm and hand meet, the plane (a, b, c, d) decides instead:
-    the hand is where a x + b y + c z <= d.
+    `nodes` and `labels` (rows, columns) are the grid's, of which the window shows `blocks`. A reading belongs to the
+    node, of its own block and those around it, whose depth is nearest to its own, if that is within MAX_JUMP: to hand
+    or arm if there are any. A pixel without a reading belongs to the nearest block. Where arm and hand meet, the plane
+    (a, b, c, d) decides instead: the hand is where a x + b y + c z <= d.
     """
     rows, columns = nodes.shape
-    height, width = depth.shape
+    left, top, right, bottom = roi
+    j0, i0, j1, i1 = blocks
     fx, fy, cx, cy = lens
     a, b, c, d = plane
     jump = np.float32(MAX_JUMP)
     out[:] = NOTHING
-    for i in range(rows):
-        for j in range(columns):
+    for i in range(i0, i1):
+        for j in range(j0, j1):
             k0, k1, m0, m1 = max(i - 1, 0), min(i + 2, rows), max(j - 1, 0), min(j + 2, columns)
             around = 0
             for k in range(k0, k1):
@@ -46,11 +126,12 @@ def hand_pixels(
                     around |= labels[k, m]
             if around == ELSEWHERE:
                 continue
-            for v in range(i * stride, min((i + 1) * stride, height)):
-                for u in range(j * stride, min((j + 1) * stride, width)):
+            u0, v0 = left + (j - j0) * stride, top + (i - i0) * stride
+            for v in range(v0, min(v0 + stride, bottom)):
+                for u in range(u0, min(u0 + stride, right)):
                     z = depth[v, u]
                     if around == HAND == labels[i, j] and abs(nodes[i, j] - z) < jump:
-                        out[v, u] = READING  # deep inside the hand
+                        out[v - top, u - left] = READING  # deep inside the hand
                         continue
                     nearest, close = np.float32(np.inf), np.float32(0)
                     label, met = ELSEWHERE, ELSEWHERE
@@ -74,6 +155,6 @@ def hand_pixels(
                         hand = bool((a * (u - cx) / fx + b * (v - cy) / fy + c) * close <= d)
                     if z > 0:
                         if met != ELSEWHERE:
-                            out[v, u] = READING if hand else OTHER
+                            out[v - top, u - left] = READING if hand else OTHER
                     elif hand:
-                        out[v, u] = MISSING
+                        out[v - top, u - left] = MISSING

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.observation.skin_statistics import OTHER, SKIN, Mixture
+from depthtrack.observation.window import Window
 
 BINS = 64
 """Bins along U and along V; each holds 4 of the 256 levels."""
@@ -148,7 +149,17 @@ class AdaptiveSkin:
 
     def __init__(self, model: SkinModel) -> None:
         self._offline = model.posterior()
+        self.forget()
+
+    def forget(self) -> None:
+        """Back to the model alone."""
         self._recent: deque[Array] = deque(maxlen=WINDOW)
+        self._classes = _classes(self._offline)
+
+    def learn(self, image: NDArray[np.uint8], labels: NDArray[np.uint8]) -> None:
+        """Take in a frame (h, w, 3) labelled (h, w) SURELY_SKIN, NOT_SKIN, or MAYBE_SKIN where it is left open."""
+        self._recent.append(count_colours(image, labels))
+        self._classes = _classes(self.posterior())
 
     def posterior(self) -> Array:
         """P = gamma P_model + (1 - gamma) P_recent (64, 64); colours not seen recently keep the model's."""
@@ -159,18 +170,23 @@ class AdaptiveSkin:
         recent = np.where(seen > 0, skin / np.maximum(seen, 1), self._offline)
         return OFFLINE_WEIGHT * self._offline + (1 - OFFLINE_WEIGHT) * recent
 
-    def classes(self) -> NDArray[np.uint8]:
-        """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (64, 64) by U and V bin."""
-        p = self.posterior()
-        return (p > T_MIN).astype(np.uint8) + (p > T_MAX).astype(np.uint8)
+    def find(
+        self, image: NDArray[np.uint8], window: Window, blocks: NDArray[np.uint8], stride: int
+    ) -> NDArray[np.uint8]:
+        """1 on skin, over a window of an RGB image (h, w, 3), found with hysteresis.
 
-    def learn(self, image: NDArray[np.uint8], labels: NDArray[np.uint8]) -> None:
-        """Take in a frame (h, w, 3) labelled (h, w) SURELY_SKIN, NOT_SKIN, or MAYBE_SKIN where it is left open."""
-        self._recent.append(count_colours(image, labels))
+        Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are looked at.
+        """
+        classes = np.empty((window.height, window.width), dtype=np.uint8)
+        classify(image, tuple(window), self._classes, blocks, stride, classes)
+        skin = np.empty_like(classes)
+        grow_skin(classes, skin)
+        return skin
 
-    def forget(self) -> None:
-        """Back to the model alone."""
-        self._recent.clear()
+
+def _classes(posterior: Array) -> NDArray[np.uint8]:
+    """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (64, 64) by U and V bin."""
+    return (posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX).astype(np.uint8)
 
 
 def count_colours(image: NDArray[np.uint8], labels: NDArray[np.uint8]) -> Array:
@@ -203,26 +219,27 @@ def _count(image: NDArray[np.uint8], labels: NDArray[np.uint8], counts: Array) -
 @numba.njit(cache=True)
 def classify(
     image: NDArray[np.uint8],
+    window: tuple[int, int, int, int],
     classes: NDArray[np.uint8],
     blocks: NDArray[np.uint8],
     stride: int,
     out: NDArray[np.uint8],
 ) -> None:
-    """Class of the pixels of an RGB image (h, w, 3), looked up in `classes` (64, 64), into `out` (h, w).
-
-    Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are looked at; elsewhere NOT_SKIN.
-    """
+    """Class of the pixels in a window of an RGB image (h, w, 3), looked up in `classes` (64, 64), into `out`; NOT_SKIN
+    where `blocks` (rows, columns) of `stride` x `stride` pixels is 0."""
+    left, top, _, _ = window
     height, width = out.shape
-    for i in range(blocks.shape[0]):
-        for v in range(i * stride, min((i + 1) * stride, height)):
-            for j in range(blocks.shape[1]):
-                for u in range(j * stride, min((j + 1) * stride, width)):
-                    out[v, u] = NOT_SKIN
-                    if blocks[i, j] != 0:
-                        r, g, b = int(image[v, u, 0]), int(image[v, u, 1]), int(image[v, u, 2])
-                        du, dv, usable = chroma_bins(r, g, b)
-                        if usable:
-                            out[v, u] = classes[du, dv]
+    for v in range(height):
+        i = v // stride
+        for j in range(blocks.shape[1]):
+            for u in range(j * stride, min((j + 1) * stride, width)):
+                label = NOT_SKIN
+                if blocks[i, j] != 0:
+                    y, x = top + v, left + u
+                    du, dv, usable = chroma_bins(int(image[y, x, 0]), int(image[y, x, 1]), int(image[y, x, 2]))
+                    if usable:
+                        label = classes[du, dv]
+                out[v, u] = label
 
 
 @numba.njit(cache=True)
