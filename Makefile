@@ -32,5 +32,5 @@ clean:
 	@touch $@
 
 .venv/.ready-test: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf,witness]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf,witness,sweep]'
 	@touch $@

@@ -1,0 +1,106 @@
+"""`depthtrack reproduce`: the papers' experiments, our figures beside theirs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from depthtrack.evaluation.experiments.reproduce import Reproduction
+    from depthtrack.evaluation.sweep.run import Workers
+
+
+@dataclass(frozen=True)
+class Command:
+    """Repeat the experiments of a paper: a table, a picture, our figures beside the paper's, and the time it took.
+
+    Every figure gets a folder under DIR: rows.jsonl with a row a measurement, table.csv, summary.json, figure.png.
+    Rows are written as they come; the same command goes on where an interrupted one stood.
+    """
+
+    figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
+    """Figures by name, as oikonomidis-2a or fig2a; all; or list, which tells what there is."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = None
+    """Folder to write to."""
+    quick: bool = False
+    """A coarse version: fewer cells and repetitions, at 96 pixels; two minutes a figure on two cores."""
+    variant: Literal["default", "paper"] = "default"
+    """The swarm as we measured it best, or as the paper has it."""
+    renderer: Literal["raster", "egl", "osmesa"] = "raster"
+    """What renders and scores the hypotheses."""
+    repetitions: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Times every measurement is repeated with another seed; unless given, as often as in the paper."""
+    resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
+    """Longest side of the region that hypotheses are rendered at; the sensor's own unless given."""
+    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Only the first so many frames of the motion."""
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Processes on this machine; as many as there are cores unless given."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """A Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""
+    json: bool = False
+    """Print the summaries as JSON, one array."""
+
+    def run(self) -> None:
+        from json import dumps
+
+        from depthtrack.evaluation.experiments.experiment import ExperimentOptions
+        from depthtrack.evaluation.experiments.registry import chosen_experiments
+        from depthtrack.evaluation.experiments.reproduce import reproduce
+
+        names = [name for name in self.figures if name != "list"]
+        experiments = chosen_experiments(names or ["all"])
+        options = ExperimentOptions(
+            self.quick, self.variant, self.renderer, self.repetitions, self.resolution, self.frames
+        )
+        if "list" in self.figures:
+            for experiment in experiments:
+                print(f"{experiment.name}  {len(experiment.cells(options)):4} cells  {experiment.title}")
+            return
+        if self.out is None or not self.figures:
+            raise InputError("name the figures and a folder to write to, as in  depthtrack reproduce all -o DIR")
+        workers, done = self._workers(), []
+        for experiment in experiments:
+            folder = self.out / experiment.name
+            done.append(reproduce(experiment, options, folder, workers, _bar(experiment.name)))
+            if not self.json:
+                print(_as_text(done[-1], folder))
+        if self.json:
+            print(dumps([each.to_json() for each in done], indent=2))
+
+    def _workers(self) -> "Workers":
+        from depthtrack.evaluation.bench.machine import usable_cores
+        from depthtrack.evaluation.sweep.cluster import DaskWorkers
+        from depthtrack.evaluation.sweep.local import LocalWorkers
+
+        if self.scheduler is not None:
+            return DaskWorkers(self.scheduler)
+        jobs = usable_cores() if self.jobs is None else self.jobs
+        if not 1 <= jobs <= 1024:
+            raise InputError(f"--jobs must lie between 1 and 1024, found {jobs}")
+        return LocalWorkers(jobs)
+
+
+def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterable[dict[str, object]]]":
+    from tqdm import tqdm
+
+    return lambda rows, total, before: tqdm(rows, name, total, initial=before, unit="cell", disable=None, leave=False)
+
+
+def _as_text(done: "Reproduction", folder: Path) -> str:
+    from depthtrack.evaluation.bench.table import aligned
+
+    lines = [("", "paper, in its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
+    return "\n".join(
+        [
+            f"{done.figure}: {done.title} ({done.source})",
+            *(f"  {line}" for line in aligned(lines, left=2)),
+            f"  {done.cells} cells, {done.seconds:.0f} s ({done.cell_seconds:.0f} s in the workers together): {folder}",
+            "",
+        ]
+    )

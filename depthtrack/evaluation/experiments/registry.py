@@ -1,0 +1,53 @@
+"""The experiments by name; none is imported before it is asked for."""
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from depthtrack import __version__
+from depthtrack.errors import InputError
+from depthtrack.evaluation.experiments.experiment import Experiment
+from depthtrack.evaluation.sweep.rows import Cell, Row
+
+_HERE = "depthtrack.evaluation.experiments"
+EXPERIMENTS = {
+    "oikonomidis-2a": f"{_HERE}.oikonomidis_2a",
+    "oikonomidis-2b": f"{_HERE}.oikonomidis_2b",
+    "oikonomidis-2c": f"{_HERE}.oikonomidis_2c",
+    "oikonomidis-2d": f"{_HERE}.oikonomidis_2d",
+    "oikonomidis-4": f"{_HERE}.oikonomidis_4",
+}
+"""Modules that hold an `EXPERIMENT`."""
+
+SHORT_NAMES = {f"fig{name.rpartition('-')[2]}": name for name in EXPERIMENTS}
+
+
+def load_experiment(name: str) -> Experiment:
+    """The experiment of this full name."""
+    experiment: Experiment = import_module(EXPERIMENTS[name]).EXPERIMENT
+    return experiment
+
+
+def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
+    """Experiments by full or short name, or `all`, each once. Raises InputError for others, naming those there are."""
+    found = []
+    for name in names:
+        full = SHORT_NAMES.get(name, name)
+        if name != "all" and full not in EXPERIMENTS:
+            known = ", ".join(f"{short} ({full})" for short, full in SHORT_NAMES.items())
+            raise InputError(f"no figure '{name}': choose all or some of {known}")
+        found += list(EXPERIMENTS) if name == "all" else [full]
+    return [load_experiment(name) for name in dict.fromkeys(found)]
+
+
+def full_cell(experiment: Experiment, cell: Cell) -> Cell:
+    """A cell as workers and journals know it: with the experiment's name, and the version that measures."""
+    return {"figure": experiment.name, "version": __version__} | cell
+
+
+def measure_cell(cell: Cell) -> Row:
+    """Measure a full cell. Raises InputError where this process has another version of depthtrack."""
+    arguments = dict(cell)
+    figure, version = arguments.pop("figure"), arguments.pop("version")
+    if version != __version__:
+        raise InputError(f"this worker has depthtrack {__version__}, the sweep needs {version}: install that one")
+    return load_experiment(figure).measure(**arguments)

@@ -1,0 +1,71 @@
+"""The journal of a sweep: a JSON object a line, appended as results come, readable after a kill at any moment."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from depthtrack.errors import InputError
+
+Cell = dict[str, Any]
+"""What one measurement depends on: plain JSON values by name."""
+
+Row = dict[str, Any]
+"""A cell and what was measured in it: plain JSON values by name."""
+
+
+class Journal:
+    """Rows on disk. A row answers a cell when it holds the same value under every name of the cell."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        """Open or begin the file; `names` are the keys that all cells have. Raises InputError for a damaged file.
+
+        A last line that a kill cut short is dropped.
+        """
+        self._names, self._rows = tuple(names), dict[str, Row]()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = path.open("a+b")
+        self._file.seek(0)
+        whole, line_break, cut = self._file.read().rpartition(b"\n")
+        if cut:
+            self._file.truncate(len(whole) + len(line_break))
+        for number, line in enumerate(whole.splitlines(), start=1):
+            row = _parse(line)
+            if row is None:
+                self._file.close()
+                raise InputError(f"{path}, line {number}: expected a JSON object; mend the line or remove the file")
+            self._rows[self._key(row)] = row
+
+    def get(self, cell: Cell) -> Row | None:
+        """The row that answers a cell, if there is one."""
+        return self._rows.get(self._key(cell))
+
+    def append(self, row: Row) -> None:
+        """Add a row; it is on its way to the disk when this returns."""
+        self._file.write(json.dumps(row).encode() + b"\n")
+        self._file.flush()
+        # As it will be read again: tuples as lists.
+        self._rows[self._key(row)] = json.loads(json.dumps(row))
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _key(self, row: Row) -> str:
+        return json.dumps([row.get(name) for name in self._names])
+
+
+def _parse(line: bytes) -> Row | None:
+    try:
+        row = json.loads(line)
+    except ValueError:
+        return None
+    return row if isinstance(row, dict) else None
