@@ -104,14 +104,14 @@ class _Recording:
 
 
 class _Observer:
-    def observe(self, frame: Frame):  # type: ignore[no-untyped-def]
+    def observe(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
         return None if frame.index % 8 == 5 else observe(MADE, frame.index)
 
 
 def run(folder: Path, count: int, resume: bool = False) -> None:
     tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=48, generations=8))
     with RunWriter(folder, {"tracker": "pso"}, ("segment", *tracker.stages), resume) as writer:
-        loop = track_sequence(_Recording(count), _Observer(), tracker, writer, MADE.poses[0])  # type: ignore[arg-type]
+        loop = track_sequence(_Recording(count), _Observer(), tracker, MODEL, writer, MADE.poses[0])  # type: ignore[arg-type]
         assert len(list(loop)) <= count
 
 

@@ -60,6 +60,7 @@ class Command:
 
         from tqdm import tqdm
 
+        from depthtrack.hand.kinematics import HandModel
         from depthtrack.observation.observation import Observer
         from depthtrack.recording.run import RunWriter
         from depthtrack.tracking.loop import track_sequence
@@ -85,7 +86,7 @@ class Command:
             RunWriter(self.out, self._configuration(hand, sequence), ("segment", *tracker.stages), self.resume) as run,
             tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
         ):
-            for row in track_sequence(sequence, observer, tracker, run, start_pose, count):
+            for row in track_sequence(sequence, observer, tracker, HandModel(hand), run, start_pose, count):
                 bar.update()
                 bar.set_postfix_str(row.status)
         lost = sum(row.status in ("lost", "absent") for row in run.rows)

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from depthtrack.camera import Camera
 from depthtrack.observation.cloud import point_cloud
+from depthtrack.observation.guided import PALM_HALF_THICKNESS, HandPlace
 from depthtrack.observation.segmentation import Segmentation, Segmenter
 from depthtrack.observation.skin_colour import SkinModel
-from depthtrack.observation.wrist import WristPlane
 from depthtrack.recording.sequence import Frame, Sequence
 
 Array = NDArray[np.float64]
-
-PALM_HALF_THICKNESS = 0.0145
-"""Metres from the palm's visible surface to its centre (see `hand.shape.HandShape.palm_thickness`)."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +87,9 @@ class Observer:
             return cls(None)
         return cls(SkinModel.default() if skin_model is None else SkinModel.load(skin_model))
 
-    def observe(self, frame: Frame, wrist: WristPlane | None = None) -> Observation | None:
-        """What is seen of the hand, or None without one. `wrist` is where a tracker expects it."""
-        found = self._segmenter.segment(frame, wrist)
+    def observe(self, frame: Frame, place: HandPlace | None = None) -> Observation | None:
+        """What is seen of the hand, or None without one. `place` is where a tracker is sure to find it."""
+        found = self._segmenter.segment(frame, place)
         return None if found is None else Observation.of(frame, found)
 
     def reset(self) -> None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from depthtrack.observation.arm import Arm, find_arm, find_vanishing_arm
 from depthtrack.observation.grid import Mask
+from depthtrack.observation.guided import PALM_HALF_THICKNESS, HandPlace, find_expected
 from depthtrack.observation.hand_pixels import hand_masks, label_hand
 from depthtrack.observation.palm import Palm
 from depthtrack.observation.search import find_start, nearest_palm
@@ -74,18 +75,31 @@ class Segmenter:
         if self._skin is not None:
             self._skin.forget()
 
-    def segment(self, frame: Frame, wrist: WristPlane | None = None) -> Segmentation | None:
-        """The hand, or None where none is seen. `wrist` is where a tracker expects it, and replaces our own cut."""
+    def segment(self, frame: Frame, place: HandPlace | None = None) -> Segmentation | None:
+        """The hand, or None where none is seen. `place` is where a tracker is sure to find it: nothing is searched."""
+        guided = None if place is None else self._guided(frame, place)
+        if guided is not None:
+            return guided
         if not 0 <= frame.timestamp - self._last_time <= MEMORY:
             self._last = None
         last, self._last = self._last, None
-        found = None if last is None else self._follow(frame, last, wrist)
+        found = None if last is None else self._follow(frame, last)
         if found is None:
             self._forget_arm()
             start = self._start(frame)
-            found = None if start is None else self._follow(frame, start, wrist)
+            found = None if start is None else self._follow(frame, start)
         self._last_time = frame.timestamp
         return found
+
+    def _guided(self, frame: Frame, place: HandPlace) -> Segmentation | None:
+        masks = find_expected(frame, place, self._skin)
+        if masks is None:
+            return None
+        self._last, self._last_time = place.centre, frame.timestamp
+        radius = float(np.linalg.norm(place.wrist.point - place.centre))
+        arm = place.wrist.normal
+        surface = place.centre - PALM_HALF_THICKNESS * place.centre / np.linalg.norm(place.centre)
+        return Segmentation(masks.window, masks.skin, masks.readings, surface, radius, arm, place.wrist)
 
     def _start(self, frame: Frame) -> Array | None:
         """Where a hand is (3,), metres, looking at the whole frame."""
@@ -93,7 +107,7 @@ class Segmenter:
         view = look(frame, Window.whole(frame.camera), (NEAREST, FARTHEST), stride, self._skin)
         return find_start(view.grid, view.surface)
 
-    def _follow(self, frame: Frame, last: Array, wrist: WristPlane | None) -> Segmentation | None:
+    def _follow(self, frame: Frame, last: Array) -> Segmentation | None:
         """The hand within DEPTH_WINDOW of its last position (3,)."""
         z = float(last[2])
         window = Window.around(frame.camera, last, DEPTH_WINDOW)
@@ -103,8 +117,7 @@ class Segmenter:
         if palm is None:
             return None
         self._last = palm.centre
-        arm, centre, own_wrist = self._arm(view, palm)
-        wrist = wrist or own_wrist
+        arm, centre, wrist = self._arm(view, palm)
         arm_mask = None if arm is None or wrist is None else arm_nodes(view.grid, palm, arm, wrist)
         labels = label_hand(view, palm, arm_mask, wrist)
         roi, skin, readings = hand_masks(view, labels, wrist)

@@ -5,35 +5,45 @@ from collections.abc import Iterator
 from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ORIENTATION, POSITION, rotation_matrix
+from depthtrack.observation.guided import HandPlace
 from depthtrack.observation.observation import Observer
+from depthtrack.observation.wrist import WristPlane
 from depthtrack.recording.run import RunRow, RunWriter
 from depthtrack.recording.sequence import Sequence
 from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
+
+_REACH_MARGIN = 0.03
+"""Metres that a hand may have moved since it was last seen, beyond its prediction."""
 
 
 def track_sequence(
     sequence: Sequence,
     observer: Observer,
     tracker: Tracker,
+    model: HandModel,
     run: RunWriter,
     start_pose: np.ndarray | None = None,
     count: int | None = None,
 ) -> Iterator[RunRow]:
     """Track every frame, or the first `count` of them, and append it to the run; yields each row as it is done.
 
-    Frames that the run already holds are observed again, which costs little and brings the observer to where it
-    was, but not tracked again. `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
+    While the track is sure, the tracker tells the observer where to look. Frames that the run already
+    holds are observed again, which costs little and brings the observer to where it was, but not tracked again.
+    `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
     starts by itself.
     """
     done = list(run.rows)
-    tracker.recall([_estimate(row) for row in done])
     awaiting_start = start_pose is not None and all(row.pose is None for row in done)
     for number, frame in enumerate(islice(sequence, count)):
         begun = time.perf_counter()
-        observation = observer.observe(frame)
+        observation = observer.observe(frame, _place(model, tracker.expected))
         observe_ms = 1e3 * (time.perf_counter() - begun)
         if number < len(done):
+            tracker.recall([_estimate(done[number])])
             continue
         if observation is None:
             estimate = ABSENT
@@ -45,6 +55,16 @@ def track_sequence(
         row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
         run.append(row, {"segment": observe_ms, **estimate.stage_ms})
         yield row
+
+
+def _place(model: HandModel, pose: NDArray[np.float64] | None) -> HandPlace | None:
+    """Where a hand in this pose is: around its palm, as far as its fingers reach, up to its wrist."""
+    if pose is None:
+        return None
+    shape = model.shape
+    reach = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + _REACH_MARGIN
+    wrist = WristPlane(model.joints(pose)[0], -rotation_matrix(pose[ORIENTATION])[:, 1])
+    return HandPlace(pose[POSITION].copy(), float(reach), wrist)
 
 
 def _estimate(row: RunRow) -> Estimate:

@@ -65,6 +65,11 @@ class Tracker(Protocol):
         """
         ...
 
+    @property
+    def expected(self) -> NDArray[np.float64] | None:
+        """Where the hand should be in the next frame, as a pose (27,); None where that is not known well."""
+        ...
+
     def close(self) -> None:
         """Free what the tracker holds."""
         ...

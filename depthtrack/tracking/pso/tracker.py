@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 
 _USUAL_FRAMES = 30
+_SURE = 0.8
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class PsoTracker:
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
         self._pose: Array | None = None
         self._velocity = np.zeros(26)
+        self._confidence = 0.0
         self._usual: deque[float] = deque(maxlen=_USUAL_FRAMES)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -118,6 +120,13 @@ class PsoTracker:
         """Take up a track after these estimates, as if they had been made just now."""
         for estimate in estimates:
             self._remember(estimate)
+
+    @property
+    def expected(self) -> Array | None:
+        """The linear prediction, while the track is sure."""
+        if self._pose is None or self._confidence < _SURE:
+            return None
+        return retract(self._pose, self._velocity)
 
     def close(self) -> None:
         self._scorer.close()
@@ -179,5 +188,5 @@ class PsoTracker:
             self._velocity = tangent_between(self._pose, estimate.pose)
         else:
             self._velocity = np.zeros(26)
-        self._pose = estimate.pose
+        self._pose, self._confidence = estimate.pose, estimate.confidence
         self._usual.append(estimate.energy)
