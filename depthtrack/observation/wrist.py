@@ -24,13 +24,13 @@ NARROW = 1.13
 """The wrist is where the breadth comes within this factor of the forearm's narrowest, just behind it. The narrowest
 place itself is ill-defined: some forearms hardly taper."""
 
-BROAD_PALM = 0.03
+BROAD_PALM = 0.025
 """Metres; an inscribed circle of this radius is the palm, seen from its front or back."""
 
 BROAD = 1.15
 """Factor on that by which a hand must be broader, for its end to be seen."""
 
-HAND_LENGTH, GUESS_RANGE = 0.19, (0.04, 0.13)
+HAND_LENGTH, GUESS_RANGE = 0.18, (0.04, 0.13)
 """Metres along the surface from the farthest fingertip to the wrist, the fingers a little bent; and between which the
 wrist is guessed from the palm's centre, where the image tells no better."""
 
@@ -55,6 +55,8 @@ def find_wrist(grid: Grid, palm: Palm, arm: Arm) -> float | None:
     """Distance (m) of the wrist from the palm's centre along the arm: where the hand has come down to the forearm's
     breadth. None where the hand is hardly broader than the wrist, as when it is seen from its side.
     """
+    if palm.radius < BROAD_PALM:
+        return None
     seen = breadth(grid, palm, arm)
     # Near the end of what is seen of the arm, breadth fades out.
     end = float(np.median((grid.points[arm.exits] - palm.centre) @ arm.direction)) - 0.01
