@@ -72,7 +72,7 @@ def find_expected(frame: Frame, place: HandPlace, skin: AdaptiveSkin | None) -> 
         found = skin.find(frame.colour, window, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
         radius = max(1, round(DILATION * camera.width))
         readings &= cv2.dilate(found.astype(np.uint8), disc(radius)) > 0
-        # Skin without a reading counts in gaps between readings: beyond them, a shadow falls on what may look like skin.
+        # Skin without a reading counts in gaps between readings: beyond them, shadows fall on what may look like skin.
         gaps = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(radius)) > 0
         silhouette = readings | (found & gaps & (kinds == _MISSING))
     silhouette = _without_specks(silhouette)
