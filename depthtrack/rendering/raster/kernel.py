@@ -1,7 +1,8 @@
 """The rasteriser: quadrics into an inverse depth buffer, sixteen pixels at a time, then the sums of Eq. (2).
 
-The buffer holds 0 where nothing is drawn, so the depth test is a maximum. Only spans that something covered are
-compared with the observation and cleared again; what an empty image would cost is known beforehand.
+The buffer holds 0 where nothing is drawn, so the depth test is a maximum, and whatever must not be seen only has to
+be 0, less, or NaN. Only blocks that something reached are compared with the observation and cleared again; what an
+empty image would cost is known beforehand.
 """
 
 import numba
@@ -16,130 +17,133 @@ from depthtrack.rendering.raster.simd import (
     both,
     fetch_add,
     filler,
+    kernel_part,
     loader,
     select,
     store,
-    vabs,
-    vhighest,
-    vlowest,
-    vmax,
     vmin,
-    vsqrt,
+)
+from depthtrack.rendering.raster.simd_functions import (
+    estimated_reciprocal,
+    estimated_reciprocal_sqrt,
+    max_or,
+    vabs,
     vsum,
 )
+from depthtrack.rendering.raster.spans import find_spans
+from depthtrack.rendering.raster.stripes import BLOCK, COLUMNS, ROWS
 from depthtrack.rendering.surface import NEAR
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
 
-BLOCK = 16
-"""Pixels handled at once; rows of the buffer are padded by as many."""
-
 _load = loader(F32X16)
 _fill = filler(F32X16)
-_IOTA: Array32 = np.arange(BLOCK, dtype=np.float32)
+_LANE_COLUMN: Array32 = np.arange(BLOCK, dtype=np.float32) % COLUMNS
+_LANE_ROW: Array32 = np.arange(BLOCK, dtype=np.float32) // COLUMNS
 _W_NEAR = np.float32(1 / NEAR)
 _ACTIVE = layout.ACTIVE
+_LARGE = 64
+"""Blocks of a bounding box from which on it pays to find out which of them are needed."""
 
 
-@numba.njit(cache=True)
-def _rows_seen(x, d, d_u, d_v, d_uu, d_uv, d_vv, height):
-    """Rows (first, last) in which any column of a block has D >= 0, with a row of slack: the lanes decide exactly."""
-    b = x * d_uv + d_v
-    discriminant = b * b - (x * (x * d_uu + d_u) + d) * (np.float32(4.0) * d_vv)
-    root, half = vsqrt(vmax(discriminant, 0.0)), np.float32(-0.5) / d_vv
-    crosses, height = discriminant >= 0.0, np.float32(height)
-    first = vlowest(select(crosses, (b - root) * half, height))
-    last = vhighest(select(crosses, (b + root) * half, np.float32(-1.0)))
-    return int(max(first - np.float32(1.0), np.float32(0.0))), int(min(last + np.float32(1.0), height))
-
-
-@numba.njit(cache=True)
-def _draw(slot, is_segment, table, buffer, stride, low, high, iota):
-    """Draw one primitive; `low` and `high` (rows,) keep the columns covered so far."""
-    u_low, u_high = int(table[q.U_LOW * q.SLOTS + slot]), int(table[q.U_HIGH * q.SLOTS + slot])
-    v_low, v_high = int(table[q.V_LOW * q.SLOTS + slot]), int(table[q.V_HIGH * q.SLOTS + slot])
-    if u_high < u_low:
-        return
+@kernel_part
+def _draw(slot, is_segment, is_close, table, buffer, blocks, first, last, low, high):
+    """Draw one primitive; `low` and `high` keep the blocks of each stripe that were reached."""
+    left, right = int(table[q.LEFT * q.SLOTS + slot]), int(table[q.RIGHT * q.SLOTS + slot])
+    box_top, box_bottom = int(table[q.TOP * q.SLOTS + slot]), int(table[q.BOTTOM * q.SLOTS + slot])
+    is_large = (right - left + 1) * (box_bottom - box_top + 1) > _LARGE and table[q.D_VV * q.SLOTS + slot] < 0.0
+    if is_large:
+        find_spans(slot, is_segment, table, right - left + 1, box_top, box_bottom, first, last)
     beta, beta_u = table[q.BETA * q.SLOTS + slot], table[q.BETA_U * q.SLOTS + slot]
-    beta_v = table[q.BETA_V * q.SLOTS + slot]
     d, d_u, d_v = table[q.D * q.SLOTS + slot], table[q.D_U * q.SLOTS + slot], table[q.D_V * q.SLOTS + slot]
     d_uu, d_uv = table[q.D_UU * q.SLOTS + slot], table[q.D_UV * q.SLOTS + slot]
-    d_vv = table[q.D_VV * q.SLOTS + slot]
-    sigma = _fill(table[q.SIGMA * q.SLOTS + slot])
     axis, axis_u = table[q.AXIS * q.SLOTS + slot], table[q.AXIS_U * q.SLOTS + slot]
-    axis_v = table[q.AXIS_V * q.SLOTS + slot]
-    axis_low = _fill(table[q.AXIS_LOW * q.SLOTS + slot])
-    axis_high = _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
-    beta_v_lanes, d_vv_lanes, axis_v_lanes = _fill(beta_v), _fill(d_vv), _fill(axis_v)
-    for u in range(u_low, u_high + 1, BLOCK):
-        x = iota + np.float32(u - u_low)
-        first, last = 0, v_high - v_low
-        if u_high - u_low >= BLOCK and d_vv < 0.0:
-            first, last = _rows_seen(x, d, d_u, d_v, d_uu, d_uv, d_vv, last)
-        # What depends on the column alone stays in registers down the block's rows.
+    beta_v, d_vv = _fill(table[q.BETA_V * q.SLOTS + slot]), _fill(table[q.D_VV * q.SLOTS + slot])
+    axis_v = _fill(table[q.AXIS_V * q.SLOTS + slot])
+    axis_low, axis_high = _fill(table[q.AXIS_LOW * q.SLOTS + slot]), _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
+    sigma = table[q.SIGMA * q.SLOTS + slot]
+    is_special = is_close or sigma < 0.0
+    for stripe in range(left, right + 1):
+        top, bottom = box_top, box_bottom
+        if is_large:
+            top, bottom = first[stripe - left], last[stripe - left]
+            if bottom < top:
+                continue
+        low[stripe], high[stripe] = min(low[stripe], top), max(high[stripe], bottom)
+        # What depends on the column alone stays in registers down the stripe.
+        x = _load(_LANE_COLUMN, 0) + np.float32((stripe - left) * COLUMNS)
         column_beta, column_d, column_d_v = x * beta_u + beta, x * (x * d_uu + d_u) + d, x * d_uv + d_v
         column_axis = x * axis_u + axis
-        stop = min(u + BLOCK - 1, u_high)
-        y = _fill(np.float32(first))
-        for v in range(v_low + first, v_low + last + 1):
-            low[v], high[v] = min(low[v], u), max(high[v], stop)
-            D = y * (y * d_vv_lanes + column_d_v) + column_d
-            w = vsqrt(vmax(D, 0.0)) * sigma + (y * beta_v_lanes + column_beta)
-            seen = both(D >= 0.0, w < _W_NEAR)
+        y = _load(_LANE_ROW, 0) + np.float32((top - box_top) * ROWS)
+        start = (stripe * blocks + top) * BLOCK
+        for index in range(start, start + (bottom - top + 1) * BLOCK, BLOCK):
+            # A Newton step: with r near 1 / sqrt(D / 4), sqrt(D) is D / 4 r (3 - D / 4 r^2). NaN where D <= 0.
+            quarter = y * (y * d_vv + column_d_v) + column_d
+            r = estimated_reciprocal_sqrt(quarter)
+            half = quarter * r
+            rest, line = np.float32(3.0) - half * r, y * beta_v + column_beta
+            if is_special:
+                w = half * sigma * rest + line
+                w = select(w < _W_NEAR, w, 0.0)
+            else:
+                w = half * rest + line
             if is_segment:
-                e = y * axis_v_lanes + column_axis
-                seen = both(seen, both(e >= w * axis_low, w * axis_high >= e))
-            index = v * stride + u
-            store(buffer, index, vmax(_load(buffer, index), select(seen, w, 0.0)))
-            y = y + np.float32(1.0)
+                e = y * axis_v + column_axis
+                w = vmin(w, vmin(e - w * axis_low, w * axis_high - e))
+            store(buffer, index, max_or(w, _load(buffer, index)))
+            y = y + np.float32(ROWS)
 
 
-@numba.njit(cache=True)
-def draw(pose, hand, camera, scratch, table, buffer, stride, low, high, iota):
-    """Draw a whole hand into a cleared buffer, and clear the padding again."""
+@kernel_part
+def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high):
+    """Draw all primitives into a cleared buffer; returns how many blocks a stripe has."""
+    blocks = buffer.shape[0] // (low.shape[0] * BLOCK)
     set_up(pose, hand, camera, scratch, table)
-    width = int(camera[6])
+    is_close = pose[2] < hand[8 * layout.REACH] + NEAR
     for n in range(_ACTIVE.shape[0]):
         slot = _ACTIVE[n]
         if slot < layout.CONES or slot > layout.GENERAL:
-            _draw(slot, False, table, buffer, stride, low, high, iota)
+            _draw(slot, False, is_close, table, buffer, blocks, first, last, low, high)
         else:
-            _draw(slot, True, table, buffer, stride, low, high, iota)
-    nothing = _fill(np.float32(0.0))
-    for v in range(low.shape[0]):
-        if high[v] >= low[v]:
-            store(buffer, v * stride + width, nothing)
+            _draw(slot, True, is_close, table, buffer, blocks, first, last, low, high)
+    return blocks
 
 
-@numba.njit(cache=True)
-def _compare(observed, skin, buffer, stride, low, high, match_depth, clamp_depth):
+@kernel_part
+def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth):
     """What the drawn pixels change in the sums of Eq. (2); clears the buffer on the way.
 
     Returns the change of the clamped difference, the matched pixels on skin, and all matched pixels.
     """
     clamped, on_skin, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
-    nothing, one, many = _fill(np.float32(0.0)), _fill(np.float32(1.0)), low.shape[0] * stride
-    for v in range(low.shape[0]):
-        start, stop = low[v], high[v]
-        low[v], high[v] = many, -1
-        for u in range(start, stop + 1, BLOCK):
-            index = v * stride + u
+    nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
+    for stripe in range(low.shape[0]):
+        top, bottom = low[stripe], high[stripe]
+        low[stripe], high[stripe] = blocks, -1
+        start = (stripe * blocks + top) * BLOCK
+        # Summed by the stripe first: one long float32 sum over a large image would lose the energy's third digit.
+        in_stripe = nothing
+        for index in range(start, start + (bottom - top + 1) * BLOCK, BLOCK):
             w = _load(buffer, index)
             o = _load(observed, index)
             drawn = w > 0.0
-            difference = vabs(o - one / w)
-            clamped = clamped + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
+            z = estimated_reciprocal(w)
+            z = z + z * (one - w * z)
+            difference = vabs(o - z)
+            # Beyond the image (o = NaN) both minima are the clamp, and nothing matches.
+            in_stripe = in_stripe + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
             # A missing reading (o = 0) matches anything that is drawn.
             allowed = select(o > 0.0, _fill(match_depth), np.float32(3e38))
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
             on_skin = on_skin + hit * _load(skin, index)
             store(buffer, index, nothing)
+        clamped = clamped + in_stripe
     return vsum(clamped), vsum(on_skin), vsum(matched)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
     counter: NDArray[np.int64],
@@ -152,6 +156,8 @@ def score_poses(
     scratch: Array,
     table: Array32,
     buffer: Array32,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
     low: NDArray[np.int64],
     high: NDArray[np.int64],
     sums: Array,
@@ -159,25 +165,25 @@ def score_poses(
 ) -> None:
     """Score poses until the shared `counter` runs out of them; several threads may work on one batch.
 
-    `poses` (B, 27); `observed` depth (metres) and `skin` (0 or 1), rows padded to the buffer's stride; `empty` the
-    sums of Eq. (2) for an empty image; `objective`: d_m, d_M, unit, epsilon, lambda, lambda_k. Writes `sums` (B, 3) and
-    `energies` (B,). `scratch`, `table`, `buffer` (all 0), `low` (all large) and `high` (all -1) are a thread's own.
+    `poses` (B, 27); `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes; `empty` the sums of
+    Eq. (2) for an empty image; `objective`: d_m, d_M, unit, epsilon, lambda, lambda_k. Writes `sums` (B, 3) and
+    `energies` (B,). A thread's own: `scratch`, `table`, `buffer` (stripes, all 0) and, a stripe each and one more,
+    `first` and `last`; a stripe each, `low` (all large) and `high` (all -1).
     """
-    stride = observed.shape[0] // low.shape[0]
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
     while True:
         n = fetch_add(counter, 1)
         if n >= poses.shape[0]:
             break
-        draw(poses[n], hand, camera, scratch, table, buffer, stride, low, high, _load(_IOTA, 0))
-        clamped, on_skin, matched = _compare(observed, skin, buffer, stride, low, high, match_depth, clamp_depth)
+        blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
+        clamped, on_skin, matched = _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth)
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_skin
         sums[n, 2] = empty[2] + matched - on_skin
         energies[n] = _energy(poses[n], sums[n], objective)
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _energy(pose, sums, objective):
     """Eq. (1) from the sums of Eq. (2), as `objective.Terms.of_sums` does for batches."""
     depth = sums[0] / objective[2] / (sums[2] + objective[3])
@@ -190,25 +196,19 @@ def _energy(pose, sums, objective):
     return depth + objective[4] * skin + objective[5] * crossing
 
 
-@numba.njit(cache=True, nogil=True)
-def render_pose(
+@numba.njit(cache=True, nogil=True, _nrt=False)
+def draw_pose(
     pose: Array,
     hand: Array,
     camera: Array,
     scratch: Array,
     table: Array32,
     buffer: Array32,
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
     low: NDArray[np.int64],
     high: NDArray[np.int64],
-    depth: Array32,
 ) -> None:
-    """Depth (h, w) in metres of one pose, 0 where there is no hand; the scratch arrays as in `score_poses`."""
-    stride = buffer.shape[0] // low.shape[0]
-    draw(pose, hand, camera, scratch, table, buffer, stride, low, high, _load(_IOTA, 0))
-    for v in range(depth.shape[0]):
-        for u in range(depth.shape[1]):
-            w = buffer[v * stride + u]
-            depth[v, u] = np.float32(1.0) / w if w > 0.0 else np.float32(0.0)
-        for u in range(stride):
-            buffer[v * stride + u] = 0.0
-        low[v], high[v] = buffer.shape[0], -1
+    """Leave the inverse depth of one pose in the buffer, for the caller to clear; arrays as in `score_poses`."""
+    blocks = _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high)
+    low[:], high[:] = blocks, -1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import FINGERS
-from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ SPHERES, CONES, GENERAL, SLOTS = 0, 32, 56, 64
 # Rows of the constants: eight lanes each.
 BASE_ROTATION, BASE_POSITION, LENGTH, MIRROR = 0, 9, 12, 15
 SPHERE_RADIUS, TIP_LENGTH, CONE_RADIUS, CONE_SLOPE, CONE_LENGTH = 16, 20, 21, 24, 27
-GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH, IS_THUMB, ROWS = 30, 33, 36, 39, 40, 41
+GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH, IS_THUMB, REACH, ROWS = 30, 33, 36, 39, 40, 41, 42
 
 ACTIVE: NDArray[np.int64] = np.array(
     [GENERAL + k for k in range(4)]
@@ -48,6 +48,7 @@ def constants(shape: HandShape) -> Array:
                 _read_cone(rows, k, lane, cone)
         rows[TIP_LENGTH, lane] = matrix[f"{finger}_sphere_3"][1, 3]
     _read_general(rows, matrix)
+    rows[REACH] = _reach(model, primitives)
     return rows.ravel()
 
 
@@ -74,3 +75,12 @@ def _read_general(rows: Array, matrix: dict[str, Array]) -> None:
         rows[GENERAL_SQUARE : GENERAL_SQUARE + 3, lane] = radii**2
     rows[GENERAL_LENGTH, 0] = length
     rows[IS_THUMB, 3] = 1
+
+
+def _reach(model: HandModel, primitives: Primitives) -> float:
+    """Metres from the palm's centre that nothing of the hand is ever beyond."""
+    fingers = np.linalg.norm(model.base_transforms[:, :3, 3], axis=1) + model.lengths.sum(axis=1)
+    # Cylinders and cones lie within the spheres and ellipsoids at their ends.
+    T = primitives.T_body_unit[primitives.kinds == SPHERE]
+    parts = np.linalg.norm(T[:, :3, 3], axis=1) + np.abs(T[:, :3, :3]).max(axis=(1, 2))
+    return float(fingers.max() + parts.max())

@@ -2,13 +2,13 @@
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster.quadrics import Coefficients, span, write_cones, write_general, write_spheres
-from depthtrack.rendering.raster.simd import F64X8, filler, first, loader, select, vfloor
+from depthtrack.rendering.raster.simd import F64X8, filler, kernel_part, loader, select
+from depthtrack.rendering.raster.simd_functions import first, vfloor
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ _load = loader(F64X8)
 _fill = filler(F64X8)
 
 
-@numba.njit(cache=True)
+@kernel_part
 def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Coefficients) -> None:
     """Fill the coefficient table for one pose.
 
@@ -57,7 +57,7 @@ def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Coeff
     _phalanx(table, 2, layout.TIP_LENGTH, hand, camera, bounds, p, y)
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _palm_rotation(qw, qx, qy, qz):
     """Rotation matrix of a quaternion of any length, row by row."""
     n = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
@@ -68,7 +68,7 @@ def _palm_rotation(qw, qx, qy, qz):
     )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _rotated(R, hand, row, stride):
     """R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
     b0, b1, b2 = _load(hand, 8 * row), _load(hand, 8 * (row + stride)), _load(hand, 8 * (row + 2 * stride))
@@ -79,7 +79,7 @@ def _rotated(R, hand, row, stride):
     )
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _turn(s, c, a, b):
     """Axes a and b turned in their plane: a towards b."""
     return (
@@ -88,7 +88,7 @@ def _turn(s, c, a, b):
     )
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _sine_cosine(x):
     """Sine and cosine to 1e-11, by their series about the nearest multiple of pi."""
     n = vfloor(x * (1 / math.pi) + 0.5)
@@ -113,7 +113,7 @@ def _sine_cosine(x):
     return sign * s * r, sign * c
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _with_thumb(mask, palm0, palm1, palm2, fingers):
     """The palm's vector in every lane, but for the thumb's ellipsoid: the first finger's."""
     return (
@@ -123,7 +123,7 @@ def _with_thumb(mask, palm0, palm1, palm2, fingers):
     )
 
 
-@numba.njit(cache=True)
+@kernel_part
 def _phalanx(table, k, length_row, hand, camera, bounds, p, y):
     """Cones k from joints `p` along `y`, and the spheres at their far end; returns those with their bounds."""
     length = _load(hand, 8 * length_row)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, Terms
-from depthtrack.rendering.raster import kernel, layout, quadrics
+from depthtrack.rendering.raster import kernel, layout, quadrics, stripes
 from depthtrack.rendering.raster.helper import Helper
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
@@ -22,6 +22,8 @@ class _Workspace:
     """One thread's own arrays: see `kernel.score_poses`."""
 
     buffer: NDArray[np.float32]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
     low: NDArray[np.int64]
     high: NDArray[np.int64]
     scratch: Array = field(default_factory=lambda: np.zeros(4 * layout.LANES))
@@ -30,16 +32,14 @@ class _Workspace:
     )
 
     @classmethod
-    def of(cls, rows: int, stride: int) -> Self:
-        return cls(
-            np.zeros(rows * stride, np.float32),
-            np.full(rows, rows * stride, np.int64),
-            np.full(rows, -1, np.int64),
-        )
+    def of(cls, shape: tuple[int, int]) -> Self:
+        count, blocks = stripes.stripe_counts(shape)
+        first, last = np.zeros((2, count + 1), np.int64)
+        return cls(stripes.new_stripes(shape), first, last, np.full(count, blocks), np.full(count, -1))
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        return self.scratch, self.table, self.buffer, self.low, self.high
+        return self.scratch, self.table, self.buffer, self.first, self.last, self.low, self.high
 
 
 class RasterScorer(ScorerBase):
@@ -59,14 +59,12 @@ class RasterScorer(ScorerBase):
         self._helpers = [Helper() for _ in range(threads - 1)]
 
     def observe(self, target: Target) -> None:
-        rows, columns = target.camera.shape
-        stride = -(-columns // kernel.BLOCK) * kernel.BLOCK + kernel.BLOCK
-        if self._target is None or self._target.camera.shape != target.camera.shape:
-            self._workspaces = [_Workspace.of(rows, stride) for _ in range(len(self._helpers) + 1)]
-            self._observed = np.zeros((rows, stride), np.float32)
-            self._skin = np.zeros((rows, stride), np.float32)
-        self._observed[:, :columns] = target.depth
-        self._skin[:, :columns] = target.skin
+        shape = target.camera.shape
+        if self._target is None or self._target.camera.shape != shape:
+            self._workspaces = [_Workspace.of(shape) for _ in range(len(self._helpers) + 1)]
+            self._observed, self._skin = stripes.new_stripes(shape), stripes.new_stripes(shape)
+        stripes.write_stripes(target.depth, np.nan, self._observed)
+        stripes.write_stripes(target.skin, 0, self._skin)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty = np.array([clamped, 0.0, np.count_nonzero(target.skin)])
         c = target.camera
@@ -82,9 +80,11 @@ class RasterScorer(ScorerBase):
         return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
 
     def render(self, pose: ArrayLike) -> NDArray[np.float32]:
-        depth = np.empty(self.target.camera.shape, np.float32)
-        batch = as_batch(np.asarray(pose)[None])
-        kernel.render_pose(batch[0], self._hand, self._camera, *self._workspaces[0].arrays, depth)
+        batch, space = as_batch(np.asarray(pose)[None]), self._workspaces[0]
+        kernel.draw_pose(batch[0], self._hand, self._camera, *space.arrays)
+        inverse = stripes.read_stripes(space.buffer, self.target.camera.shape)
+        depth = np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
+        space.buffer[:] = 0
         return depth
 
     def close(self) -> None:
@@ -103,8 +103,8 @@ class RasterScorer(ScorerBase):
                 self._counter,
                 self._hand,
                 self._camera,
-                self._observed.reshape(-1),
-                self._skin.reshape(-1),
+                self._observed,
+                self._skin,
                 self._empty,
                 self._constants,
                 *space.arrays,

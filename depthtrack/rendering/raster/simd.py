@@ -2,16 +2,16 @@
 
 LLVM's auto-vectoriser gives up on the rasteriser's loops, so their inner lines are written on vectors: a value of
 type `Vector(float32, 16)` is one AVX-512 register (two on AVX2, four on SSE), with the usual operators. All functions
-here exist only inside numba-compiled code.
+here exist only inside numba-compiled code; those that read a vector are in `simd_functions`.
 """
 
 import operator
 from collections.abc import Callable
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import intrinsic, lower_builtin, register_model
@@ -38,10 +38,17 @@ _LLVM_ELEMENTS: dict[types.Type, ir.Type] = {
     types.boolean: ir.IntType(1),
 }
 F32X16 = Vector(types.float32, 16)
-F32X32 = Vector(types.float32, 32)
 F64X8 = Vector(types.float64, 8)
 # Multiply-adds may be fused: the same machine gives the same bits, whatever the number of threads.
 _FLAGS = ("contract", "nsz")
+
+
+def kernel_part(function: Callable[..., Any]) -> Any:
+    """Compile a function that only kernels call; arrays are lent to it.
+
+    Counting references to them would take locked instructions at every call, longer than much of the work itself.
+    """
+    return numba.njit(cache=True, _nrt=False)(function)
 
 
 @register_model(Vector)
@@ -50,11 +57,11 @@ class _VectorModel(models.PrimitiveModel):
         super().__init__(manager, vector, vector.llvm())
 
 
-def _element(value: types.Type) -> types.Type | None:
+def element_of(value: types.Type) -> types.Type | None:
     return value.element if isinstance(value, Vector) else None
 
 
-def _operands(a: types.Type, b: types.Type) -> Vector | None:
+def operands(a: types.Type, b: types.Type) -> Vector | None:
     """The vector type two operands meet in, where one may be a scalar; None when neither is a float vector."""
     vector = a if isinstance(a, Vector) else b
     other = b if vector is a else a
@@ -72,41 +79,42 @@ def _widen(context: Any, builder: ir.IRBuilder, value: ir.Value, found: types.Ty
     return builder.shuffle_vector(single, ir.Constant(wanted.llvm(), ir.Undefined), lanes)
 
 
-_Emit = Callable[[ir.IRBuilder, ir.Value, ir.Value], ir.Value]
+Emit = Callable[[ir.IRBuilder, ir.Value, ir.Value], ir.Value]
 
 
-def _widen_all(context: Any, builder: ir.IRBuilder, found: Any, values: Any, wanted: Vector) -> list[ir.Value]:
+def widen_all(context: Any, builder: ir.IRBuilder, found: Any, values: Any, wanted: Vector) -> list[ir.Value]:
+    """Operands of the types `found` as vectors of one type."""
     return [_widen(context, builder, value, t, wanted) for value, t in zip(values, found, strict=True)]
 
 
-def _binary(emit: _Emit) -> Any:
+def _binary(emit: Emit) -> Any:
     @intrinsic
     def function(typing_context: Any, a: types.Type, b: types.Type) -> Any:
-        vector = _operands(a, b)
+        vector = operands(a, b)
 
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
             assert vector is not None
-            return emit(builder, *_widen_all(context, builder, signature.args, arguments, vector))
+            return emit(builder, *widen_all(context, builder, signature.args, arguments, vector))
 
         return vector and (vector(a, b), generate)
 
     return function
 
 
-def _operator(symbol: Any, emit: _Emit, compares: bool = False) -> None:
+def _operator(symbol: Any, emit: Emit, compares: bool = False) -> None:
     """Teach numba an operator on vectors, directly: an @overload would be compiled anew for every use."""
 
     class Typing(AbstractTemplate):
         def generic(self, arguments: Any, _: Any) -> Any:
-            vector = _operands(*arguments) if len(arguments) == 2 else None
+            vector = operands(*arguments) if len(arguments) == 2 else None
             return vector and (vector.mask if compares else vector)(*arguments)
 
     infer_global(symbol)(Typing)
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        vector = _operands(*signature.args)
+        vector = operands(*signature.args)
         assert vector is not None
-        return emit(builder, *_widen_all(context, builder, signature.args, arguments, vector))
+        return emit(builder, *widen_all(context, builder, signature.args, arguments, vector))
 
     for a, b in ((Vector, Vector), (Vector, types.Number), (types.Number, Vector)):
         lower_builtin(symbol, a, b)(generate)
@@ -131,7 +139,7 @@ def both(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
         return builder.and_(*arguments)
 
-    return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
+    return (a(a, b), generate) if element_of(a) == types.boolean and a == b else None
 
 
 @intrinsic
@@ -141,96 +149,20 @@ def either(typing_context: Any, a: types.Type, b: types.Type) -> Any:
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
         return builder.or_(*arguments)
 
-    return (a(a, b), generate) if _element(a) == types.boolean and a == b else None
+    return (a(a, b), generate) if element_of(a) == types.boolean and a == b else None
 
 
 @intrinsic
 def select(typing_context: Any, mask: types.Type, a: types.Type, b: types.Type) -> Any:
     """Lanes of `a` where the mask is set, of `b` elsewhere; either may be a scalar, not both."""
-    vector = _operands(a, b)
-    if vector is None or _element(mask) != types.boolean:
+    vector = operands(a, b)
+    if vector is None or element_of(mask) != types.boolean:
         return None
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        return builder.select(arguments[0], *_widen_all(context, builder, signature.args[1:], arguments[1:], vector))
+        return builder.select(arguments[0], *widen_all(context, builder, signature.args[1:], arguments[1:], vector))
 
     return vector(mask, a, b), generate
-
-
-def _call(builder: ir.IRBuilder, name: str, result: ir.Type, *arguments: ir.Value) -> ir.Value:
-    function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(result, [argument.type for argument in arguments]), name
-    )
-    return builder.call(function, arguments)
-
-
-def _suffix(vector: Vector) -> str:
-    return f"v{vector.lanes}f{32 if vector.element == types.float32 else 64}"
-
-
-def _unary(name: str) -> Any:
-    @intrinsic
-    def function(typing_context: Any, a: types.Type) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-            return _call(builder, f"llvm.{name}.{_suffix(a)}", a.llvm(), arguments[0])
-
-        return (a(a), generate) if isinstance(a, Vector) else None
-
-    return function
-
-
-vsqrt = _unary("sqrt")
-vabs = _unary("fabs")
-vfloor = _unary("floor")
-
-
-@intrinsic
-def first(typing_context: Any, a: types.Type) -> Any:
-    """The first lane, a scalar."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        return builder.extract_element(arguments[0], ir.Constant(ir.IntType(32), 0))
-
-    return (a.element(a), generate) if isinstance(a, Vector) else None
-
-
-@intrinsic
-def narrow(typing_context: Any, a: types.Type) -> Any:
-    """The same lanes in float32."""
-    if _element(a) != types.float64:
-        return None
-    single = Vector(types.float32, a.lanes)
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        return builder.fptrunc(arguments[0], single.llvm())
-
-    return single(a), generate
-
-
-def _across(combine: _Emit) -> Any:
-    """A reduction over the lanes, halves against halves: the order is fixed, so the bits are."""
-
-    @intrinsic
-    def function(typing_context: Any, a: types.Type) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-            value, lanes = arguments[0], a.lanes
-            while lanes > 1:
-                half = lanes // 2
-                undefined = ir.Constant(value.type, ir.Undefined)
-                index = ir.VectorType(ir.IntType(32), half)
-                low = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half))))
-                high = builder.shuffle_vector(value, undefined, ir.Constant(index, list(range(half, lanes))))
-                value, lanes = combine(builder, low, high), half
-            return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
-
-        return (a.element(a), generate) if isinstance(a, Vector) else None
-
-    return function
-
-
-vsum = _across(lambda builder, a, b: builder.fadd(a, b))
-vlowest = _across(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
-vhighest = _across(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
 
 
 def _address(

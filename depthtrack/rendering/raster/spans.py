@@ -1,0 +1,48 @@
+"""Which blocks of each stripe a primitive can reach: less than its bounding box, never less than it covers.
+
+Down a column of pixels a quadric is seen between the roots of D, and a segment of its axis between two rows; both in
+closed form, for sixteen columns at once.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.rendering.raster import quadrics as q
+from depthtrack.rendering.raster import stripes
+from depthtrack.rendering.raster.simd import F32X16, kernel_part, loader, select, vmax, vmin
+from depthtrack.rendering.raster.simd_functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
+
+_load = loader(F32X16)
+_COLUMNS: NDArray[np.float32] = np.arange(16, dtype=np.float32)
+_SLACK = np.float32(0.25)
+"""Rows; the float32 roots are good to a hundredth, and the lanes decide exactly."""
+
+
+@kernel_part
+def find_spans(slot, is_segment, table, count, top, bottom, first, last):
+    """Blocks first[n] to last[n] of stripe LEFT + n, for `count` stripes; none where the primitive misses a stripe.
+
+    Needs D_VV < 0, and room for one stripe more in `first` and `last`.
+    """
+    d, d_u, d_v = table[q.D * q.SLOTS + slot], table[q.D_U * q.SLOTS + slot], table[q.D_V * q.SLOTS + slot]
+    d_uu, d_uv = table[q.D_UU * q.SLOTS + slot], table[q.D_UV * q.SLOTS + slot]
+    four_a, half = np.float32(4.0) * table[q.D_VV * q.SLOTS + slot], table[q.HALF * q.SLOTS + slot]
+    axis, axis_u = table[q.AXIS * q.SLOTS + slot], table[q.AXIS_U * q.SLOTS + slot]
+    axis_near, axis_far = table[q.AXIS_NEAR * q.SLOTS + slot], table[q.AXIS_FAR * q.SLOTS + slot]
+    per_row = table[q.ROWS_PER_AXIS * q.SLOTS + slot]
+    height = np.float32((bottom - top + 1) * stripes.ROWS)
+    for n in range(0, count, 2):
+        x = _load(_COLUMNS, 0) + np.float32(n * stripes.COLUMNS)
+        b = x * d_uv + d_v
+        discriminant = b * b - (x * (x * d_uu + d_u) + d) * four_a
+        root = discriminant * estimated_reciprocal_sqrt(discriminant)
+        low = select(discriminant > 0.0, (b - root) * half, height)
+        high = select(discriminant > 0.0, (b + root) * half, np.float32(-2.0))
+        if is_segment:
+            e = x * axis_u + axis
+            one, other = (axis_near - e) * per_row, (axis_far - e) * per_row
+            low, high = vmax(low, vmin(one, other)), vmin(high, vmax(one, other))
+        low_left, low_right = lowest_of_halves(vmin(vmax(low - _SLACK, 0.0), height))
+        high_left, high_right = highest_of_halves(vmax(vmin(high + _SLACK, height - np.float32(1.0)), np.float32(-1.0)))
+        first[n], last[n] = top + (int(low_left) >> 1), top + (int(high_left) >> 1)
+        first[n + 1], last[n + 1] = top + (int(low_right) >> 1), top + (int(high_right) >> 1)
