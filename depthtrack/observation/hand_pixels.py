@@ -51,9 +51,9 @@ def label_hand(view: View, palm: Palm, arm: Mask | None, wrist: WristPlane | Non
 def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Window, Mask, Mask]:
     """The region of interest in the frame, with the hand's silhouette and its readings (h, w) in it.
 
-    Within r of the outline of its readings, where depth is least sure, colour decides what is hand; farther inside,
-    depth alone does, so that shadows and highlights leave no holes; where readings are missing in between, colour
-    does. Readings count up to r outside that silhouette.
+    Within r of the outline of its readings, where depth is least sure, only what has the colour of skin is hand;
+    farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
+    are filled where they are skin, and the outline is smoothed. Readings count up to r outside the silhouette.
     """
     blocks = _blocks_around(view.grid, labels)
     stride, window, frame = view.grid.stride, view.window, view.frame
@@ -72,10 +72,30 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
         return roi, readings, readings
     skin = view.skin[roi.top - window.top : roi.bottom - window.top, roi.left - window.left : roi.right - window.left]
     r = max(1, round(DILATION * frame.camera.width))
-    inside = cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0
-    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc((r + 1) // 2)) > 0
-    silhouette = (readings & inside) | ((skin > 0) & closed & (kinds != OTHER))
+    inside = readings & (cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0)
+    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 2))) > 0
+    filled = closed | ((kinds <= MISSING) & _enclosed(closed))
+    coloured = skin > 0
+    silhouette = inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
     return roi, silhouette, readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
+
+
+def _enclosed(mask: Mask) -> Mask:
+    """What cannot be reached from outside without crossing `mask` (h, w), and the mask itself."""
+    framed = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
+    framed[1:-1, 1:-1] = mask
+    cv2.floodFill(framed, None, (0, 0), 2)
+    return framed[1:-1, 1:-1] != 2
+
+
+def _smoothed(mask: Mask, r: int) -> Mask:
+    """The majority of the pixels about each: sensors' outlines waver by a pixel.
+
+    A little less than half suffices, for readings are lost at outlines and never won.
+    """
+    side = 2 * (r // 2) + 1
+    share = cv2.boxFilter(mask.astype(np.uint8) * 200, -1, (side, side), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(share > 90)
 
 
 def _blocks_around(grid: Grid, labels: Labels) -> Window:
