@@ -289,6 +289,7 @@ def test_processes_give_the_same_bits_and_a_cut_sweep_goes_on(tmp_path: Path) ->
 
     shared = reproduce(experiment, TINY, cut, LocalWorkers(2), watch)
     assert watched == [(5, 1)]
+    assert (serial.reused, shared.reused) == (0, 1)
     assert untimed(shared.table) == untimed(serial.table)
     read = [
         [json.loads(line) for line in (folder / "rows.jsonl").read_text().splitlines()]
@@ -318,6 +319,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert [line["distance_m"] for line in summary["table"]] == [0.5, 1.0, 1.5, 2.0, 2.5]
     assert main(["reproduce", "oikonomidis-2b", *tiny]) == 0
     text = capsys.readouterr().out
+    assert "5 cells, 5 of them from before" in text
     assert "at most 7.5 mm" in text
     assert f"{summary['comparisons'][1]['ours']:.3g} mm" in text
 

@@ -20,7 +20,8 @@ class Command:
     """Repeat the experiments of a paper: a table, a picture, our figures beside the paper's, and the time it took.
 
     Every figure gets a folder under DIR: rows.jsonl with a row a measurement, table.csv, summary.json, figure.png.
-    Rows are written as they come; the same command goes on where an interrupted one stood.
+    Rows are written as they come; the same command goes on where an interrupted one stood. After a change of the
+    code, choose a new DIR.
     """
 
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
@@ -89,18 +90,20 @@ class Command:
 def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterable[dict[str, object]]]":
     from tqdm import tqdm
 
-    return lambda rows, total, before: tqdm(rows, name, total, initial=before, unit="cell", disable=None, leave=False)
+    return lambda rows, total, reused: tqdm(rows, name, total, initial=reused, unit="cell", disable=None, leave=False)
 
 
 def _as_text(done: "Reproduction", folder: Path) -> str:
     from depthtrack.evaluation.bench.table import aligned
 
     lines = [("", "paper, in its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
+    reused = f"{done.reused} of them from before, " if done.reused else ""
+    time = f"{done.seconds:.0f} s ({done.cell_seconds:.0f} s in the workers together)"
     return "\n".join(
         [
             f"{done.figure}: {done.title} ({done.source})",
             *(f"  {line}" for line in aligned(lines, left=2)),
-            f"  {done.cells} cells, {done.seconds:.0f} s ({done.cell_seconds:.0f} s in the workers together): {folder}",
+            f"  {done.cells} cells, {reused}{time}: {folder}",
             "",
         ]
     )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import PALM_HALF_THICKNESS, Observation
+from depthtrack.observation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
         origin=(left, top),
         skin=np.ascontiguousarray(frame.skin[window]),
         depth=depth,
-        centre=surface + PALM_HALF_THICKNESS * inwards,
+        centre=surface + hand.palm_thickness * hand.scale / 2 * inwards,
         palm_radius=hand.palm_breadth * hand.scale / 2,
     )
 

@@ -28,8 +28,9 @@ Progress = Callable[[Iterator[Row], int, int], Iterable[Row]]
 class Reproduction:
     """A figure, reproduced.
 
-    `seconds` that this call took, `cell_seconds` that all cells together took, now or before; `table` as the
-    experiment tabulates its rows; `machine` that called (a cluster's workers may be others).
+    `cells` in all, `reused` of which the folder had rows already; `seconds` that this call took, `cell_seconds` that
+    all cells together took, now or before; `table` as the experiment tabulates its rows; `machine` that called (a
+    cluster's workers may be others).
     """
 
     figure: str
@@ -38,6 +39,7 @@ class Reproduction:
     options: ExperimentOptions
     machine: Machine
     cells: int
+    reused: int
     seconds: float
     cell_seconds: float
     comparisons: list[Comparison]
@@ -52,15 +54,15 @@ def reproduce(
     options: ExperimentOptions,
     folder: Path,
     workers: Workers,
-    progress: Progress = lambda rows, total, before: rows,
+    progress: Progress = lambda rows, total, reused: rows,
 ) -> Reproduction:
     """Measure the cells that `folder` has no row of yet, then write table, picture and summary there."""
     begun = perf_counter()
     machine = describe_machine()
     cells = [full_cell(experiment, cell) for cell in experiment.cells(options)]
     with Journal(folder / "rows.jsonl", list(cells[0])) as journal:
-        before = sum(journal.get(cell) is not None for cell in cells)
-        rows = run_sweep(measure_cell, cells, journal, workers, lambda rows: progress(rows, len(cells), before))
+        reused = sum(journal.get(cell) is not None for cell in cells)
+        rows = run_sweep(measure_cell, cells, journal, workers, lambda rows: progress(rows, len(cells), reused))
     done = Reproduction(
         figure=experiment.name,
         title=experiment.title,
@@ -68,6 +70,7 @@ def reproduce(
         options=options,
         machine=machine,
         cells=len(cells),
+        reused=reused,
         seconds=round(perf_counter() - begun, 3),
         cell_seconds=round(sum(row["seconds"] for row in rows), 3),
         comparisons=experiment.compare(rows),
