@@ -50,9 +50,11 @@ class Command:
     """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
 
     def run(self) -> None:
+        from depthtrack.viewing.moments import sequence_depth_range
+
         self._check_options()
         sequence = self.recording.open()
-        near, far = self.depth_range or _depth_range(sequence)
+        near, far = self.depth_range or sequence_depth_range(sequence)
         if self.sheet is not None:
             self._write_sheet(sequence, self.sheet, near, far)
         if self.strip is not None:
@@ -158,16 +160,6 @@ class Command:
         from depthtrack.viewing.estimated_masks import mask_estimator
 
         return mask_estimator()
-
-
-def _depth_range(sequence: "Sequence") -> tuple[float, float]:
-    """Near and far of a few frames spread over the recording, in metres."""
-    import numpy as np
-
-    from depthtrack.viewing.depth_colours import depth_range
-    from depthtrack.viewing.moments import evenly_chosen
-
-    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
 
 
 def _why_no_window() -> str | None:

@@ -74,18 +74,22 @@ class Observation:
 class Observer:
     """Turns frames into observations; remembers where the hand was, as `segmentation.Segmenter` does.
 
-    `skin_model` is used where frames have colour; None uses depth alone.
+    `skin_model` is used where frames have colour; None uses depth alone. `wrist_margin` (metres) keeps that much of
+    the forearm beyond the wrist.
     """
 
-    def __init__(self, skin_model: SkinModel | None = None) -> None:
-        self._segmenter = Segmenter(skin_model)
+    def __init__(self, skin_model: SkinModel | None = None, wrist_margin: float = 0.0) -> None:
+        self._segmenter = Segmenter(skin_model, wrist_margin)
 
     @classmethod
-    def for_sequence(cls, sequence: Sequence, skin_model: Path | None = None) -> Self:
+    def for_sequence(
+        cls, sequence: Sequence, skin_model: Path | None = None, use_colour: bool = True, wrist_margin: float = 0.0
+    ) -> Self:
         """With skin colours, those of a file or the published ones, for a recording that has colour."""
-        if sequence[0].colour is None:
-            return cls(None)
-        return cls(SkinModel.default() if skin_model is None else SkinModel.load(skin_model))
+        first = next(iter(sequence), None)
+        if not use_colour or first is None or first.colour is None:
+            return cls(None, wrist_margin)
+        return cls(SkinModel.default() if skin_model is None else SkinModel.load(skin_model), wrist_margin)
 
     def observe(self, frame: Frame, place: HandPlace | None = None) -> Observation | None:
         """What is seen of the hand, or None without one. `place` is where a tracker is sure to find it."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from depthtrack.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
+from depthtrack.viewing.depth_colours import depth_range
 
 Pixel = TypeVar("Pixel", bound=np.generic)
 
@@ -103,6 +104,11 @@ def evenly_chosen(length: int, count: int) -> list[int]:
     """At most `count` different indices below `length`, in order: the middles of as many equal parts."""
     count = min(length, count)
     return [int((part + 0.5) * length / count) for part in range(count)]
+
+
+def sequence_depth_range(sequence: Sequence) -> tuple[float, float]:
+    """Near and far, metres, of a few frames spread over a recording: one scale for all of its pictures."""
+    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
 
 
 def _crop(image: NDArray[Pixel], left: int, top: int, width: int, height: int) -> NDArray[Pixel]:

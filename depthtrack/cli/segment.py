@@ -1,0 +1,104 @@
+"""`depthtrack segment`: the hand in every frame, to look at and in figures."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from depthtrack.evaluation.segmentation import SegmentedFrame
+    from depthtrack.recording import Sequence
+
+
+@dataclass(frozen=True)
+class Command:
+    """Find the hand in every frame, by skin colour and depth, its bare forearm cut off at the wrist.
+
+    Writes an overlay video, a contact sheet and a table, and tells how well the result agrees with the recording's
+    true silhouettes where it knows them.
+    """
+
+    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
+    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FOLDER")] = None
+    """Folder to write to; NAME-segmented here unless given."""
+    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+    depth_only: bool = False
+    """Leave colour aside."""
+    wrist_margin: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
+    """Keep so much of the forearm beyond the wrist, to compare with silhouettes that do."""
+    json: bool = False
+    """Print JSON instead of text."""
+
+    def run(self) -> None:
+        from json import dumps
+
+        from depthtrack.evaluation.segmentation import segment_sequence, summary
+        from depthtrack.observation.observation import Observer
+
+        if not -50 <= self.wrist_margin <= 200:
+            raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
+        sequence = self.recording.open()
+        observer = Observer.for_sequence(
+            sequence, self.skin_model, use_colour=not self.depth_only, wrist_margin=self.wrist_margin / 1000
+        )
+        folder = self.out or Path(f"{sequence.name}-segmented")
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = list(self._written(sequence, segment_sequence(sequence, observer), folder))
+        report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
+        print(dumps(report, indent=2) if self.json else _text(report))
+
+    def _written(
+        self, sequence: "Sequence", results: "Iterator[SegmentedFrame]", folder: Path
+    ) -> "Iterator[dict[str, Any]]":
+        """Pass on the figures of each frame, while video, contact sheet and table are made of the whole."""
+        import csv
+
+        from tqdm import tqdm
+
+        from depthtrack.viewing.contact_sheet import contact_sheet, describe, frame_rate, save_picture
+        from depthtrack.viewing.moments import Moment, evenly_chosen, sequence_depth_range
+        from depthtrack.viewing.panels import panel
+        from depthtrack.viewing.video import VideoWriter
+
+        chosen, shown = set(evenly_chosen(len(sequence), 12)), []
+        near, far = sequence_depth_range(sequence)
+        table = folder / ".segments.csv.part"
+        with (
+            VideoWriter(folder / "overlay.mp4", frame_rate(sequence) or 30.0) as video,
+            table.open("w", newline="", encoding="utf-8") as file,
+            tqdm(total=len(sequence), unit="frame", delay=1, leave=False, disable=None) as bar,
+        ):
+            rows: csv.DictWriter[str] | None = None
+            for result in results:
+                moment = Moment(result.frame, result.mask)
+                video.write(panel(moment, ("depth", "mask"), 360, near, far))
+                if result.frame.index in chosen:
+                    shown.append(moment)
+                row = result.row()
+                if rows is None:
+                    rows = csv.DictWriter(file, row)
+                    rows.writeheader()
+                rows.writerow(row)
+                bar.update()
+                yield row
+        table.replace(folder / "segments.csv")
+        save_picture(contact_sheet(shown, sequence.name, describe(sequence), near, far), folder / "contact-sheet.png")
+
+
+def _text(report: dict[str, Any]) -> str:
+    iou = report["mean_iou"]
+    ms = report["ms_per_frame"]
+    lines = [
+        f"{report['recording']}: a hand in {report['frames_with_hand']} of {report['frames']} frames",
+        *([] if iou is None else [f"mean overlap with the true silhouette (IoU) {iou:.3f}"]),
+        *([] if ms is None else [f"{ms['median']:.1f} ms a frame (95 %: {ms['p95']:.1f} ms)"]),
+        f"look at {report['written_to']}/contact-sheet.png and overlay.mp4; figures are in segments.csv",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,38 @@
+"""`depthtrack train-skin`: a skin colour model from labelled images."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from depthtrack.errors import InputError
+
+
+@dataclass(frozen=True)
+class Command:
+    """Learn skin colours where the published statistics do not fit: other light, other cameras.
+
+    Give a folder of images and one of masks, white on skin, with the same names; or a recording with colour and
+    hand_mask/, whose forearms should then be covered. Use the result with --skin-model.
+    """
+
+    images: Annotated[Path, tyro.conf.Positional]
+    """Folder of images, or a recording."""
+    masks: Annotated[Path | None, tyro.conf.Positional] = None
+    """Folder of masks; not needed for a recording."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")] = None
+    """Where to write the model."""
+
+    def run(self) -> None:
+        from tqdm import tqdm
+
+        from depthtrack.observation.labelled_images import from_folders, from_recording
+        from depthtrack.observation.skin_colour import SkinModel
+
+        if self.out is None:
+            raise InputError("say where to write the model: -o FILE.json")
+        labelled = from_recording(self.images) if self.masks is None else from_folders(self.images, self.masks)
+        model = SkinModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))
+        model.save(self.out)
+        print(f"{self.out}: {100 * model.prior:.1f} % of the pixels were skin; use it with --skin-model {self.out}")

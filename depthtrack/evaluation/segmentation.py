@@ -1,0 +1,80 @@
+"""How well the hand is cut out of a recording, frame by frame."""
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.observation.observation import Observation, Observer
+from depthtrack.recording.sequence import Frame, Sequence
+
+
+@dataclass(frozen=True)
+class SegmentedFrame:
+    """One frame's result. `mask` (h, w) covers the whole frame, None where no hand was found; `iou` with the true
+    silhouette, None where that is not known; `ms` milliseconds to observe the frame, point cloud included."""
+
+    frame: Frame
+    observation: Observation | None
+    mask: NDArray[np.bool_] | None
+    iou: float | None
+    ms: float
+
+    def row(self) -> dict[str, Any]:
+        """Figures for a table; centre in metres, area in pixels."""
+        x, y, z = (None,) * 3 if self.observation is None else (float(c) for c in self.observation.centre)
+        return {
+            "index": self.frame.index,
+            "timestamp": self.frame.timestamp,
+            "found": self.mask is not None,
+            "centre_x": x,
+            "centre_y": y,
+            "centre_z": z,
+            "area_px": 0 if self.mask is None else int(self.mask.sum()),
+            "iou": self.iou,
+            "ms": round(self.ms, 3),
+        }
+
+
+def segment_sequence(sequence: Sequence, observer: Observer) -> Iterator[SegmentedFrame]:
+    """Observe every frame of a recording, in order."""
+    for frame in sequence:
+        begun = time.perf_counter()
+        observation = observer.observe(frame)
+        if observation is not None:
+            observation.points  # noqa: B018 (the cloud belongs to the observation's cost)
+        ms = 1e3 * (time.perf_counter() - begun)
+        mask = None if observation is None else whole_mask(observation, frame.depth.shape)
+        truth = sequence.hand_mask(frame.index)
+        yield SegmentedFrame(frame, observation, mask, None if truth is None else overlap(mask, truth), ms)
+
+
+def whole_mask(observation: Observation, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """The hand's silhouette over the whole frame (h, w)."""
+    mask = np.zeros(shape, dtype=np.bool_)
+    left, top = observation.origin
+    mask[top : top + observation.camera.height, left : left + observation.camera.width] = observation.skin
+    return mask
+
+
+def overlap(mask: NDArray[np.bool_] | None, truth: NDArray[np.bool_]) -> float:
+    """Intersection over union of two silhouettes (h, w), the Jaccard index; two empty ones agree."""
+    if mask is None:
+        return float(not truth.any())
+    union = np.count_nonzero(mask | truth)
+    return 1.0 if union == 0 else np.count_nonzero(mask & truth) / union
+
+
+def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """From the frames' rows: mean IoU (None where no truth is known), frames with a hand, milliseconds a frame."""
+    rows = list(rows)
+    ious, times = [row["iou"] for row in rows if row["iou"] is not None], [row["ms"] for row in rows]
+    return {
+        "frames": len(rows),
+        "frames_with_hand": sum(row["found"] for row in rows),
+        "mean_iou": float(np.mean(ious)) if ious else None,
+        "ms_per_frame": {"median": float(np.median(times)), "p95": float(np.percentile(times, 95))} if rows else None,
+    }
