@@ -31,7 +31,8 @@ HALF, AXIS_NEAR, AXIS_FAR, ROWS_PER_AXIS = 19, 20, 21, 22
 COEFFICIENT_ROWS = 23
 
 STEEP = 1e20
-"""Factor on all that is about the axis: e w is above any depth a hair inside the segment, and below 0 outside."""
+"""Factor on all that concerns the axis. What is to be >= 0 is then above any w a hair inside the segment, and far below
+0 outside: the least of it and w is w where the segment is, and nothing elsewhere."""
 
 
 @kernel_part
