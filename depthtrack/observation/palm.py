@@ -40,6 +40,9 @@ PALM_RADII = (0.012, 0.058)
 LIMB_AREA = 10e-4
 """Square metres of surface between HAND_REACH and EXIT_REACH that make a limb; noise and held things show less."""
 
+FINGER_AREA = 25e-4
+"""Square metres of a finger, at most, that may be seen there."""
+
 LARGEST_EXIT = 150e-4
 """Square metres that an arm shows between those distances, at most: 8 cm of one 12 cm wide, and half as much again."""
 
@@ -122,20 +125,23 @@ def palm_near(grid: Grid, surface: Grid, tip: int) -> Palm | None:
 
 
 def _limbs(grid: Grid, paths: Paths) -> tuple[Nodes, ...] | None:
-    """What goes on beyond the reach of the hand from whose palm the paths come (what it holds ends there), or None
-    where that is nothing that a hand could be the end of."""
-    near, edge = paths.reached(HAND_REACH), grid.edge
+    """What goes on beyond the reach of the hand from whose palm the paths come, towards the body if anything does, or
+    None where that is nothing that a hand could be the end of. What a hand holds ends within EXIT_REACH."""
+    near, edge, area = paths.reached(HAND_REACH), grid.edge, grid.areas
     labels, _ = grid.within(~near).surfaces()
     far = paths.reached() & ~near
     goes_on = np.unique(labels[far & ((paths.distance > EXIT_REACH - 0.01) | edge)])
-    limbs = tuple(np.flatnonzero((labels == label) & far) for label in goes_on)
-    areas = [float(grid.areas.flat[limb].sum()) for limb in limbs]
-    # A limb that is cut off by the view on this side and ends freely on the other is a hand's the other way round.
     leads_home = np.isin(goes_on, labels[edge])
+    areas = np.array([area[(labels == label) & far].sum() for label in goes_on])
+    # A limb that is cut off by the view on this side and ends freely on the other is a hand's the other way round.
     backwards = bool(np.any(near & edge)) and not leads_home.all()
-    if backwards or sum(area > LIMB_AREA for area in areas) > 1 or sum(areas) > LARGEST_EXIT:
+    # Beside an arm, what is no larger than a finger is one, seen from a palm that is not quite where it was thought.
+    has_arm = leads_home.any() or np.any(areas > FINGER_AREA)
+    counts = (areas > (FINGER_AREA if has_arm else LIMB_AREA)) | (leads_home & (areas > LIMB_AREA))
+    if backwards or counts.sum() > 1 or areas.sum() > LARGEST_EXIT:
         return None
-    return limbs
+    limbs = goes_on[leads_home] if leads_home.any() else goes_on[counts] if counts.any() else goes_on
+    return tuple(np.flatnonzero((labels == label) & far) for label in limbs)
 
 
 def finger_area(surface: Grid, palm: Palm) -> float:

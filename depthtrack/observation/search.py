@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 SLICE, SLICE_STEP = 0.35, 0.2
 """Metres: a start looks at the nearest things first, in slices this thick: a hand and a forearm that points away."""
 
-LARGEST_STEP = 0.15
-"""Metres that a palm moves between frames, at most: 4.5 m/s at 30 Hz. What is farther is something else."""
+LARGEST_STEP = 0.12
+"""Metres that a palm moves between frames, at most: 3.6 m/s at 30 Hz. What is farther is something else."""
 
 SURE_COST = -0.05
 """Metres: a palm of usual breadth within 5 cm of its last position needs no comparison with others."""
@@ -27,8 +27,11 @@ USUAL_WRIST, NO_ARM_COST = 0.06, 0.1
 DISTANCE_WEIGHT = 0.25
 
 
-def find_start(grid: Grid, surface: Grid) -> Array | None:
-    """Where a hand is (3,), metres, among the nodes of `surface` that may be hand; nearest things first."""
+def find_start(grid: Grid, surface: Grid, lost: Array | None = None) -> Array | None:
+    """Where a hand is (3,), metres, among the nodes of `surface` that may be hand; nearest things first.
+
+    `lost` (3,) is where it was a moment ago, if it was seen.
+    """
     depths = np.sort(surface.depth[surface.depth > 0])
     area = np.cumsum(depths**2) / (grid.focal[0] * grid.focal[1])
     if area.size == 0 or area[-1] < SMALLEST_AREA:
@@ -40,17 +43,18 @@ def find_start(grid: Grid, surface: Grid) -> Array | None:
         near, hands = grid.within(part), surface.within(part)
         palms = list(find_palms(near, hands))
         if palms:
-            return min(palms, key=lambda palm: start_cost(near, hands, palm)).centre
+            return min(palms, key=lambda palm: start_cost(near, hands, palm, lost)).centre
         start += SLICE_STEP
     return None
 
 
-def start_cost(grid: Grid, surface: Grid, palm: Palm) -> float:
-    """Metres: how near a palm is, less what speaks for it: breadth, fingers, and a wrist right behind it."""
-    arm = find_arm(grid, palm, anatomical_guess(palm))
-    wrist = NO_ARM_COST if arm is None else min(max(narrowest_place(grid, palm, arm) - USUAL_WRIST, 0), 0.15)
+def start_cost(grid: Grid, surface: Grid, palm: Palm, lost: Array | None) -> float:
+    """Metres: how far a palm is, less what speaks for it: breadth, fingers, and a wrist right behind it."""
     fingers = FINGER_BONUS * min(finger_area(surface, palm) / FINGER_AREA, 1)
-    return DISTANCE_WEIGHT * float(palm.centre[2]) + wrist - _breadth_bonus(palm) - fingers
+    distance = DISTANCE_WEIGHT * float(palm.centre[2])
+    if lost is not None:
+        distance += float(np.linalg.norm(palm.centre - lost))
+    return distance + _wrist_cost(grid, palm) - _breadth_bonus(palm) - fingers
 
 
 def nearest_palm(grid: Grid, surface: Grid, last: Array) -> Palm | None:
@@ -58,12 +62,21 @@ def nearest_palm(grid: Grid, surface: Grid, last: Array) -> Palm | None:
     nearest, lowest = None, np.inf
     for palm in find_palms(grid, surface):
         distance = float(np.linalg.norm(palm.centre - last))
+        if distance > LARGEST_STEP:
+            continue
         cost = distance - _breadth_bonus(palm)
-        if cost < lowest and distance < LARGEST_STEP:
+        if cost < SURE_COST:
+            return palm
+        cost += _wrist_cost(grid, palm)
+        if cost < lowest:
             nearest, lowest = palm, cost
-            if cost < SURE_COST:
-                break
     return nearest
+
+
+def _wrist_cost(grid: Grid, palm: Palm) -> float:
+    """A hand has a wrist right behind it; an elbow or a stump of an arm has not."""
+    arm = find_arm(grid, palm, anatomical_guess(palm))
+    return NO_ARM_COST if arm is None else min(max(narrowest_place(grid, palm, arm) - USUAL_WRIST, 0), 0.15)
 
 
 def _breadth_bonus(palm: Palm) -> float:

@@ -82,13 +82,13 @@ class Segmenter:
             return guided
         if not 0 <= frame.timestamp - self._last_time <= MEMORY:
             self._last = None
-        last, self._last = self._last, None
-        found = None if last is None else self._follow(frame, last)
+        found = None if self._last is None else self._follow(frame, self._last)
         if found is None:
             self._forget_arm()
             start = self._start(frame)
             found = None if start is None else self._follow(frame, start)
-        self._last_time = frame.timestamp
+        if found is not None:
+            self._last_time = frame.timestamp
         return found
 
     def _guided(self, frame: Frame, place: HandPlace) -> Segmentation | None:
@@ -105,7 +105,7 @@ class Segmenter:
         """Where a hand is (3,), metres, looking at the whole frame."""
         stride = max(1, round(frame.camera.width / START_COLUMNS))
         view = look(frame, Window.whole(frame.camera), (NEAREST, FARTHEST), stride, self._skin)
-        return find_start(view.grid, view.surface)
+        return find_start(view.grid, view.surface, self._last)
 
     def _follow(self, frame: Frame, last: Array) -> Segmentation | None:
         """The hand within DEPTH_WINDOW of its last position (3,)."""
