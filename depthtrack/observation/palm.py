@@ -134,7 +134,7 @@ def _limbs(grid: Grid, paths: Paths) -> tuple[Nodes, ...] | None:
     leads_home = np.isin(goes_on, labels[edge])
     areas = np.array([area[(labels == label) & far].sum() for label in goes_on])
     # A limb that is cut off by the view on this side and ends freely on the other is a hand's the other way round.
-    backwards = bool(np.any(near & edge)) and not leads_home.all()
+    backwards = bool(np.any(near & edge) and np.any(areas[~leads_home] > FINGER_AREA))
     # Beside an arm, what is no larger than a finger is one, seen from a palm that is not quite where it was thought.
     has_arm = leads_home.any() or np.any(areas > FINGER_AREA)
     counts = (areas > (FINGER_AREA if has_arm else LIMB_AREA)) | (leads_home & (areas > LIMB_AREA))
