@@ -1,6 +1,5 @@
 """Every vector operation of compiled kernels against numpy, lane by lane."""
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -176,36 +175,3 @@ def test_vectors_of_different_kinds_do_not_mix() -> None:
     wide, narrow = loader(F64X8), loader(F32X16)
     with pytest.raises(TypingError):
         numba.njit(lambda a, b: functions.vsum(wide(a, 0) + narrow(b, 0)))(np.zeros(8), np.zeros(16, np.float32))
-
-
-@numba.njit(nogil=True)
-def _take(counter: NDArray[np.int64], amount: int, stop: int, tickets: NDArray[np.int64]) -> int:
-    """Take tickets until they run out; returns how many."""
-    taken = 0
-    while True:
-        ticket = simd.fetch_add(counter, amount)
-        if ticket >= stop:
-            return taken
-        tickets[taken] = ticket
-        taken += 1
-
-
-@pytest.mark.parametrize("amount", [1, 3])
-def test_threads_get_every_ticket_once(amount: int) -> None:
-    stop, counter = 600_000, np.zeros(1, np.int64)
-    tickets = [np.empty(stop, np.int64) for _ in range(2)]
-    _take(np.array([stop]), amount, stop, tickets[0])  # compiled before the race
-    start, taken = threading.Barrier(2), [0, 0]
-
-    def work(which: int) -> None:
-        start.wait()
-        taken[which] = _take(counter, amount, stop, tickets[which])
-
-    threads = [threading.Thread(target=work, args=(which,)) for which in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    given = np.concatenate([own[:count] for own, count in zip(tickets, taken, strict=True)])
-    np.testing.assert_array_equal(np.sort(given), np.arange(0, stop, amount))
-    assert counter[0] == stop + 2 * amount  # each thread found out by asking once more

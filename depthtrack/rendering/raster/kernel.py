@@ -15,7 +15,6 @@ from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.simd import (
     F32X16,
     both,
-    fetch_add,
     filler,
     kernel_part,
     loader,
@@ -32,6 +31,7 @@ from depthtrack.rendering.raster.simd_functions import (
 )
 from depthtrack.rendering.raster.spans import find_spans
 from depthtrack.rendering.raster.stripes import BLOCK, COLUMNS, ROWS
+from depthtrack.rendering.raster.tickets import give_back, take
 from depthtrack.rendering.surface import NEAR
 
 Array = NDArray[np.float64]
@@ -146,7 +146,9 @@ def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth
 @numba.njit(cache=True, nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
-    counter: NDArray[np.int64],
+    tickets: NDArray[np.int64],
+    thread: int,
+    patience: int,
     hand: Array,
     camera: Array,
     observed: Array32,
@@ -163,7 +165,7 @@ def score_poses(
     sums: Array,
     energies: Array,
 ) -> None:
-    """Score poses until the shared `counter` runs out of them; several threads may work on one batch.
+    """Score the poses that `tickets` are for, together with other threads; see `tickets.take` for when this returns.
 
     `poses` (B, 27); `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes; `empty` the sums of
     Eq. (2) for an empty image; `objective`: d_m, d_M, unit, epsilon, lambda, lambda_k. Writes `sums` (B, 3) and
@@ -172,8 +174,8 @@ def score_poses(
     """
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
     while True:
-        n = fetch_add(counter, 1)
-        if n >= poses.shape[0]:
+        n = take(tickets, thread, patience)
+        if n < 0:
             break
         blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
         clamped, on_skin, matched = _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth)
@@ -181,6 +183,7 @@ def score_poses(
         sums[n, 1] = on_skin
         sums[n, 2] = empty[2] + matched - on_skin
         energies[n] = _energy(poses[n], sums[n], objective)
+        give_back(tickets, thread)
 
 
 @kernel_part

@@ -1,20 +1,27 @@
 """The `raster` backend: prepares arrays, shares a batch among threads."""
 
+import time
+import weakref
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, Terms
 from depthtrack.rendering.raster import kernel, layout, quadrics, stripes
 from depthtrack.rendering.raster.helper import Helper
+from depthtrack.rendering.raster.tickets import Tickets, is_done, new_tickets, offer, tell_to_leave
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
 
 Array = NDArray[np.float64]
+_PATIENCE = 4000
+"""Looks at an exhausted batch before a thread goes to sleep: some 0.2 ms, enough for a swarm to be moved."""
 
 
 @dataclass
@@ -43,7 +50,10 @@ class _Workspace:
 
 
 class RasterScorer(ScorerBase):
-    """CPU rasteriser; `threads` share each batch, and the energies' bits do not depend on how many there are."""
+    """CPU rasteriser; `threads` share each batch, and the energies' bits do not depend on how many there are.
+
+    Between batches that follow each other closely the threads beyond the first stay awake, and keep their cores busy.
+    """
 
     name = "raster"
 
@@ -55,20 +65,25 @@ class RasterScorer(ScorerBase):
         self._constants = np.array(
             [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.skin_weight, o.kinematic_weight]
         )
-        self._counter = np.zeros(1, np.int64)
-        self._helpers = [Helper() for _ in range(threads - 1)]
+        self._camera, self._empty = np.empty(8), np.empty(3)
+        self._make_room(256)
+        self._tickets = new_tickets(threads)
+        # Threads know the scorer weakly, so that one that was forgotten rather than closed ends them too.
+        self._helpers = [Helper(partial(_help, weakref.ref(self), n)) for n in range(1, threads)]
+        self._dismiss = weakref.finalize(self, _dismiss, self._tickets, self._helpers)
 
     def observe(self, target: Target) -> None:
         shape = target.camera.shape
         if self._target is None or self._target.camera.shape != shape:
+            self._send_to_sleep()
             self._workspaces = [_Workspace.of(shape) for _ in range(len(self._helpers) + 1)]
             self._observed, self._skin = stripes.new_stripes(shape), stripes.new_stripes(shape)
         stripes.write_stripes(target.depth, np.nan, self._observed)
         stripes.write_stripes(target.skin, 0, self._skin)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
-        self._empty = np.array([clamped, 0.0, np.count_nonzero(target.skin)])
+        self._empty[:] = clamped, 0.0, np.count_nonzero(target.skin)
         c = target.camera
-        self._camera = np.array([c.fx, c.fy, c.cx, c.cy, 1 / c.fx, 1 / c.fy, c.width, c.height], np.float64)
+        self._camera[:] = c.fx, c.fy, c.cx, c.cy, 1 / c.fx, 1 / c.fy, c.width, c.height
         self._target = target
 
     def score(self, poses: ArrayLike) -> Array:
@@ -80,42 +95,73 @@ class RasterScorer(ScorerBase):
         return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
 
     def render(self, pose: ArrayLike) -> NDArray[np.float32]:
-        batch, space = as_batch(np.asarray(pose)[None]), self._workspaces[0]
+        shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
+        space = self._workspaces[0]
         kernel.draw_pose(batch[0], self._hand, self._camera, *space.arrays)
-        inverse = stripes.read_stripes(space.buffer, self.target.camera.shape)
+        inverse = stripes.read_stripes(space.buffer, shape)
         depth = np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
         space.buffer[:] = 0
         return depth
 
     def close(self) -> None:
-        for helper in self._helpers:
-            helper.stop()
-        self._helpers = []
+        self._dismiss()
 
     def _sums_and_energies(self, poses: Array) -> tuple[Array, Array]:
         self.target  # noqa: B018 (raises before the first observation)
-        sums, energies = np.empty((len(poses), 3)), np.empty(len(poses))
-        self._counter[0] = 0
+        count = len(poses)
+        self._settle()
+        if count > len(self._poses):
+            self._send_to_sleep()
+            self._make_room(count)
+        self._poses[:count] = poses
+        offer(self._tickets, count)
+        if count > 1:
+            for helper in self._helpers:
+                helper.wake()
+        # Each pose is scored whole by whichever thread takes it: the same bits for any number of them.
+        self._work(0)
+        self._settle()
+        return self._sums[:count].copy(), self._energies[:count].copy()
 
-        def work(space: _Workspace) -> None:
-            kernel.score_poses(
-                poses,
-                self._counter,
-                self._hand,
-                self._camera,
-                self._observed,
-                self._skin,
-                self._empty,
-                self._constants,
-                *space.arrays,
-                sums,
-                energies,
-            )
+    def _work(self, thread: int) -> None:
+        kernel.score_poses(
+            self._poses,
+            self._tickets,
+            thread,
+            _PATIENCE,
+            self._hand,
+            self._camera,
+            self._observed,
+            self._skin,
+            self._empty,
+            self._constants,
+            *self._workspaces[thread].arrays,
+            self._sums,
+            self._energies,
+        )
 
-        # Each pose is scored whole by whichever thread is free: the same bits for any number of them.
-        for helper, space in zip(self._helpers, self._workspaces[1:], strict=True):
-            helper.start(work, space)
-        work(self._workspaces[0])
-        for helper in self._helpers:
-            helper.wait()
-        return sums, energies
+    def _settle(self) -> None:
+        """Wait for poses that other threads still have in hand."""
+        while not is_done(self._tickets):
+            time.sleep(0)
+
+    def _send_to_sleep(self) -> None:
+        """Have no other thread look at any array, so that they can be replaced."""
+        tell_to_leave(self._tickets, True)
+        while not all(helper.is_idle for helper in self._helpers):
+            time.sleep(0)
+        tell_to_leave(self._tickets, False)
+
+    def _make_room(self, count: int) -> None:
+        self._poses, self._sums, self._energies = np.empty((count, POSE_SIZE)), np.empty((count, 3)), np.empty(count)
+
+
+def _help(scorer: "weakref.ref[RasterScorer]", thread: int) -> None:
+    if (alive := scorer()) is not None:
+        alive._work(thread)
+
+
+def _dismiss(tickets: Tickets, helpers: list[Helper]) -> None:
+    tell_to_leave(tickets, True)
+    while helpers:
+        helpers.pop().stop()

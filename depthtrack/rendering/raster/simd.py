@@ -213,15 +213,3 @@ def filler(vector: Vector) -> Any:
         return vector(scalar), generate
 
     return fill
-
-
-@intrinsic
-def fetch_add(typing_context: Any, counter: types.Type, amount: types.Type) -> Any:
-    """Add to counter[0] (an int64 array) as one indivisible step and return what it held: hands out work to threads."""
-
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
-        data = context.make_array(counter)(context, builder, arguments[0]).data
-        step = context.cast(builder, arguments[1], amount, types.int64)
-        return builder.atomic_rmw("add", data, step, "monotonic")
-
-    return types.int64(counter, amount), generate
