@@ -76,8 +76,9 @@ def follow(
         seed=repetition,
         renderer=renderer,
         resolution=resolution,
-        # No search after a loss: it would cost more than many frames of a small swarm.
+        # Never lost: a search would cost more than many frames of a small swarm, and noise is no loss.
         lost_energy=np.inf,
+        lost_confidence=0.0,
     )
     with closing(PsoTracker(seen.hand, options)) as tracker:
         estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]
