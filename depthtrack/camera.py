@@ -109,10 +109,10 @@ class Camera:
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
         # Between a 170 degree and a 0.5 degree field of view: outside it, units or columns were mixed up.
-        if not all(0.04 <= focal / max(camera.shape) <= 120 for focal in (camera.fx, camera.fy)):
-            raise InputError(
-                f"{where}: fx and fy must be focal lengths in pixels, found {camera.fx:g} and {camera.fy:g}"
-            )
+        for name in ("fx", "fy"):
+            focal = getattr(camera, name)
+            if not 0.04 <= focal / max(camera.shape) <= 120:
+                raise InputError(f"{where}: {name} must be a focal length in pixels, found {focal:g}")
         return camera
 
 
