@@ -9,8 +9,11 @@ demo: .venv/.ready
 	$(BIN)/depthtrack synth everyday out/everyday --model skin --sensor kinect1 --background room --overwrite
 	$(BIN)/depthtrack info out/everyday
 	$(BIN)/depthtrack segment out/everyday -o out/segmented
+	rm -rf out/run
+	$(BIN)/depthtrack track out/everyday -o out/run
+	$(BIN)/depthtrack evaluate out/run
 	$(BIN)/depthtrack view out/everyday --sheet out/everyday.png
-	@echo "Look at out/everyday.png, and at the hand found in every frame: out/segmented"
+	@echo "Look at out/everyday.png, and at the hand found in every frame: out/segmented/overlay.mp4"
 
 test: .venv/.ready-test lint
 	$(BIN)/python -m pytest
