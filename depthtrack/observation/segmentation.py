@@ -11,7 +11,7 @@ from depthtrack.observation.guided import PALM_HALF_THICKNESS, HandPlace, find_e
 from depthtrack.observation.hand_pixels import hand_masks, label_hand
 from depthtrack.observation.palm import Palm
 from depthtrack.observation.search import find_start, nearest_palm
-from depthtrack.observation.skin_colour import MAYBE_SKIN, NOT_SKIN, SURELY_SKIN, AdaptiveSkin, SkinModel
+from depthtrack.observation.skin_colour import AdaptiveSkin, SkinModel
 from depthtrack.observation.view import View, blind_skin, look
 from depthtrack.observation.window import Window
 from depthtrack.observation.wrist import WristFilter, WristPlane, arm_nodes, find_wrist, palm_centre
@@ -145,11 +145,9 @@ class Segmenter:
         self._wrist.forget()
 
     def _learn(self, view: View, roi: Window, hand: Mask) -> None:
-        """Adapt to the colours of the hand's skin and of what is no skin; skin elsewhere, as the arm's, is left out."""
+        """Adapt to the colours of the hand and of what is around it."""
         if self._skin is None or view.skin is None or view.frame.colour is None:
             return
         left, top = roi.left - view.window.left, roi.top - view.window.top
-        skin = view.skin[top : top + roi.height : 2, left : left + roi.width : 2]
-        hand = hand[::2, ::2]
-        labels = np.where(hand == (skin > 0), np.where(hand, np.uint8(SURELY_SKIN), np.uint8(NOT_SKIN)), MAYBE_SKIN)
-        self._skin.learn(np.ascontiguousarray(view.frame.colour[roi.slices][::2, ::2]), labels.astype(np.uint8))
+        skin = view.skin[top : top + roi.height, left : left + roi.width]
+        self._skin.learn(view.frame.colour, roi, np.ascontiguousarray(skin), np.ascontiguousarray(hand))

@@ -20,8 +20,8 @@ from depthtrack.errors import InputError
 from depthtrack.observation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.observation.window import Window
 
-BINS = 64
-"""Bins along U and along V; each holds 4 of the 256 levels."""
+BINS, LEVELS = 64, 32
+"""Bins along U and along V, and steps of R, G and B by which a colour's bin is looked up."""
 
 T_MAX, T_MIN = 0.5, 0.15
 """Skin starts where P(skin | colour) exceeds T_MAX and grows through neighbours above T_MIN (ibid., Sec. 2.1)."""
@@ -41,7 +41,8 @@ NOT_SKIN, MAYBE_SKIN, SURELY_SKIN = 0, 1, 2
 Array = NDArray[np.float64]
 
 _LARGEST_FILE = 4 << 20
-# Rows U and V of the full-range YUV of JPEG (ITU-R BT.601); both are 0 for greys.
+# Rows Y, U and V of the full-range YUV of JPEG (ITU-R BT.601); U and V are 0 for greys.
+_LUMINANCE = np.array([0.299, 0.587, 0.114])
 _CHROMA = np.array([[-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
 
 
@@ -81,7 +82,8 @@ class SkinModel:
         for image, mask in labelled:
             if image.shape != (*mask.shape, 3):
                 raise InputError(f"an image of shape {image.shape} cannot have a mask of shape {mask.shape}")
-            counts += count_colours(image, np.where(mask, SURELY_SKIN, NOT_SKIN).astype(np.uint8))
+            whole = Window(0, 0, image.shape[1], image.shape[0])
+            counts += _count(np.ascontiguousarray(image), whole, mask.astype(np.uint8), mask, step=1)
         other, skin = counts
         if skin.sum() == 0 or other.sum() == 0:
             raise InputError(
@@ -144,6 +146,16 @@ def chroma_distribution(mixture: Mixture) -> Array:
     return total / total.sum()
 
 
+@cache
+def _bin_of_colour() -> NDArray[np.int16]:
+    """Flat U and V bin (32768,) of every colour, in steps of 8 levels of R, G and B; -1 where luminance is useless."""
+    level = np.arange(LEVELS) * 8 + 3.5
+    rgb = np.stack(np.meshgrid(level, level, level, indexing="ij"), axis=-1).reshape(-1, 3)
+    u, v = np.clip((rgb @ _CHROMA.T + 128) * BINS // 256, 0, BINS - 1).astype(np.int16).T
+    luminance = rgb @ _LUMINANCE
+    return np.where((luminance >= DARKEST) & (luminance <= BRIGHTEST), u * BINS + v, np.int16(-1)).astype(np.int16)
+
+
 class AdaptiveSkin:
     """P(skin | colour) that follows the light: the model, blended with what the last frames showed."""
 
@@ -154,12 +166,15 @@ class AdaptiveSkin:
     def forget(self) -> None:
         """Back to the model alone."""
         self._recent: deque[Array] = deque(maxlen=WINDOW)
-        self._classes = _classes(self._offline)
+        self._classes = class_of_colour(self._offline)
 
-    def learn(self, image: NDArray[np.uint8], labels: NDArray[np.uint8]) -> None:
-        """Take in a frame (h, w, 3) labelled (h, w) SURELY_SKIN, NOT_SKIN, or MAYBE_SKIN where it is left open."""
-        self._recent.append(count_colours(image, labels))
-        self._classes = _classes(self.posterior())
+    def learn(self, image: NDArray[np.uint8], window: Window, skin: NDArray[np.uint8], hand: NDArray[np.bool_]) -> None:
+        """Take in a window of an RGB image: its `skin` (h, w; not 0) that is `hand` (h, w), and what is neither.
+
+        Skin elsewhere, as a face's or the arm's, and what the hand has that is no skin, are left out.
+        """
+        self._recent.append(_count(image, window, skin, hand, step=2))
+        self._classes = class_of_colour(self.posterior())
 
     def posterior(self) -> Array:
         """P = gamma P_model + (1 - gamma) P_recent (64, 64); colours not seen recently keep the model's."""
@@ -184,36 +199,44 @@ class AdaptiveSkin:
         return skin
 
 
-def _classes(posterior: Array) -> NDArray[np.uint8]:
-    """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (64, 64) by U and V bin."""
-    return (posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX).astype(np.uint8)
+def class_of_colour(posterior: Array) -> NDArray[np.uint8]:
+    """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of every colour, for P(skin | colour) (64, 64)."""
+    classes = np.append((posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX), np.uint8(NOT_SKIN))
+    return classes[_bin_of_colour()].astype(np.uint8)
 
 
-def count_colours(image: NDArray[np.uint8], labels: NDArray[np.uint8]) -> Array:
-    """Pixels (2, 64, 64) that are not skin and that are, by U and V bin, of an RGB image (h, w, 3)."""
-    counts = np.zeros((2, BINS, BINS))
-    _count(image, labels, counts)
-    return counts
+def _count(
+    image: NDArray[np.uint8], window: Window, skin: NDArray[np.uint8], hand: NDArray[np.bool_], step: int
+) -> Array:
+    """Pixels (2, 64, 64) of neither skin nor hand, and of both, by U and V bin; every `step`-th both ways."""
+    counts = np.zeros((2, BINS * BINS))
+    count_colours(image, tuple(window), skin, hand, step, _bin_of_colour(), counts)
+    return counts.reshape(2, BINS, BINS)
 
 
 @numba.njit(cache=True, inline="always")
-def chroma_bins(r: int, g: int, b: int) -> tuple[int, int, bool]:
-    """U and V bin of a colour, and whether its luminance lets chroma mean something; 8-bit fixed point."""
-    y = (77 * r + 150 * g + 29 * b) >> 8
-    u = (-43 * r - 85 * g + 128 * b + 32768) >> 10
-    v = (128 * r - 107 * g - 21 * b + 32768) >> 10
-    return min(u, BINS - 1), min(v, BINS - 1), DARKEST <= y <= BRIGHTEST
+def _colour_index(image: NDArray[np.uint8], y: int, x: int) -> int:
+    return (int(image[y, x, 0]) >> 3) << 10 | (int(image[y, x, 1]) >> 3) << 5 | int(image[y, x, 2]) >> 3
 
 
 @numba.njit(cache=True)
-def _count(image: NDArray[np.uint8], labels: NDArray[np.uint8], counts: Array) -> None:
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            label = labels[i, j]
-            if label != MAYBE_SKIN:
-                u, v, usable = chroma_bins(int(image[i, j, 0]), int(image[i, j, 1]), int(image[i, j, 2]))
-                if usable:
-                    counts[label >> 1, u, v] += 1
+def count_colours(
+    image: NDArray[np.uint8],
+    window: tuple[int, int, int, int],
+    skin: NDArray[np.uint8],
+    hand: NDArray[np.bool_],
+    step: int,
+    bin_of_colour: NDArray[np.int16],
+    counts: Array,
+) -> None:
+    """Add to `counts` (2, 4096) the pixels of a window where `skin` and `hand` (h, w) agree, by that and by bin."""
+    left, top, _, _ = window
+    for v in range(0, skin.shape[0], step):
+        for u in range(0, skin.shape[1], step):
+            if (skin[v, u] != 0) == hand[v, u]:
+                chroma = bin_of_colour[_colour_index(image, top + v, left + u)]
+                if chroma >= 0:
+                    counts[int(hand[v, u]), chroma] += 1
 
 
 @numba.njit(cache=True)
@@ -225,47 +248,49 @@ def classify(
     stride: int,
     out: NDArray[np.uint8],
 ) -> None:
-    """Class of the pixels in a window of an RGB image (h, w, 3), looked up in `classes` (64, 64), into `out`; NOT_SKIN
+    """Class of the pixels in a window of an RGB image (h, w, 3), looked up in `classes` (32768,), into `out`; NOT_SKIN
     where `blocks` (rows, columns) of `stride` x `stride` pixels is 0."""
     left, top, _, _ = window
     height, width = out.shape
     for v in range(height):
         i = v // stride
         for j in range(blocks.shape[1]):
-            for u in range(j * stride, min((j + 1) * stride, width)):
-                label = NOT_SKIN
-                if blocks[i, j] != 0:
-                    y, x = top + v, left + u
-                    du, dv, usable = chroma_bins(int(image[y, x, 0]), int(image[y, x, 1]), int(image[y, x, 2]))
-                    if usable:
-                        label = classes[du, dv]
-                out[v, u] = label
+            u0, u1 = j * stride, min((j + 1) * stride, width)
+            if blocks[i, j] != 0:
+                for u in range(u0, u1):
+                    out[v, u] = classes[_colour_index(image, top + v, left + u)]
+            else:
+                for u in range(u0, u1):
+                    out[v, u] = NOT_SKIN
 
 
 @numba.njit(cache=True)
 def grow_skin(classes: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
     """Hysteresis: `out` (h, w) is 1 where `classes` is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
-    rows, columns = classes.shape
-    seeds, grown = classes.ravel(), out.ravel()
+    columns = classes.shape[1]
+    label, grown = classes.ravel(), out.ravel()
+    for n in range(label.size):
+        grown[n] = label[n] == SURELY_SKIN
     around = (-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1)
-    stack = np.empty(seeds.size, dtype=np.int32)
-    grown[:] = 0
-    for start in range(seeds.size):
-        if seeds[start] != SURELY_SKIN or grown[start] != 0:
+    stack = np.empty(label.size, dtype=np.int32)
+    for start in range(label.size):
+        if label[start] != MAYBE_SKIN or grown[start] != 0:
             continue
-        grown[start] = 1
-        stack[0] = start
-        size = 1
+        # A doubtful pixel beside skin: it and all doubtful ones that hang together with it are skin.
+        size = 0
+        for offset in around:
+            there = start + offset
+            if 0 <= there < label.size and abs(there % columns - start % columns) <= 1 and grown[there] != 0:
+                grown[start] = 1
+                stack[0] = start
+                size = 1
         while size > 0:
             size -= 1
             here = stack[size]
-            row, column = here // columns, here % columns
-            inside = 0 < row < rows - 1 and 0 < column < columns - 1
             for offset in around:
                 there = here + offset
-                if not inside and not (0 <= there < seeds.size and abs(there % columns - column) <= 1):
-                    continue
-                if grown[there] == 0 and seeds[there] != NOT_SKIN:
+                inside = 0 <= there < label.size and abs(there % columns - here % columns) <= 1
+                if inside and label[there] == MAYBE_SKIN and grown[there] == 0:
                     grown[there] = 1
                     stack[size] = there
                     size += 1

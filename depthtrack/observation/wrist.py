@@ -58,9 +58,7 @@ def find_wrist(grid: Grid, palm: Palm, arm: Arm) -> float | None:
     if palm.radius < BROAD_PALM:
         return None
     seen = breadth(grid, palm, arm)
-    # Near the end of what is seen of the arm, breadth fades out.
-    end = float(np.median((grid.points[arm.exits] - palm.centre) @ arm.direction)) - 0.01
-    forearm = (FOREARM[0] < BIN_MIDDLES) & (min(FOREARM[1], end) > BIN_MIDDLES)
+    forearm = (FOREARM[0] < BIN_MIDDLES) & (min(FOREARM[1], _visible_end(grid, palm, arm)) > BIN_MIDDLES)
     if not forearm.any():
         return None
     wrist = NARROW * seen[forearm].min()
@@ -78,8 +76,13 @@ def narrowest_place(grid: Grid, palm: Palm, arm: Arm) -> float:
     It is the wrist, right behind a hand; from an elbow, which may look like a fist, it is a forearm away.
     """
     seen = breadth(grid, palm, arm)
-    arm_only = (BIN_MIDDLES > PALM_EDGE) & (seen > 0.01)
-    return float(BIN_MIDDLES[arm_only][np.argmin(seen[arm_only])]) if arm_only.any() else 0.0
+    forearm = (FOREARM[0] < BIN_MIDDLES) & (_visible_end(grid, palm, arm) > BIN_MIDDLES)
+    return float(BIN_MIDDLES[forearm][np.argmin(seen[forearm])]) if forearm.any() else 0.0
+
+
+def _visible_end(grid: Grid, palm: Palm, arm: Arm) -> float:
+    """Distance (m) along the arm from the palm's centre beyond which its breadth fades out."""
+    return float(np.median((grid.points[arm.exits] - palm.centre) @ arm.direction)) - 0.01
 
 
 def palm_centre(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Array:
