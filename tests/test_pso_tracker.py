@@ -61,7 +61,7 @@ def test_a_hand_that_jumps_is_lost_and_found_again() -> None:
     follow(tracker, range(10, 14))
     statuses = [tracker.track(observe(MADE, 300)).status for _ in range(3)]
     found = tracker.track(observe(MADE, 300))
-    assert Status.LOST in statuses or found.energy < PsoOptions().lost_energy
+    assert Status.LOST in statuses or found.energy < PsoOptions().lost.energy
     assert errors_mm([found], range(300, 301))[0] < 40
 
 

@@ -26,8 +26,9 @@ class Command:
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
     """Run folder to write."""
-    tracker: Literal["pso"] = "pso"
-    """How to track: pso renders hypotheses (Oikonomidis et al. 2011)."""
+    tracker: Literal["pso", "ik"] = "pso"
+    """How to track: pso renders hypotheses (Oikonomidis et al. 2011), ik fits a surface to the point cloud (Schroeder
+    et al. 2014)."""
     hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
     """Sizes of the hand; unless given, the recording's own, or the average adult's right hand."""
     start: Literal["auto", "truth"] = "auto"
@@ -39,12 +40,12 @@ class Command:
     seed: int = 0
     """Chooses the random numbers: the same seed gives the same poses."""
     threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Threads of the tracker; as many as there are cores unless given. Poses do not depend on it."""
+    """Threads of pso; as many as there are cores unless given. Poses do not depend on it."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
 
     variant: Literal["default", "paper"] = "default"
-    """The swarm as we measured it best, or as the paper has it."""
+    """The tracker as we measured it best, or as its paper has it."""
     particles: int = 64
     """Particles of the swarm."""
     generations: int = 25
@@ -54,8 +55,12 @@ class Command:
     renderer: Literal["raster", "egl", "osmesa", "oracle"] = "raster"
     """What renders and scores the hypotheses."""
 
+    model: Literal["skin", "cylinders"] = "skin"
+    """What ik fits: the skin mesh, or the model of cylinders and spheres."""
+    subsample: int = 3
+    """Every so many-th point is used by ik."""
+
     def run(self) -> None:
-        import os
         from contextlib import closing
 
         from tqdm import tqdm
@@ -64,25 +69,16 @@ class Command:
         from depthtrack.observation.observation import Observer
         from depthtrack.recording.run import RunWriter
         from depthtrack.tracking.loop import track_sequence
-        from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
+        from depthtrack.tracking.trackers import create_tracker
 
         sequence = self.recording.open()
         hand = self._hand(sequence)
-        threads = self.threads or len(os.sched_getaffinity(0))
-        options = PsoOptions(
-            variant=self.variant,
-            particles=self.particles,
-            generations=self.generations,
-            seed=self.seed,
-            renderer=self.renderer,
-            threads=threads,
-            resolution=self.resolution,
-        )
+        options = self._options()
         start_pose = self._start_pose(sequence)
         observer = Observer.for_sequence(sequence, self.skin_model)
         count = len(sequence) if self.frames is None else min(self.frames, len(sequence))
         with (
-            closing(PsoTracker(hand, options)) as tracker,
+            closing(create_tracker(self.tracker, hand, **options)) as tracker,
             RunWriter(self.out, self._configuration(hand, sequence), ("segment", *tracker.stages), self.resume) as run,
             tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
         ):
@@ -92,6 +88,22 @@ class Command:
         lost = sum(row.status in ("lost", "absent") for row in run.rows)
         print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
         print(f"see how good they are:  depthtrack evaluate {self.out}")
+
+    def _options(self) -> dict[str, Any]:
+        """What the chosen tracker is made with."""
+        import os
+
+        if self.tracker == "ik":
+            return {"variant": self.variant, "model": self.model, "subsample": self.subsample, "seed": self.seed}
+        return {
+            "variant": self.variant,
+            "particles": self.particles,
+            "generations": self.generations,
+            "seed": self.seed,
+            "renderer": self.renderer,
+            "threads": self.threads or len(os.sched_getaffinity(0)),
+            "resolution": self.resolution,
+        }
 
     def _hand(self, sequence: "Sequence") -> "HandShape":
         from depthtrack.hand.shape import HandShape
@@ -115,10 +127,11 @@ class Command:
         import platform
         from importlib.metadata import version
 
-        names = ("tracker", "start", "frames", "seed", "variant", "particles", "generations", "resolution", "renderer")
+        options = {name: value for name, value in self._options().items() if name != "threads"}
         return {
             "sequence": str(self.recording.path.resolve()),
-            **{name: getattr(self, name) for name in names},
+            **{name: getattr(self, name) for name in ("tracker", "start", "frames")},
+            **options,
             "skin_model": None if self.skin_model is None else str(self.skin_model.resolve()),
             "on_damage": self.recording.on_damage,
             "threads": self.threads,

@@ -12,6 +12,7 @@ from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
+from depthtrack.tracking.memory import LostBelow
 from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
@@ -77,8 +78,7 @@ def follow(
         renderer=renderer,
         resolution=resolution,
         # Never lost: a search would cost more than many frames of a small swarm, and noise is no loss.
-        lost_energy=np.inf,
-        lost_confidence=0.0,
+        lost=LostBelow(confidence=0.0, energy=np.inf),
     )
     with closing(PsoTracker(seen.hand, options)) as tracker:
         estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]

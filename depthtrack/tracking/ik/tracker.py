@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import POSE_SIZE, retract, tangent_between
+from depthtrack.hand.pose import POSE_SIZE, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.observation.observation import Observation
@@ -21,6 +21,7 @@ from depthtrack.tracking.ik.fit import FitOptions, Fitter, synergy_space
 from depthtrack.tracking.ik.matching import Surface
 from depthtrack.tracking.ik.mesh import MeshSurface
 from depthtrack.tracking.ik.space import FULL, Space
+from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.search import SearchOptions, find_pose
 from depthtrack.tracking.tracker import Estimate, Status
 
@@ -48,7 +49,7 @@ class IkOptions:
     subsample: int = 3
     synergies: Synergies | None = None
     seed: int = 0
-    lost_energy: float = 16.0
+    lost: LostBelow = field(default_factory=LostBelow)
     search: SearchOptions = field(default_factory=SearchOptions)
     fit: FitOptions | None = None
 
@@ -72,7 +73,7 @@ class IkTracker:
     """Follows a hand by fitting its surface: see `tracker.Tracker`."""
 
     name = "ik"
-    stages = ("observe", "fit", "check")
+    stages: tuple[str, ...] = ("observe", "fit", "check")
 
     def __init__(self, shape: HandShape, options: IkOptions | None = None) -> None:
         self.options = options = options or IkOptions()
@@ -84,8 +85,7 @@ class IkTracker:
         self._fitter = Fitter(shape, make_surface(options.model, shape, fit.agreement), fit)
         self._scorer = RasterScorer(shape)
         self._space: Space = FULL if options.synergies is None else synergy_space(options.synergies)
-        self._pose: Array | None = None
-        self._velocity = np.zeros(26)
+        self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by fitting, or by searching."""
@@ -103,20 +103,25 @@ class IkTracker:
 
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
-        if self._pose is None:
+        last = self._memory.pose
+        if last is None:
             return self.start(observation)
         begun = time.perf_counter()
         self._observe(observation)
         observed = time.perf_counter()
         ahead = 1.0 if self.options.variant == "paper" else 0.5
-        found = self._fitter.fit(within_limits(retract(self._pose, ahead * self._velocity)), self._space)
+        found = self._fitter.fit(within_limits(retract(last, ahead * self._memory.velocity)), self._space)
         return self._settle(found, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
-        """Take up a track after the estimates of all frames so far: the last two poses are what it remembers."""
-        self._pose, self._velocity = None, np.zeros(26)
-        for estimate in estimates[-2:]:
-            self._remember(estimate)
+        """Take up a track after these estimates, as if they had been made just now."""
+        for estimate in estimates:
+            self._memory.remember(estimate)
+
+    @property
+    def expected(self) -> Array | None:
+        """The linear prediction, while the track is sure."""
+        return self._memory.expected
 
     def close(self) -> None:
         self._scorer.close()
@@ -132,23 +137,14 @@ class IkTracker:
     def _settle(self, pose: Array, status: Status, begun: float, observed: float) -> Estimate:
         fitted = time.perf_counter()
         terms = self._scorer.terms(pose[None])
-        energy = float(terms.energy[0])
-        if energy > self.options.lost_energy:
+        energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
+        if self._memory.is_lost(energy, confidence):
             status = Status.LOST
         stage_ms = {
             "observe": 1e3 * (observed - begun),
             "fit": 1e3 * (fitted - observed),
             "check": 1e3 * (time.perf_counter() - fitted),
         }
-        estimate = Estimate(pose, energy, float(1 - terms.skin[0]), status, stage_ms)
-        self._remember(estimate)
+        estimate = Estimate(pose, energy, confidence, status, stage_ms)
+        self._memory.remember(estimate)
         return estimate
-
-    def _remember(self, estimate: Estimate) -> None:
-        """Pose and velocity for the next frame, from estimates alone: a resumed run sees what this one did."""
-        if estimate.pose is None or estimate.status is Status.LOST:
-            self._pose, self._velocity = None, np.zeros(26)
-            return
-        before, moving = self._pose, estimate.status is Status.TRACKED
-        self._velocity = tangent_between(before, estimate.pose) if before is not None and moving else np.zeros(26)
-        self._pose = estimate.pose

@@ -1,7 +1,6 @@
 """The PSO tracker: one swarm a frame, around the last pose and where it was heading (Oikonomidis 2011, Sec. 2.4)."""
 
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import POSE_SIZE, POSITION, retract, tangent_between
+from depthtrack.hand.pose import POSE_SIZE, POSITION, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.target import Target
+from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.search import SearchOptions, find_pose, refine
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
@@ -24,9 +24,6 @@ from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
-
-_USUAL_FRAMES = 30
-_SURE = 0.8
 
 
 @dataclass(frozen=True)
@@ -39,8 +36,6 @@ class PsoOptions:
     the hand; it damps more and randomises half of the fingers near the best. Each was measured to help.
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
-    A track counts as lost below `lost_confidence`, or where its energy exceeds both `lost_energy` and twice what was
-    usual over the last second: a hand of other sizes than the model's has a high energy all the time.
     """
 
     variant: Variant = "default"
@@ -51,8 +46,7 @@ class PsoOptions:
     threads: int = 1
     resolution: int | None = None
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
-    lost_confidence: float = 0.6
-    lost_energy: float = 12.0
+    lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
 
@@ -76,10 +70,7 @@ class PsoTracker:
             raise InputError(f"no PSO variant '{options.variant}': choose default or paper")
         threads = {"threads": options.threads} if options.renderer == "raster" else {}
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
-        self._pose: Array | None = None
-        self._velocity = np.zeros(26)
-        self._confidence = 0.0
-        self._usual: deque[float] = deque(maxlen=_USUAL_FRAMES)
+        self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by a swarm, or by searching."""
@@ -98,16 +89,17 @@ class PsoTracker:
 
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
-        if self._pose is None:
+        last = self._memory.pose
+        if last is None:
             return self.start(observation)
         begun = time.perf_counter()
         self._observe(observation)
         observed = time.perf_counter()
         generator, options = self._generator(observation), self.options
-        space = self._space(self._pose)
+        space = self._space(last)
         found = minimise(
             lambda x: self._scorer.score(space.poses(x)),
-            self._population(space, self._pose, generator),
+            self._population(space, last, generator),
             space.lower,
             space.upper,
             space.fingers,
@@ -119,14 +111,12 @@ class PsoTracker:
     def recall(self, estimates: Sequence[Estimate]) -> None:
         """Take up a track after these estimates, as if they had been made just now."""
         for estimate in estimates:
-            self._remember(estimate)
+            self._memory.remember(estimate)
 
     @property
     def expected(self) -> Array | None:
         """The linear prediction, while the track is sure."""
-        if self._pose is None or self._confidence < _SURE:
-            return None
-        return retract(self._pose, self._velocity)
+        return self._memory.expected
 
     def close(self) -> None:
         self._scorer.close()
@@ -145,10 +135,10 @@ class PsoTracker:
         count = self.options.particles
         centres, spread = np.tile(last, (count, 1)), np.repeat(self.options.spread, [3, 3, 20])
         if self.options.variant == "default":
-            centres[1::3] = retract(last, self._velocity)
+            centres[1::3] = retract(last, self._memory.velocity)
             centres[2::3, POSITION] += self._drift(last)
             # What moved fast may as well have stopped, or turned: look as far as half of its last step.
-            spread = np.hypot(spread, 0.5 * self._velocity)
+            spread = np.hypot(spread, 0.5 * self._memory.velocity)
         steps = generator.standard_normal((count, 26)) * spread
         steps[:3] = 0  # the centres themselves take part
         return space.coordinates(retract(centres, steps))
@@ -168,25 +158,9 @@ class PsoTracker:
 
     def _settle(self, pose: Array, energy: float, status: Status, begun: float, observed: float) -> Estimate:
         confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
-        if confidence < self.options.lost_confidence or energy > self._highest_energy():
+        if self._memory.is_lost(energy, confidence):
             status = Status.LOST
         stage_ms = {"observe": 1e3 * (observed - begun), "swarm": 1e3 * (time.perf_counter() - observed)}
         estimate = Estimate(pose, energy, confidence, status, stage_ms)
-        self._remember(estimate)
+        self._memory.remember(estimate)
         return estimate
-
-    def _highest_energy(self) -> float:
-        """Above this, a pose does not explain the hand."""
-        return max(self.options.lost_energy, 2 * float(np.median(self._usual))) if self._usual else np.inf
-
-    def _remember(self, estimate: Estimate) -> None:
-        """Pose and velocity for the next frame, from estimates alone: a resumed run sees what this one did."""
-        if estimate.pose is None or estimate.status is Status.LOST:
-            self._pose, self._velocity = None, np.zeros(26)
-            return
-        if self._pose is not None and estimate.status is Status.TRACKED:
-            self._velocity = tangent_between(self._pose, estimate.pose)
-        else:
-            self._velocity = np.zeros(26)
-        self._pose, self._confidence = estimate.pose, estimate.confidence
-        self._usual.append(estimate.energy)
