@@ -241,13 +241,13 @@ def starts(*errors: float, mirrored: int = 0) -> list[Row]:
 
 
 def test_the_histogram_of_starts() -> None:
-    rows = starts(0.0, 4.9, 5.0, 40.0, 40.1, 82.0, 150.0, 999.0, mirrored=3)
+    rows = starts(0.0, 2.4, 2.5, 40.0, 40.1, 82.0, 120.0, 999.0, mirrored=3)
     table = load_experiment("oikonomidis-4").tabulate(rows)
     filled = {
         line["from_mm"]: (line["share_percent"], line["mirrored_percent"]) for line in table if line["share_percent"]
     }
-    assert filled == {0: (25, 0), 5: (12.5, 0), 40: (25, 0), 80: (12.5, 12.5), 150: (25, 25)}
-    assert table[0]["to_mm"] == 5
+    assert filled == {0: (25, 0), 2.5: (12.5, 0), 40: (25, 0), 80: (12.5, 12.5), 120: (25, 25)}
+    assert table[0]["to_mm"] == 2.5
     assert table[-1]["to_mm"] is None
     assert list(said("oikonomidis-4", rows).values()) == [50.0, 37.5, pytest.approx(40.05), 0.5]
 

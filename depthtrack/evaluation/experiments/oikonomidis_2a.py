@@ -38,7 +38,7 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
         Comparison("error at 64 particles x 25 generations", "5 mm (its Fig. 2b, 0.5 m)", ours, "mm"),
         Comparison("what more of either gains at most", "0.5 mm", None if ours is None else ours - min(larger), "mm"),
         Comparison(
-            "frames a second at 64 x 25; ours: one core, tracking alone",
+            "frames a second at 64 x 25 (ours: on one core)",
             "15 (GTX 580)",
             speeds[0] if speeds else None,
             "Hz",

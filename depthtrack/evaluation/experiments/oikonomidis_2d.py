@@ -37,7 +37,11 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
         [line["viewpoint"] for line in table], error, reach, fmt="o", capsize=4, label="ours (bars: all repetitions)"
     )
     axes.axhline(5, color="black", linestyle="--", lw=1, label="paper at 0.5 m (its Fig. 2b), read from its text")
-    axes.set(xlabel="viewpoint (0: frontal)", ylabel="error $M_d$ (mm)", ylim=(0, None))
+    axes.set(
+        xlabel="viewpoint (0: frontal)",
+        ylabel="error $M_d$ (mm)",
+        ylim=(0, 1.1 * max(5, *error, *(line["highest_mm"] for line in table))),
+    )
     axes.set_xticks(range(VIEWPOINT_COUNT))
     axes.legend()
 

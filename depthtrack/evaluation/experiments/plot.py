@@ -41,7 +41,7 @@ def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[
         axes.text(0, 1.02, experiment.source, transform=axes.transAxes, color="0.4")
         for number, cells in enumerate(below, start=1):
             y = (_LINE * (len(below) - number) + 0.12) / height
-            for x, text in zip((0.09, 0.61, 0.87), cells, strict=True):
+            for x, text in zip((0.09, 0.56, 0.86), cells, strict=True):
                 figure.text(x, y, text, color="0.4" if number in (1, len(below)) else "0.1")
         picture = BytesIO()
         figure.savefig(picture, format="png")
