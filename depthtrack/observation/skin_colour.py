@@ -151,7 +151,8 @@ def _bin_of_colour() -> NDArray[np.int16]:
     """Flat U and V bin (32768,) of every colour, in steps of 8 levels of R, G and B; -1 where luminance is useless."""
     level = np.arange(LEVELS) * 8 + 3.5
     rgb = np.stack(np.meshgrid(level, level, level, indexing="ij"), axis=-1).reshape(-1, 3)
-    u, v = np.clip((rgb @ _CHROMA.T + 128) * BINS // 256, 0, BINS - 1).astype(np.int16).T
+    # Greys lie on a bin's edge: rounding must not scatter them.
+    u, v = np.clip((rgb @ _CHROMA.T + 128) * BINS / 256 + 1e-9, 0, BINS - 1).astype(np.int16).T
     luminance = rgb @ _LUMINANCE
     return np.where((luminance >= DARKEST) & (luminance <= BRIGHTEST), u * BINS + v, np.int16(-1)).astype(np.int16)
 
