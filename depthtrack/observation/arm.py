@@ -18,11 +18,12 @@ Array = NDArray[np.float64]
 ARM_AREA = 3e-4
 """Square metres of an arm beyond the hand's reach that are seen at least; little, for it may point straight away."""
 
-SMALLEST_BORDER = 0.03
-"""Metres of the image's border that an arm leaving through it covers, at least; fingers cover less."""
+SMALLEST_BORDER = 0.04
+"""Metres of the image's border that an arm leaving through it covers, at least: a wrist is 39 mm thick and 57 broad
+(`HandShape`), two fingers side by side are less."""
 
-PALM_EDGE = 0.03
-"""Metres from the palm's centre within which no arm begins."""
+NEAREST_BORDER = 0.06
+"""Metres from the palm's centre to where an arm leaves what is seen, at least; nearer, nothing of it would show."""
 
 NEARER = 0.04
 """Metres by which an arm that vanishes too near to the sensor is nearer there than the palm."""
@@ -96,7 +97,7 @@ def breadth(grid: Grid, palm: Palm, arm: Arm) -> Array:
 
 def _leaving(grid: Grid, palm: Palm, border: Mask) -> list[Nodes]:
     """Where an arm leaves what is seen, through `border` (rows, columns), before it has left the hand's reach."""
-    leaving = border & palm.paths.reached() & (palm.paths.distance > PALM_EDGE)
+    leaving = border & palm.paths.reached() & (palm.paths.distance > NEAREST_BORDER)
     labels, areas = grid.within(leaving).surfaces()
     parts = [np.flatnonzero(labels == label) for label in range(len(areas))]
     cell = float(palm.centre[2]) / grid.focal[0]

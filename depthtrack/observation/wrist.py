@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.observation.arm import ARM_HALF_BREADTH, BIN, BIN_MIDDLES, PALM_EDGE, Arm, breadth
+from depthtrack.observation.arm import ARM_HALF_BREADTH, BIN, BIN_MIDDLES, Arm, breadth
 from depthtrack.observation.grid import Grid, Mask
 from depthtrack.observation.palm import Palm
 
@@ -17,7 +17,7 @@ WRIST_TO_PALM = 0.046
 PALM_HALF_LENGTH = 0.05
 """Metres from the palm's centre within which the hand is broadest."""
 
-FOREARM = (PALM_EDGE, 0.12)
+FOREARM = (0.03, 0.12)
 """Metres from the palm's centre between which the forearm's narrowest place is looked for."""
 
 NARROW = 1.13
