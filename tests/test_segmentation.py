@@ -148,10 +148,11 @@ def test_a_hand_far_from_its_last_place_is_found_again() -> None:
     shift = -150
     assert abs(shift) / frame.camera.fx * 0.5 > DEPTH_WINDOW / 2
     assert frame.colour is not None
+    farther = np.where(frame.depth > 0, frame.depth + 0.3, 0).astype(np.float32)
     moved = replace(
         frame,
         timestamp=frame.timestamp + 1 / 30,
-        depth=np.roll(frame.depth, shift, axis=1) + np.float32(0.3) * (np.roll(frame.depth, shift, axis=1) > 0),
+        depth=np.roll(farther, shift, axis=1),
         colour=np.roll(frame.colour, shift, axis=1),
     )
     assert overlap(segmenter.segment(moved), np.roll(mask, shift, axis=1)) > 0.9
