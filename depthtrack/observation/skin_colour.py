@@ -195,9 +195,7 @@ class AdaptiveSkin:
         """
         classes = np.empty((window.height, window.width), dtype=np.uint8)
         classify(image, tuple(window), self._classes, blocks, stride, classes)
-        skin = np.empty_like(classes)
-        grow_skin(classes, skin)
-        return skin
+        return grow_skin(classes)
 
 
 def class_of_colour(posterior: Array) -> NDArray[np.uint8]:
@@ -265,24 +263,28 @@ def classify(
                     out[v, u] = NOT_SKIN
 
 
+def grow_skin(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Hysteresis: 1 where `classes` (h, w) is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
+    grown = (classes == SURELY_SKIN).astype(np.uint8)
+    grow_into(classes, np.flatnonzero(classes == MAYBE_SKIN), grown)
+    return grown
+
+
 @numba.njit(cache=True)
-def grow_skin(classes: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
-    """Hysteresis: `out` (h, w) is 1 where `classes` is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
+def grow_into(classes: NDArray[np.uint8], doubtful: NDArray[np.int64], grown: NDArray[np.uint8]) -> None:
+    """Add to `grown` (h, w), in place, the `doubtful` pixels (flat indices of MAYBE_SKIN) that are joined to it."""
     columns = classes.shape[1]
-    label, grown = classes.ravel(), out.ravel()
-    for n in range(label.size):
-        grown[n] = label[n] == SURELY_SKIN
+    label, skin = classes.ravel(), grown.ravel()
     around = (-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1)
-    stack = np.empty(label.size, dtype=np.int32)
-    for start in range(label.size):
-        if label[start] != MAYBE_SKIN or grown[start] != 0:
+    stack = np.empty(doubtful.size, dtype=np.int64)
+    for start in doubtful:
+        if skin[start] != 0:
             continue
-        # A doubtful pixel beside skin: it and all doubtful ones that hang together with it are skin.
         size = 0
         for offset in around:
             there = start + offset
-            if 0 <= there < label.size and abs(there % columns - start % columns) <= 1 and grown[there] != 0:
-                grown[start] = 1
+            if 0 <= there < label.size and abs(there % columns - start % columns) <= 1 and skin[there] != 0:
+                skin[start] = 1
                 stack[0] = start
                 size = 1
         while size > 0:
@@ -291,7 +293,7 @@ def grow_skin(classes: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
             for offset in around:
                 there = here + offset
                 inside = 0 <= there < label.size and abs(there % columns - here % columns) <= 1
-                if inside and label[there] == MAYBE_SKIN and grown[there] == 0:
-                    grown[there] = 1
+                if inside and label[there] == MAYBE_SKIN and skin[there] == 0:
+                    skin[there] = 1
                     stack[size] = there
                     size += 1

@@ -33,17 +33,19 @@ def look(frame: Frame, window: Window, reach: tuple[float, float], stride: int, 
         return View(frame, window, grid, grid, None)
     # Colour is asked only about what is within reach, and right beside it: edges of depth are ragged.
     beside = cv2.dilate((grid.depth > 0).astype(np.uint8), disc(1))
-    found = skin.find(frame.colour, window, np.asarray(beside, dtype=np.uint8), stride)
-    return View(frame, window, grid, grid.within(_closed(_covered(found, stride, 0.25))), found)
+    blocks = np.asarray(beside, dtype=np.uint8)
+    found = skin.find(frame.colour, window, blocks, stride)
+    return View(frame, window, grid, grid.within(_closed(_covered(found, stride, 0.25, blocks))), found)
 
 
 def blind_skin(view: View, skin: AdaptiveSkin) -> Mask:
     """Nodes (rows, columns) of skin without readings, into which what is too near to the sensor vanishes."""
     if view.frame.colour is None:
         return np.zeros(view.grid.depth.shape, dtype=np.bool_)
-    missing = _covered((view.frame.depth[view.window.slices] == 0).astype(np.uint8), view.grid.stride, 0.5)
+    everywhere = np.ones(view.grid.depth.shape, dtype=np.uint8)
+    missing = _covered((view.frame.depth[view.window.slices] == 0).astype(np.uint8), view.grid.stride, 0.5, everywhere)
     found = skin.find(view.frame.colour, view.window, missing.astype(np.uint8), view.grid.stride)
-    return missing & _covered(found, view.grid.stride, 0.5)
+    return missing & _covered(found, view.grid.stride, 0.5, missing.astype(np.uint8))
 
 
 @cache
@@ -59,16 +61,18 @@ def _closed(nodes: Mask) -> Mask:
     return np.asarray(cv2.morphologyEx(nodes.astype(np.uint8), cv2.MORPH_CLOSE, disc(2)) > 0)
 
 
-def _covered(mask: NDArray[np.uint8], stride: int, share: float) -> Mask:
-    """Nodes (rows, columns) whose block is covered by `mask` (h, w) to at least `share`."""
-    shares = np.empty((-(-mask.shape[0] // stride), -(-mask.shape[1] // stride)), dtype=np.float32)
-    share_of_blocks(mask, stride, shares)
+def _covered(mask: NDArray[np.uint8], stride: int, share: float, blocks: NDArray[np.uint8]) -> Mask:
+    """Those of `blocks` (rows, columns; not 0) that `mask` (h, w) covers to at least `share`."""
+    shares = np.zeros(blocks.shape, dtype=np.float32)
+    share_of_blocks(mask, stride, blocks, shares)
     return shares >= share
 
 
 @numba.njit(cache=True)
-def share_of_blocks(mask: NDArray[np.uint8], stride: int, share: NDArray[np.float32]) -> None:
-    """Share of each block that `mask` (h, w) covers, into `share` (rows, columns).
+def share_of_blocks(
+    mask: NDArray[np.uint8], stride: int, blocks: NDArray[np.uint8], share: NDArray[np.float32]
+) -> None:
+    """Share of each of `blocks` (rows, columns; not 0) that `mask` (h, w) covers, into `share` (rows, columns).
 
     Looks at every second pixel both ways where blocks are large enough.
     """
@@ -76,6 +80,8 @@ def share_of_blocks(mask: NDArray[np.uint8], stride: int, share: NDArray[np.floa
     step = 1 if stride < 4 else 2
     for i in range(share.shape[0]):
         for j in range(share.shape[1]):
+            if blocks[i, j] == 0:
+                continue
             count, size = 0, 0
             for v in range(i * stride, min((i + 1) * stride, height), step):
                 for u in range(j * stride, min((j + 1) * stride, width), step):

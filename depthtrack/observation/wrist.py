@@ -100,10 +100,15 @@ def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
 
     Fingers that reach past the plane beside the arm are not connected to it there, and stay.
     """
-    beyond = ((grid.points - plane.point) @ plane.normal > 0).reshape(grid.depth.shape)
-    labels, _ = grid.within(beyond & palm.paths.reached()).surfaces()
-    through = np.unique(labels.ravel()[arm.exits])
-    return np.isin(labels, through[through >= 0])
+    beyond = np.flatnonzero(palm.paths.reached())
+    beyond = beyond[(grid.points[beyond] - plane.point) @ plane.normal > 0]
+    mask = np.zeros(grid.depth.shape, dtype=np.bool_)
+    mask.flat[beyond] = True
+    labels, areas = grid.within(mask).surfaces()
+    goes_on = np.zeros(len(areas) + 1, dtype=np.bool_)  # the last one stands for -1, no surface
+    goes_on[labels.ravel()[arm.exits]] = True
+    goes_on[-1] = False
+    return goes_on[labels]
 
 
 class WristFilter:
