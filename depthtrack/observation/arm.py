@@ -79,9 +79,9 @@ def breadth(grid: Grid, palm: Palm, arm: Arm) -> Array:
     nodes = np.flatnonzero(palm.paths.reached())
     offset = grid.points[nodes] - palm.centre
     along = offset @ arm.direction
-    aside = np.linalg.norm(offset - along[:, None] * arm.direction, axis=1)
+    aside_squared = np.einsum("ij,ij->i", offset, offset) - along**2
     margin, count = 4, len(BIN_MIDDLES)
-    near = (aside < ARM_HALF_BREADTH) & (along > -margin * BIN) & (along < (count + margin) * BIN)
+    near = (aside_squared < ARM_HALF_BREADTH**2) & (along > -margin * BIN) & (along < (count + margin) * BIN)
     position, area = along[near] / BIN - 0.5 + 2 * margin, grid.areas.ravel()[nodes[near]]
     # Each node's area is shared by the two bins that it lies between; then smoothed, as nodes are as wide as bins.
     left = np.floor(position).astype(np.int64)

@@ -5,7 +5,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.observation.grid import MAX_JUMP, Depth, Grid, Mask
+from depthtrack.observation.grid import MAX_JUMP, Depth, Mask
 from depthtrack.observation.palm import HAND_REACH, TIP_TO_WRIST, Palm
 from depthtrack.observation.view import View, disc
 from depthtrack.observation.window import Window
@@ -55,9 +55,9 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
     farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
     are filled where they are skin, and the outline is smoothed. Readings count up to r outside the silhouette.
     """
-    blocks = _blocks_around(view.grid, labels)
+    blocks = _blocks_of_hand(labels)
     stride, window, frame = view.grid.stride, view.window, view.frame
-    roi = Window(
+    tight = Window(
         window.left + blocks.left * stride,
         window.top + blocks.top * stride,
         min(window.left + blocks.right * stride, window.right),
@@ -65,19 +65,27 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
     )
     plane = (0.0, 0.0, 0.0, 0.0) if wrist is None else (*wrist.normal.tolist(), float(wrist.normal @ wrist.point))
     lens = (frame.camera.fx, frame.camera.fy, frame.camera.cx, frame.camera.cy)
-    kinds = np.empty((roi.height, roi.width), dtype=np.uint8)
-    sort_pixels(frame.depth, tuple(roi), view.grid.depth, labels, tuple(blocks), stride, lens, plane, kinds)
+    kinds = np.empty((tight.height, tight.width), dtype=np.uint8)
+    sort_pixels(frame.depth, tuple(tight), view.grid.depth, labels, tuple(blocks), stride, lens, plane, kinds)
+    silhouette = readings = kinds == READING
+    if view.skin is not None:
+        left, top = tight.left - window.left, tight.top - window.top
+        coloured = view.skin[top : top + tight.height, left : left + tight.width] > 0
+        r = max(1, round(DILATION * frame.camera.width))
+        silhouette = _silhouette(kinds, coloured, r)
+        readings = readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
+    room = round(ROOM * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
+    roi = tight.grown(room, frame.camera)
+    return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
+
+
+def _silhouette(kinds: NDArray[np.uint8], coloured: Mask, r: int) -> Mask:
+    """The hand's silhouette (h, w) from the kinds of its pixels and where they are `coloured` like skin."""
     readings = kinds == READING
-    if view.skin is None:
-        return roi, readings, readings
-    skin = view.skin[roi.top - window.top : roi.bottom - window.top, roi.left - window.left : roi.right - window.left]
-    r = max(1, round(DILATION * frame.camera.width))
     inside = readings & (cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0)
     closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 2))) > 0
     filled = closed | ((kinds <= MISSING) & _enclosed(closed))
-    coloured = skin > 0
-    silhouette = inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
-    return roi, silhouette, readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
+    return inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
 
 
 def _enclosed(mask: Mask) -> Mask:
@@ -98,16 +106,15 @@ def _smoothed(mask: Mask, r: int) -> Mask:
     return np.asarray(share > 90)
 
 
-def _blocks_around(grid: Grid, labels: Labels) -> Window:
-    """The hand's nodes, and ROOM around them."""
+def _blocks_of_hand(labels: Labels) -> Window:
+    """The hand's nodes, and two more on every side for what the dilation may add."""
     hand = labels == HAND
-    room = 1 + round(ROOM * grid.focal[0] / float(grid.depth[hand].mean()))
     rows, columns = np.flatnonzero(hand.any(axis=1)), np.flatnonzero(hand.any(axis=0))
     return Window(
-        max(int(columns[0]) - room, 0),
-        max(int(rows[0]) - room, 0),
-        min(int(columns[-1]) + 1 + room, labels.shape[1]),
-        min(int(rows[-1]) + 1 + room, labels.shape[0]),
+        max(int(columns[0]) - 2, 0),
+        max(int(rows[0]) - 2, 0),
+        min(int(columns[-1]) + 3, labels.shape[1]),
+        min(int(rows[-1]) + 3, labels.shape[0]),
     )
 
 

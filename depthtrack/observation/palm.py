@@ -127,21 +127,25 @@ def palm_near(grid: Grid, surface: Grid, tip: int) -> Palm | None:
 def _limbs(grid: Grid, paths: Paths) -> tuple[Nodes, ...] | None:
     """What goes on beyond the reach of the hand from whose palm the paths come, towards the body if anything does, or
     None where that is nothing that a hand could be the end of. What a hand holds ends within EXIT_REACH."""
-    near, edge, area = paths.reached(HAND_REACH), grid.edge, grid.areas
-    labels, _ = grid.within(~near).surfaces()
+    near, edge = paths.reached(HAND_REACH), grid.edge
+    labels, everything = grid.within(~near).surfaces()
     far = paths.reached() & ~near
-    goes_on = np.unique(labels[far & ((paths.distance > EXIT_REACH - 0.01) | edge)])
-    leads_home = np.isin(goes_on, labels[edge])
-    areas = np.array([area[(labels == label) & far].sum() for label in goes_on])
+    count = len(everything)
+    goes_on, leads_home = np.zeros(count + 1, dtype=np.bool_), np.zeros(count + 1, dtype=np.bool_)
+    goes_on[labels[far & ((paths.distance > EXIT_REACH - 0.01) | edge)]] = True
+    leads_home[labels[edge]] = True  # the last one stands for -1, no surface
+    limbs = np.flatnonzero(goes_on[:-1])
+    home = leads_home[limbs]
+    areas = np.bincount(labels[far], grid.areas[far], count)[limbs]
     # A limb that is cut off by the view on this side and ends freely on the other is a hand's the other way round.
-    backwards = bool(np.any(near & edge) and np.any(areas[~leads_home] > FINGER_AREA))
+    backwards = bool(np.any(near & edge) and np.any(areas[~home] > FINGER_AREA))
     # Beside an arm, what is no larger than a finger is one, seen from a palm that is not quite where it was thought.
-    has_arm = leads_home.any() or np.any(areas > FINGER_AREA)
-    counts = (areas > (FINGER_AREA if has_arm else LIMB_AREA)) | (leads_home & (areas > LIMB_AREA))
+    has_arm = home.any() or np.any(areas > FINGER_AREA)
+    counts = (areas > (FINGER_AREA if has_arm else LIMB_AREA)) | (home & (areas > LIMB_AREA))
     if backwards or counts.sum() > 1 or areas.sum() > LARGEST_EXIT:
         return None
-    limbs = goes_on[leads_home] if leads_home.any() else goes_on[counts] if counts.any() else goes_on
-    return tuple(np.flatnonzero((labels == label) & far) for label in limbs)
+    chosen = limbs[home] if home.any() else limbs[counts] if counts.any() else limbs
+    return tuple(np.flatnonzero((labels == label) & far) for label in chosen)
 
 
 def finger_area(surface: Grid, palm: Palm) -> float:

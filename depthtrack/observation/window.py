@@ -42,3 +42,19 @@ class Window(NamedTuple):
     def slices(self) -> tuple[slice, slice]:
         """Rows and columns, to index an image with."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
+
+    def grown(self, margin: int, camera: Camera) -> "Window":
+        """With `margin` more pixels on every side, as far as the camera's image goes."""
+        return Window(
+            max(self.left - margin, 0),
+            max(self.top - margin, 0),
+            min(self.right + margin, camera.width),
+            min(self.bottom + margin, camera.height),
+        )
+
+    def pasted(self, mask: NDArray[np.bool_], outer: "Window") -> NDArray[np.bool_]:
+        """`mask` (h, w) of this window as one of an `outer` window that holds it."""
+        out = np.zeros((outer.height, outer.width), dtype=np.bool_)
+        left, top = self.left - outer.left, self.top - outer.top
+        out[top : top + self.height, left : left + self.width] = mask
+        return out

@@ -82,7 +82,7 @@ def narrowest_place(grid: Grid, palm: Palm, arm: Arm) -> float:
 
 def _visible_end(grid: Grid, palm: Palm, arm: Arm) -> float:
     """Distance (m) along the arm from the palm's centre beyond which its breadth fades out."""
-    return float(np.median((grid.points[arm.exits] - palm.centre) @ arm.direction)) - 0.01
+    return float(((grid.points[arm.exits] - palm.centre) @ arm.direction).mean()) - 0.01
 
 
 def palm_centre(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Array:
