@@ -174,7 +174,7 @@ class AdaptiveSkin:
 
         Skin elsewhere, as a face's or the arm's, and what the hand has that is no skin, are left out.
         """
-        self._recent.append(_count(image, window, skin, hand, step=2))
+        self._recent.append(_count(image, window, skin, hand, step=3))
         self._classes = class_of_colour(self.posterior())
 
     def posterior(self) -> Array:
@@ -193,9 +193,16 @@ class AdaptiveSkin:
 
         Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are looked at.
         """
-        classes = np.empty((window.height, window.width), dtype=np.uint8)
-        classify(image, tuple(window), self._classes, blocks, stride, classes)
-        return grow_skin(classes)
+        skin = np.zeros((window.height, window.width), dtype=np.uint8)
+        rows, columns = np.flatnonzero(blocks.any(axis=1)), np.flatnonzero(blocks.any(axis=0))
+        if len(rows):
+            i0, i1, j0, j1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+            part = skin[i0 * stride : i1 * stride, j0 * stride : j1 * stride]
+            classes = np.empty(part.shape, dtype=np.uint8)
+            left, top = int(window.left + j0 * stride), int(window.top + i0 * stride)
+            classify(image, left, top, self._classes, np.ascontiguousarray(blocks[i0:i1, j0:j1]), stride, classes)
+            part[:] = grow_skin(classes)
+        return skin
 
 
 def class_of_colour(posterior: Array) -> NDArray[np.uint8]:
@@ -241,15 +248,15 @@ def count_colours(
 @numba.njit(cache=True)
 def classify(
     image: NDArray[np.uint8],
-    window: tuple[int, int, int, int],
+    left: int,
+    top: int,
     classes: NDArray[np.uint8],
     blocks: NDArray[np.uint8],
     stride: int,
     out: NDArray[np.uint8],
 ) -> None:
-    """Class of the pixels in a window of an RGB image (h, w, 3), looked up in `classes` (32768,), into `out`; NOT_SKIN
-    where `blocks` (rows, columns) of `stride` x `stride` pixels is 0."""
-    left, top, _, _ = window
+    """Class of the pixels of an RGB image (h, w, 3) from (left, top) on, looked up in `classes` (32768,), into `out`;
+    NOT_SKIN where `blocks` (rows, columns) of `stride` x `stride` pixels is 0."""
     height, width = out.shape
     for v in range(height):
         i = v // stride
