@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -58,40 +58,43 @@ def sweep(folder: Path, cells: list[Cell], workers: Workers, measure: Any = squa
 
 
 @contextmanager
-def dask_process(*arguments: str) -> Iterator[None]:
+def dask_process(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     """A `dask` command in a process of its own, which finds this module."""
     command = [sys.executable, "-m", "dask", *arguments]
     process = subprocess.Popen(command, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stderr=subprocess.DEVNULL)
     try:
-        yield
+        yield process
     finally:
         process.terminate()
         process.wait()
 
 
 @contextmanager
-def dask_scheduler(folder: Path) -> Iterator[str]:
-    """Address of a Dask scheduler on loopback."""
+def dask_scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A Dask scheduler on loopback: its address and its process."""
     pytest.importorskip("distributed", reason="Dask is not installed: pip install 'depthtrack[sweep]'")
     note = folder / "scheduler.json"
-    with dask_process("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", f"--scheduler-file={note}"):
+    where = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", f"--scheduler-file={note}")
+    with dask_process("scheduler", *where) as process:
         for _ in range(600):
             if note.exists() and note.read_text().endswith("}"):
                 break
             time.sleep(0.1)
-        yield json.loads(note.read_text())["address"]
+        yield json.loads(note.read_text())["address"], process
+
+
+def dask_workers(address: str, folder: Path) -> AbstractContextManager[Any]:
+    """Two worker processes of a scheduler."""
+    return dask_process(
+        "worker", address, "--nworkers=2", "--nthreads=1", "--no-dashboard", f"--local-directory={folder}"
+    )
 
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A scheduler with two worker processes."""
+    """Address of a scheduler with two worker processes."""
     folder = tmp_path_factory.mktemp("dask")
-    with (
-        dask_scheduler(folder) as address,
-        dask_process(
-            "worker", address, "--nworkers=2", "--nthreads=1", "--no-dashboard", f"--local-directory={folder}"
-        ),
-    ):
+    with dask_scheduler(folder) as (address, _), dask_workers(address, folder):
         yield address
 
 
@@ -206,7 +209,7 @@ def test_an_address_without_scheduler_is_told(
 
 def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", 1)
-    with dask_scheduler(tmp_path) as address, pytest.raises(InputError, match="has no workers"):
+    with dask_scheduler(tmp_path) as (address, _), pytest.raises(InputError, match="has no workers"):
         list(DaskWorkers(address).measure(square, [{"x": 1}]))
 
 
@@ -221,6 +224,25 @@ def test_a_cell_that_kills_every_dask_worker_is_given_up() -> None:
         workers = DaskWorkers(local.scheduler_address)
         with pytest.raises(SweepError, match="killed every worker that took it"):
             list(workers.measure(always_deadly, [{"x": 1}]))
+
+
+def test_a_sweep_whose_scheduler_dies_keeps_its_rows(tmp_path: Path) -> None:
+    cells: list[Cell] = [{"x": x, "marker": None} for x in range(500)]
+    with dask_scheduler(tmp_path) as (address, process), dask_workers(address, tmp_path):
+
+        def shoot(rows: Iterator[Row]) -> Iterator[Row]:
+            for row in rows:
+                process.kill()
+                yield row
+
+        with (
+            Journal(tmp_path / "rows.jsonl", ["x", "marker"]) as journal,
+            pytest.raises(SweepError, match="went away: run the same command again"),
+        ):
+            run_sweep(deadly_at_first, cells, journal, DaskWorkers(address), shoot)
+        assert (tmp_path / "rows.jsonl").read_bytes().count(b"\n") >= 1
+    rows = sweep(tmp_path, cells[:40], InThisProcess(), deadly_at_first)
+    assert [row["square"] for row in rows] == [x * x for x in range(40)]
 
 
 def test_a_figure_made_on_a_cluster_is_the_one_made_here(

@@ -1,6 +1,7 @@
 """Workers on an existing Dask cluster."""
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from importlib import import_module
 from typing import Any
 
@@ -59,4 +60,6 @@ class DaskWorkers:
             raise SweepError(f"a Dask worker cannot import depthtrack: install it there as here ({error})") from error
         except self._dask.scheduler.KilledWorker as error:
             raise SweepError(f"a cell killed every worker that took it: is memory short there? ({error})") from error
+        except (CancelledError, self._dask.comm.core.CommClosedError) as error:
+            raise SweepError(f"the Dask scheduler at {self.address} went away: run the same command again") from error
         return row
