@@ -23,6 +23,9 @@ hand; a reading of the hand."""
 DILATION = 5 / 640
 """Radius r of the circular dilation of Oikonomidis et al. 2011, Sec. 2.1, as a share of the image's width."""
 
+MARGIN = 2
+"""Nodes around the hand's into which its pixels may reach."""
+
 ROOM = 0.04
 """Metres around the hand that the region of interest leaves for hypotheses to move in."""
 
@@ -75,7 +78,7 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
         silhouette = _silhouette(kinds, coloured, r)
         readings = readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
     room = round(ROOM * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
-    roi = tight.grown(room, frame.camera)
+    roi = tight.grown(max(room - MARGIN * stride, 0), frame.camera)
     return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
 
 
@@ -107,14 +110,14 @@ def _smoothed(mask: Mask, r: int) -> Mask:
 
 
 def _blocks_of_hand(labels: Labels) -> Window:
-    """The hand's nodes, and two more on every side for what the dilation may add."""
+    """The hand's nodes, and MARGIN more on every side."""
     hand = labels == HAND
     rows, columns = np.flatnonzero(hand.any(axis=1)), np.flatnonzero(hand.any(axis=0))
     return Window(
-        max(int(columns[0]) - 2, 0),
-        max(int(rows[0]) - 2, 0),
-        min(int(columns[-1]) + 3, labels.shape[1]),
-        min(int(rows[-1]) + 3, labels.shape[0]),
+        max(int(columns[0]) - MARGIN, 0),
+        max(int(rows[0]) - MARGIN, 0),
+        min(int(columns[-1]) + 1 + MARGIN, labels.shape[1]),
+        min(int(rows[-1]) + 1 + MARGIN, labels.shape[0]),
     )
 
 
