@@ -28,7 +28,7 @@ class LostBelow:
 
 
 class TrackMemory:
-    """The last pose (27,), or None where there is nothing to follow, and `velocity` (26,): its last step."""
+    """The last pose (27,), or None where there is nothing to follow; `velocity` (26,), its last step; its `energy`."""
 
     def __init__(self, limits: LostBelow) -> None:
         self._limits = limits
@@ -36,6 +36,7 @@ class TrackMemory:
         self._usual: deque[float] = deque(maxlen=_USUAL_FRAMES)
         self.pose: Array | None = None
         self.velocity = np.zeros(26)
+        self.energy = np.inf
 
     def is_lost(self, energy: float, confidence: float) -> bool:
         """Whether a pose with this energy and confidence is not to be trusted."""
@@ -51,7 +52,7 @@ class TrackMemory:
             self.velocity = tangent_between(self.pose, estimate.pose)
         else:
             self.velocity = np.zeros(26)
-        self.pose, self._confidence = estimate.pose, estimate.confidence
+        self.pose, self.energy, self._confidence = estimate.pose, estimate.energy, estimate.confidence
         self._usual.append(estimate.energy)
 
     @property

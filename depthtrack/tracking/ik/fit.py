@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from depthtrack.hand.alignment import rigid_alignment
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose, quaternion_from_matrix, rotation_matrix
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.synergies import Synergies
 from depthtrack.observation.observation import Observation
 from depthtrack.tracking.ik.chain import Bodies, Chain, place
-from depthtrack.tracking.ik.matching import Cloud, Surface
+from depthtrack.tracking.ik.matching import Cloud, Matches, Surface
 from depthtrack.tracking.ik.moments import Moments, clear
 from depthtrack.tracking.ik.residuals import Residual, add_matches
 from depthtrack.tracking.ik.solver import Damping, Solution, limit_slope, solve
@@ -19,25 +18,45 @@ from depthtrack.tracking.ik.space import FULL, Space
 
 Array = NDArray[np.float64]
 
+_COARSE = 4
+"""The whole hand is aligned by every so many-th point of the cloud."""
+_STANDARD_COUNT = 3000.0
+"""Points that damping is stated for: with more or fewer, it grows and shrinks alongside their sum."""
+
 
 @dataclass(frozen=True)
 class FitOptions:
     """How an observation is fitted.
 
     `rounds` of correspondences with at most `inner` Gauss-Newton steps each, after `rigid` rounds that move the hand
-    as a whole. `damping` lambda of Eq. (4), m^2/rad^2 for a sum over all points; `reach` (m) and `agreement` (cosine of
-    the normals) that correspondences must have; `softness` (m) of the robust weights, 0 for none.
+    as a whole. `residual` and `softness` (m, in the first and in the last round, 0 for none) say how correspondences
+    count, `reach` (m) and `agreement` (cosine between normals) which do. `damping` is lambda of Eq. (4) and `hold` how
+    firmly the angles are tied to those given, both in m^2/rad^2 beside the sum over 3000 points.
     """
 
     rounds: int = 5
     inner: int = 5
-    rigid: int = 1
+    rigid: int = 2
     residual: Residual = "symmetric"
-    softness: float = 0.01
-    reach: float = 0.03
+    softness: tuple[float, float] = (0.03, 0.007)
+    reach: float = 0.04
     agreement: float = 0.3
     damping: float = 1e-4
+    hold: float = 5e-5
     avoid_limits: bool = False
+
+    def softness_at(self, round_: int, rounds: int) -> float:
+        """Graduated: outliers lose their say as the fit improves."""
+        first, last = self.softness
+        if first <= 0 or last <= 0:
+            return 0.0
+        return float(first * (last / first) ** (round_ / max(rounds - 1, 1)))
+
+
+PAPER_FIT = FitOptions(
+    rigid=1, residual="point", softness=(0.0, 0.0), agreement=0.0, damping=1e-6, hold=0.0, avoid_limits=True
+)
+"""Schroeder et al. 2014: point to point, all points alike, damping by the step alone, joint limit avoidance."""
 
 
 class Fitter:
@@ -48,51 +67,56 @@ class Fitter:
         self._surface = surface
         self._chain = Chain.of(shape)
         self._bodies, self._moments = Bodies.empty(), Moments.empty()
-        none = np.zeros((20, 20)), np.zeros(20)
-        self._damping = Damping(options.damping, 1e-9, *none, options.avoid_limits)
 
     def observe(self, observation: Observation, every: int) -> None:
-        """Set what the next fits are to, every so many-th point of it."""
+        """Set what the next fits are to: every so many-th point of this observation."""
         self._cloud = Cloud.of(observation, every)
+        self._matches = Matches.room(len(self._cloud.points))
+        self._coarse = Cloud.of(observation, every * _COARSE)
+        self._coarse_matches = Matches.room(len(self._coarse.points))
         self._surface.observe(observation, self._cloud, self.options.reach)
+        self._share = len(self._cloud.points) / _STANDARD_COUNT
 
-    def fit(self, pose: Array, space: Space = FULL, rounds: int | None = None) -> Array:
-        """The pose (27,) reached from `pose` by moving what `space` lets move."""
+    def fit(self, pose: Array, space: Space = FULL, rounds: int | None = None, held: Array | None = None) -> Array:
+        """The pose (27,) reached from `pose` by moving what `space` lets move.
+
+        `held` (20,) are the angles that those which the observation says nothing of are drawn to; None lets go.
+        """
+        options = self.options
         pose = pose.copy()
         coordinates = space.project(pose[ANGLES])
         pose[ANGLES] = space.angles(coordinates)
-        for _ in range(self.options.rigid):
+        for _ in range(options.rigid):
             self._align(pose)
         slope = np.array([limit_slope(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
         state = Solution(pose, coordinates, slope)
-        for _ in range(self.options.rounds if rounds is None else rounds):
-            self._match(pose)
-            solve(self._chain, self._moments, space, self._damping, self.options.inner, self._bodies, state)
+        hold = np.zeros((20, 20)) if held is None else options.hold * self._share * np.eye(20)
+        rest = np.zeros(20) if held is None else held
+        damping = Damping(options.damping * self._share, 1e-9, hold, rest, options.avoid_limits)
+        rounds = options.rounds if rounds is None else rounds
+        for k in range(rounds):
+            self._match(pose, self._cloud, self._matches, options.softness_at(k, rounds))
+            solve(self._chain, self._moments, space, damping, options.inner, self._bodies, state)
         return pose
 
-    def _match(self, pose: Array) -> None:
+    def _match(self, pose: Array, cloud: Cloud, matches: Matches, softness: float) -> None:
         place(self._chain, pose, self._bodies)
-        matches = self._surface.match(pose, self._bodies)
+        self._surface.match(pose, self._bodies, cloud, matches)
         clear(self._moments, self._bodies)
-        add_matches(self._moments, matches, self._cloud, self.options.residual, self.options.softness)
+        add_matches(self._moments, matches, cloud, self.options.residual, softness)
 
     def _align(self, pose: Array) -> None:
         """Move the whole hand onto its correspondences: in closed form for points (Horn 1987), else by solving."""
+        matches = self._coarse_matches
+        self._match(pose, self._coarse, matches, self.options.softness[0])
         if self.options.residual != "point":
-            self._match(pose)
-            held = Space(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
             still = Solution(pose, np.zeros(1), np.zeros(1))
-            solve(self._chain, self._moments, held, self._damping, self.options.inner, self._bodies, still)
+            held = Space(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
+            free = Damping(1.0, 1e-9, np.zeros((20, 20)), np.zeros(20), False)
+            solve(self._chain, self._moments, held, free, self.options.inner, self._bodies, still)
             return
-        place(self._chain, pose, self._bodies)
-        matches = self._surface.match(pose, self._bodies)
         found = matches.body >= 0
         if found.sum() >= 3:
-            R, t = rigid_alignment(matches.x[found], self._cloud.points[found])
+            R, t = rigid_alignment(matches.x[found], self._coarse.points[found])
             turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
             pose[:] = make_pose(R @ pose[POSITION] + t, turned, pose[ANGLES])
-
-
-def synergy_space(synergies: Synergies) -> Space:
-    """The space of these synergies."""
-    return Space(synergies.components, synergies.mean, synergies.lower, synergies.upper, False)

@@ -43,12 +43,12 @@ class Surface(Protocol):
     """A hand's surface that observed points can be matched to."""
 
     def observe(self, observation: Observation, cloud: Cloud, reach: float) -> None:
-        """Prepare for matches with this cloud; none will be further than `reach` (m)."""
+        """Prepare for matches with points of this cloud; none will be further than `reach` (m)."""
         ...
 
-    def match(self, pose: Array, bodies: Bodies) -> Matches:
-        """Closest seen points of the hand in `pose` (27,), whose `bodies` are already placed.
+    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, matches: Matches) -> None:
+        """The closest seen points of the hand in `pose` (27,), whose `bodies` are already placed, into `matches`.
 
-        Only surface whose normal agrees with the observed one counts. What is returned is overwritten by the next call.
+        Only surface whose normal agrees with the observed one counts.
         """
         ...

@@ -18,7 +18,6 @@ from depthtrack.hand.kinematics import BODY_COUNT
 from depthtrack.tracking.ik.chain import Bodies
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 class Moments(NamedTuple):
@@ -47,77 +46,17 @@ def clear(moments: Moments, bodies: Bodies) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def add_planes(moments: Moments, body: Index, x: Array, y: Array, n: Array, weight: Array) -> None:
-    """Add residuals n . (x - y): `body` (N,) that surface points `x` (N, 3) are fixed to, their targets `y` (N, 3),
-    unit directions `n` (N, 3) and weights (N,). Points of weight 0 are passed over."""
-    M, g, c = moments.M, moments.g, moments.centre
-    a = np.empty(6)
-    for i in range(body.shape[0]):
-        w = weight[i]
-        if w <= 0.0:
-            continue
-        b = body[i]
-        px, py, pz = x[i, 0] - c[0], x[i, 1] - c[1], x[i, 2] - c[2]
-        nx, ny, nz = n[i, 0], n[i, 1], n[i, 2]
-        e = nx * (x[i, 0] - y[i, 0]) + ny * (x[i, 1] - y[i, 1]) + nz * (x[i, 2] - y[i, 2])
-        a[0], a[1], a[2] = nx, ny, nz
-        a[3], a[4], a[5] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-        for j in range(6):
-            wa = w * a[j]
-            g[b, j] += wa * e
-            for k in range(j + 1):
-                M[b, j, k] += wa * a[k]
-        moments.e[b] += w * e * e
-
-
-@numba.njit(cache=True, nogil=True)
-def add_points(moments: Moments, body: Index, x: Array, y: Array, weight: Array) -> None:
-    """Add residuals x - y, all three coordinates; arguments as for `add_planes`."""
-    M, g, c = moments.M, moments.g, moments.centre
-    for i in range(body.shape[0]):
-        w = weight[i]
-        if w <= 0.0:
-            continue
-        b = body[i]
-        px, py, pz = x[i, 0] - c[0], x[i, 1] - c[1], x[i, 2] - c[2]
-        ex, ey, ez = x[i, 0] - y[i, 0], x[i, 1] - y[i, 1], x[i, 2] - y[i, 2]
-        # v shifts a point as it is, w by w x p: the gradient of its coordinates is (1, -[p]x).
-        M[b, 0, 0] += w
-        M[b, 1, 1] += w
-        M[b, 2, 2] += w
-        M[b, 3, 1] -= w * pz
-        M[b, 3, 2] += w * py
-        M[b, 4, 0] += w * pz
-        M[b, 4, 2] -= w * px
-        M[b, 5, 0] -= w * py
-        M[b, 5, 1] += w * px
-        M[b, 3, 3] += w * (py * py + pz * pz)
-        M[b, 4, 4] += w * (px * px + pz * pz)
-        M[b, 5, 5] += w * (px * px + py * py)
-        M[b, 4, 3] -= w * px * py
-        M[b, 5, 3] -= w * px * pz
-        M[b, 5, 4] -= w * py * pz
-        g[b, 0] += w * ex
-        g[b, 1] += w * ey
-        g[b, 2] += w * ez
-        g[b, 3] += w * (py * ez - pz * ey)
-        g[b, 4] += w * (pz * ex - px * ez)
-        g[b, 5] += w * (px * ey - py * ex)
-        moments.e[b] += w * (ex * ex + ey * ey + ez * ez)
-
-
-@numba.njit(cache=True, nogil=True)
 def twist(moments: Moments, bodies: Bodies, b: int, out: Array) -> None:
     """Twist (6,) of body b from where it was when the residuals were added, to first order in its turn."""
     now, was, c = bodies.T[b], moments.T[b], moments.centre
-    R = out_rotation = np.empty((3, 3))
+    R = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             R[i, j] = now[i, 0] * was[j, 0] + now[i, 1] * was[j, 1] + now[i, 2] * was[j, 2]
     for i in range(3):
         moved = now[i, 3]
         for j in range(3):
-            moved += out_rotation[i, j] * (c[j] - was[j, 3])
+            moved += R[i, j] * (c[j] - was[j, 3])
         out[i] = moved - c[i]
     out[3], out[4], out[5] = (R[2, 1] - R[1, 2]) / 2, (R[0, 2] - R[2, 0]) / 2, (R[1, 0] - R[0, 1]) / 2
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.synergies import Synergies
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,12 @@ class Space(NamedTuple):
     lower: Array
     upper: Array
     full: bool
+
+    @staticmethod
+    def of(synergies: Synergies, count: int | None = None) -> "Space":
+        """The global pose and the first `count` synergies, or all of them. Raises InputError if there are fewer."""
+        s = synergies if count is None else synergies.truncated(count)
+        return Space(np.ascontiguousarray(s.components), np.array(s.mean), np.array(s.lower), np.array(s.upper), False)
 
     def project(self, angles: Array) -> Array:
         """Coordinates (l,) of the nearest angles that the space holds, moved within the limits."""

@@ -10,36 +10,37 @@ from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import POSE_SIZE, retract
+from depthtrack.hand.pose import ANGLES, POSE_SIZE, retract
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.synergies import Synergies
+from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.observation.observation import Observation
+from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.tracking.ik.capsules import CapsuleSurface
-from depthtrack.tracking.ik.fit import FitOptions, Fitter, synergy_space
+from depthtrack.tracking.ik.fit import PAPER_FIT, FitOptions, Fitter
+from depthtrack.tracking.ik.hierarchy import SearchOptions, find_pose
 from depthtrack.tracking.ik.matching import Surface
 from depthtrack.tracking.ik.mesh import MeshSurface
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.memory import LostBelow, TrackMemory
-from depthtrack.tracking.pso.search import SearchOptions, find_pose
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 Model = Literal["skin", "cylinders"]
 
-PAPER = FitOptions(residual="point", softness=0.0, agreement=0.0, avoid_limits=True)
-"""Schroeder et al. 2014: point to point, no robust weights, joint limit avoidance."""
-
 
 @dataclass(frozen=True)
 class IkOptions:
     """How the IK tracker works; the same options and observations give the same bits.
 
-    `variant` "paper" is Schroeder et al. 2014, "default" what was measured to do best. `model` is what the observation
-    is matched to: the skin mesh, or the model of cylinders and spheres. Every `subsample`-th point is used. With
-    `synergies`, only they and the global pose are solved for. `fit` overrides everything about the fit.
+    `variant` "paper" is Schroeder et al. 2014: point to point, linear prediction, joint limit avoidance. "default" fits
+    along normals with graduated robust weights, chooses among predictions by rendering them, and tries again where the
+    result does not look like the observation: each measured to help. `fit` overrides either's way of fitting.
+    `model` is what the observation is matched to: the skin mesh, or tapered capsules. Every `subsample`-th point is
+    used. With `synergies`, only they and the global pose are solved for; the search for a start, which needs some in
+    any case, then uses them too.
     """
 
     variant: Variant = "default"
@@ -50,14 +51,20 @@ class IkOptions:
     synergies: Synergies | None = None
     seed: int = 0
     lost: LostBelow = field(default_factory=LostBelow)
-    search: SearchOptions = field(default_factory=SearchOptions)
     fit: FitOptions | None = None
+    search: SearchOptions = field(default_factory=SearchOptions)
+    objective: Objective = field(default_factory=Objective)
 
     @property
     def fitting(self) -> FitOptions:
         """How each observation is fitted."""
-        base = self.fit or (PAPER if self.variant == "paper" else FitOptions())
-        return base if self.fit else replace(base, rounds=self.rounds, inner=self.inner)
+        base = self.fit or (PAPER_FIT if self.variant == "paper" else FitOptions())
+        return replace(base, rounds=self.rounds, inner=self.inner)
+
+    @property
+    def predictions(self) -> tuple[float, ...]:
+        """Shares of the last frame's motion that the next frame's may be."""
+        return (1.0,) if self.variant == "paper" else (0.0, 0.5, 1.0)
 
 
 def make_surface(model: Model, shape: HandShape, agreement: float) -> Surface:
@@ -66,52 +73,64 @@ def make_surface(model: Model, shape: HandShape, agreement: float) -> Surface:
         return MeshSurface(shape, agreement)
     if model == "cylinders":
         return CapsuleSurface(shape, agreement)
-    raise InputError(f"no hand model '{model}': choose skin or cylinders")
+    raise InputError(f"no hand model '{model}' for fitting: choose skin or cylinders")
 
 
 class IkTracker:
     """Follows a hand by fitting its surface: see `tracker.Tracker`."""
 
     name = "ik"
-    stages: tuple[str, ...] = ("observe", "fit", "check")
+    stages: tuple[str, ...] = ("observe", "predict", "fit", "retry")
 
     def __init__(self, shape: HandShape, options: IkOptions | None = None) -> None:
         self.options = options = options or IkOptions()
         if options.variant not in ("default", "paper"):
             raise InputError(f"no IK variant '{options.variant}': choose default or paper")
-        if options.subsample < 1:
-            raise InputError(f"subsample must be 1 or more, found {options.subsample}")
-        fit = options.fitting
-        self._fitter = Fitter(shape, make_surface(options.model, shape, fit.agreement), fit)
-        self._scorer = RasterScorer(shape)
-        self._space: Space = FULL if options.synergies is None else synergy_space(options.synergies)
+        for name in ("rounds", "inner", "subsample"):
+            if not 1 <= getattr(options, name) <= 1000:
+                raise InputError(f"{name} must lie between 1 and 1000, found {getattr(options, name)}")
+        fitting = options.fitting
+        self._fitter = Fitter(shape, make_surface(options.model, shape, fitting.agreement), fitting)
+        self._scorer = RasterScorer(shape, options.objective)
+        self._space: Space = FULL if options.synergies is None else Space.of(options.synergies)
+        self._synergies = options.synergies or load_synergies()
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by fitting, or by searching."""
-        begun = time.perf_counter()
+        clock = _Clock()
         self._observe(observation)
-        observed = time.perf_counter()
+        clock.lap("observe")
         if pose is None:
-            given, _ = find_pose(self._scorer, observation.centre, self._generator(observation), self.options.search)
+            found = self._search(observation)
+            clock.lap("retry")
         else:
             given = np.asarray(pose, dtype=np.float64)
             if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
                 raise InputError(f"a start pose must be {POSE_SIZE} finite numbers, found shape {given.shape}")
-        found = self._fitter.fit(within_limits(given), self._space)
-        return self._settle(found, Status.STARTED, begun, observed)
+            found = self._fitter.fit(within_limits(given), self._space, 2 * self.options.rounds)
+            clock.lap("fit")
+        return self._settle(found, Status.STARTED, clock)
 
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
         last = self._memory.pose
         if last is None:
             return self.start(observation)
-        begun = time.perf_counter()
+        clock = _Clock()
         self._observe(observation)
-        observed = time.perf_counter()
-        ahead = 1.0 if self.options.variant == "paper" else 0.5
-        found = self._fitter.fit(within_limits(retract(last, ahead * self._memory.velocity)), self._space)
-        return self._settle(found, Status.TRACKED, begun, observed)
+        clock.lap("observe")
+        steps = np.outer(self.options.predictions, self._memory.velocity)
+        ahead = within_limits(retract(last, steps))
+        ahead = ahead[np.argsort(self._scorer.score(ahead), kind="stable")]
+        clock.lap("predict")
+        held = last[ANGLES] if self._space.full else None
+        found = self._fitter.fit(ahead[0], self._space, held=held)
+        clock.lap("fit")
+        if self.options.variant == "default":
+            found = self._reconsider(found, ahead[1:], held)
+            clock.lap("retry")
+        return self._settle(found, Status.TRACKED, clock)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
         """Take up a track after these estimates, as if they had been made just now."""
@@ -130,21 +149,46 @@ class IkTracker:
         self._scorer.observe(Target(observation.camera, observation.skin, observation.depth))
         self._fitter.observe(observation, self.options.subsample)
 
-    def _generator(self, observation: Observation) -> np.random.Generator:
-        """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""
-        return np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
+    def _reconsider(self, found: Array, others: Array, held: Array | None) -> Array:
+        """The best of what further descents find, where the first one ended much higher than the frame before."""
+        satisfied = 1.3 * self._memory.energy + 2.0
+        if self._scorer.score(found[None])[0] <= satisfied:
+            return found
+        tried = np.stack([found, *(self._fitter.fit(pose, self._space, held=held) for pose in others)])
+        energies = self._scorer.score(tried)
+        best = tried[np.argmin(energies)]
+        if energies.min() <= satisfied:
+            return best
+        further = self._fitter.fit(best, self._space, 2 * self.options.rounds, held)
+        return np.stack([best, further])[np.argmin(self._scorer.score(np.stack([best, further])))]
 
-    def _settle(self, pose: Array, status: Status, begun: float, observed: float) -> Estimate:
-        fitted = time.perf_counter()
+    def _search(self, observation: Observation) -> Array:
+        # Philox keyed by seed and frame: the same whatever happened before.
+        generator = np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
+        found = find_pose(
+            self._fitter, self._scorer, observation.centre, self._synergies, self.options.search, generator
+        )[0]
+        return found if self._space.full else self._fitter.fit(found, self._space)
+
+    def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
         terms = self._scorer.terms(pose[None])
         energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
         if self._memory.is_lost(energy, confidence):
             status = Status.LOST
-        stage_ms = {
-            "observe": 1e3 * (observed - begun),
-            "fit": 1e3 * (fitted - observed),
-            "check": 1e3 * (time.perf_counter() - fitted),
-        }
+        stage_ms = {name: clock.milliseconds.get(name, 0.0) for name in self.stages}
         estimate = Estimate(pose, energy, confidence, status, stage_ms)
         self._memory.remember(estimate)
         return estimate
+
+
+class _Clock:
+    """Milliseconds between laps."""
+
+    def __init__(self) -> None:
+        self.milliseconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.milliseconds[name] = 1e3 * (now - self._last)
+        self._last = now
