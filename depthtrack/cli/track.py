@@ -1,6 +1,6 @@
 """`depthtrack track`: a recording's hand, frame by frame, into a run folder."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,7 +12,6 @@ from depthtrack.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-    from depthtrack.hand.shape import HandShape
     from depthtrack.recording import Sequence
 
 
@@ -68,18 +67,31 @@ class Command:
         from depthtrack.hand.kinematics import HandModel
         from depthtrack.observation.observation import Observer
         from depthtrack.recording.run import RunWriter
+        from depthtrack.tracking.configuration import chosen_hand, run_configuration
         from depthtrack.tracking.loop import track_sequence
         from depthtrack.tracking.trackers import create_tracker
 
         sequence = self.recording.open()
-        hand = self._hand(sequence)
+        hand = chosen_hand(sequence, self.hand)
         options = self._options()
+        configuration = run_configuration(
+            self.recording.path,
+            sequence,
+            hand,
+            self.tracker,
+            options,
+            start=self.start,
+            frames=self.frames,
+            skin_model=self.skin_model,
+            on_damage=self.recording.on_damage,
+            threads=self.threads,
+        )
         start_pose = self._start_pose(sequence)
         observer = Observer.for_sequence(sequence, self.skin_model)
         count = len(sequence) if self.frames is None else min(self.frames, len(sequence))
         with (
             closing(create_tracker(self.tracker, hand, **options)) as tracker,
-            RunWriter(self.out, self._configuration(hand, sequence), ("segment", *tracker.stages), self.resume) as run,
+            RunWriter(self.out, configuration, ("segment", *tracker.stages), self.resume) as run,
             tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
         ):
             for row in track_sequence(sequence, observer, tracker, HandModel(hand), run, start_pose, count):
@@ -105,14 +117,6 @@ class Command:
             "resolution": self.resolution,
         }
 
-    def _hand(self, sequence: "Sequence") -> "HandShape":
-        from depthtrack.hand.shape import HandShape
-
-        if self.hand is not None:
-            return HandShape.from_json(self.hand)
-        truth = sequence.ground_truth
-        return truth.hand if truth is not None and truth.hand is not None else HandShape()
-
     def _start_pose(self, sequence: "Sequence") -> "np.ndarray | None":
         if self.start == "auto":
             return None
@@ -121,24 +125,3 @@ class Command:
         if truth is None or truth.poses is None or row is None:
             raise InputError(f"{self.recording.path} knows no true pose of its first frame: use --start auto")
         return truth.poses[row]
-
-    def _configuration(self, hand: "HandShape", sequence: "Sequence") -> dict[str, Any]:
-        import json
-        import platform
-        from importlib.metadata import version
-
-        options = {name: value for name, value in self._options().items() if name != "threads"}
-        return {
-            "sequence": str(self.recording.path.resolve()),
-            **{name: getattr(self, name) for name in ("tracker", "start", "frames")},
-            **options,
-            "skin_model": None if self.skin_model is None else str(self.skin_model.resolve()),
-            "on_damage": self.recording.on_damage,
-            "threads": self.threads,
-            "camera": asdict(sequence.camera),
-            "hand": json.loads(hand.to_json()),
-            "versions": {
-                "python": platform.python_version(),
-                **{name: version(name) for name in ("depthtrack", "numpy", "numba")},
-            },
-        }

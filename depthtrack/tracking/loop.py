@@ -1,7 +1,7 @@
 """The loop over a recording: observe, start or follow, write down; takes up an interrupted run where it stood."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
@@ -28,20 +28,21 @@ def track_sequence(
     run: RunWriter,
     start_pose: np.ndarray | None = None,
     count: int | None = None,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> Iterator[RunRow]:
     """Track every frame, or the first `count` of them, and append it to the run; yields each row as it is done.
 
     While the track is sure, the tracker tells the observer where to look. Frames that the run already
     holds are observed again, which costs little and brings the observer to where it was, but not tracked again.
     `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
-    starts by itself.
+    starts by itself. `clock` (seconds) times the observer.
     """
     done = list(run.rows)
     awaiting_start = start_pose is not None and all(row.pose is None for row in done)
     for number, frame in enumerate(islice(sequence, count)):
-        begun = time.perf_counter()
+        begun = clock()
         observation = observer.observe(frame, _place(model, tracker.expected))
-        observe_ms = 1e3 * (time.perf_counter() - begun)
+        observe_ms = 1e3 * (clock() - begun)
         if number < len(done):
             tracker.recall([_estimate(done[number])])
             continue

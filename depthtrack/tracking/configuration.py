@@ -1,0 +1,56 @@
+"""What a run folder tells of how it was made: enough to make it again."""
+
+import json
+import platform
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.sequence import Sequence
+
+
+def run_configuration(
+    path: Path,
+    sequence: Sequence,
+    hand: HandShape,
+    tracker: str,
+    options: dict[str, Any],
+    *,
+    start: str = "auto",
+    frames: int | None = None,
+    skin_model: Path | None = None,
+    on_damage: str = "refuse",
+    threads: int | None = None,
+    **more: Any,
+) -> dict[str, Any]:
+    """The contents of run.json: recording at `path`, tracker and options, camera, hand, versions; and `more`.
+
+    Threads change no pose, so they are told apart from the options.
+    """
+    return {
+        "sequence": str(path.resolve()),
+        "tracker": tracker,
+        "start": start,
+        "frames": frames,
+        **{name: value for name, value in options.items() if name != "threads"},
+        **more,
+        "skin_model": None if skin_model is None else str(skin_model.resolve()),
+        "on_damage": on_damage,
+        "threads": threads,
+        "camera": asdict(sequence.camera),
+        "hand": json.loads(hand.to_json()),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("depthtrack", "numpy", "numba")},
+        },
+    }
+
+
+def chosen_hand(sequence: Sequence, file: Path | None) -> HandShape:
+    """The hand of a file; without one the recording's own, or the average adult's right hand. Raises InputError."""
+    if file is not None:
+        return HandShape.from_json(file)
+    truth = sequence.ground_truth
+    return truth.hand if truth is not None and truth.hand is not None else HandShape()
