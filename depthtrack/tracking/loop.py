@@ -41,7 +41,7 @@ def track_sequence(
     awaiting_start = start_pose is not None and all(row.pose is None for row in done)
     for number, frame in enumerate(islice(sequence, count)):
         begun = clock()
-        observation = observer.observe(frame, _place(model, tracker.expected))
+        observation = observer.observe(frame, hand_place(model, tracker.expected))
         observe_ms = 1e3 * (clock() - begun)
         if number < len(done):
             tracker.recall([_estimate(done[number])])
@@ -58,7 +58,7 @@ def track_sequence(
         yield row
 
 
-def _place(model: HandModel, pose: NDArray[np.float64] | None) -> HandPlace | None:
+def hand_place(model: HandModel, pose: NDArray[np.float64] | None) -> HandPlace | None:
     """Where a hand in this pose is: around its palm, as far as its fingers reach, up to its wrist."""
     if pose is None:
         return None

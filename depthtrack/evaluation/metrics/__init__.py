@@ -1,0 +1,39 @@
+"""Metrics, one file a family. Every metric knows its unit; arrays have a row a frame.
+
+A row is NaN where a frame cannot be judged: no pose, no truth, or no hand observed.
+"""
+
+from depthtrack.evaluation.metrics.jitter import added_jitter, jitter
+from depthtrack.evaluation.metrics.losses import Loss, Losses, find_losses
+from depthtrack.evaluation.metrics.metric import Metric
+from depthtrack.evaluation.metrics.points import (
+    PointErrors,
+    angle_error,
+    endpoint_error,
+    endpoint_errors,
+    joint_errors,
+)
+from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
+from depthtrack.evaluation.metrics.success import SuccessCurve
+from depthtrack.evaluation.metrics.timing import frame_time, stage_times
+
+__all__ = [
+    "Loss",
+    "Losses",
+    "Metric",
+    "PointErrors",
+    "Residuals",
+    "SuccessCurve",
+    "added_jitter",
+    "angle_error",
+    "e2d",
+    "e3d",
+    "endpoint_error",
+    "endpoint_errors",
+    "find_losses",
+    "frame_time",
+    "jitter",
+    "joint_errors",
+    "silhouette_iou",
+    "stage_times",
+]

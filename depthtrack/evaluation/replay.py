@@ -1,0 +1,134 @@
+"""A run beside its recording: every frame as the tracker saw it, with what the tracker said of it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.errors import InputError
+from depthtrack.evaluation.model_surface import ModelSurface
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.observation.observation import Observation, Observer
+from depthtrack.recording import open_sequence
+from depthtrack.recording.run import Run
+from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.tracking.loop import hand_place
+from depthtrack.tracking.memory import LostBelow, TrackMemory
+from depthtrack.tracking.tracker import Estimate, Status
+
+Array = NDArray[np.float64]
+
+_SAME_TIME = 1e-6
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """One frame of a run: `row` in the run, the recording's `frame`, the hand observed in it (None without one), and
+    the tracker's `estimate`."""
+
+    row: int
+    frame: Frame
+    observation: Observation | None
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A run and its recording, opened with the run's own camera."""
+
+    run: Run
+    sequence: Sequence
+    hand: HandShape
+
+    @classmethod
+    def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
+        """The run beside the recording it tracked, or beside `sequence` where that has moved. Raises InputError."""
+        path = sequence or recorded_path(run)
+        if sequence is None and not path.exists():
+            raise InputError(
+                f"the recording {path} of the run {run.folder} is not there any more: give --sequence PATH"
+            )
+        recording = open_sequence(path, _camera(run), on_damage="skip")
+        _check_same_recording(run, recording, path)
+        return cls(run, recording, run_hand(run))
+
+    def surface(self) -> ModelSurface:
+        """The surface that the run fitted. Raises InputError for hand sizes that no skin fits."""
+        return ModelSurface.of(self.hand, skin=self.run.configuration.get("model") == "skin")
+
+    def __len__(self) -> int:
+        return len(self.run.index)
+
+    def __iter__(self) -> Iterator[Replayed]:
+        """Every frame that is still readable, observed with the run's own settings and guided by its own poses."""
+        run, model, memory = self.run, HandModel(self.hand), TrackMemory(LostBelow())
+        observer = Observer.for_sequence(self.sequence, _skin_model(run))
+        row_of = {int(index): row for row, index in enumerate(run.index)}
+        for frame in self.sequence.frames(map(int, run.index)):
+            row = row_of[frame.index]
+            observation = observer.observe(frame, hand_place(model, memory.expected))
+            estimate = estimate_of(run, row)
+            memory.remember(estimate)
+            yield Replayed(row, frame, observation, estimate)
+
+
+def estimate_of(run: Run, row: int) -> Estimate:
+    """What the tracker said of one frame."""
+    pose = run.poses[row]
+    return Estimate(
+        pose if np.isfinite(pose).all() else None,
+        float(run.energy[row]),
+        float(run.confidence[row]),
+        Status(run.status[row]),
+        {stage: float(values[row]) for stage, values in run.stage_ms.items() if row < len(values)},
+    )
+
+
+def run_hand(run: Run) -> HandShape:
+    """The hand that a run was tracked with. Raises InputError."""
+    try:
+        return HandShape.from_fields(run.configuration["hand"])
+    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+        raise InputError(f"{run.folder / 'run.json'} names no usable hand: {error}") from error
+
+
+def recorded_path(run: Run) -> Path:
+    """Where the run's recording was. Raises InputError when run.json does not say."""
+    path = run.configuration.get("sequence")
+    if not isinstance(path, str):
+        raise InputError(f"{run.folder / 'run.json'} does not say which recording it tracked: give --sequence PATH")
+    return Path(path)
+
+
+def _camera(run: Run) -> Camera | None:
+    """The camera that the run was tracked with; None leaves the recording its own."""
+    fields: Any = run.configuration.get("camera")
+    return None if fields is None else Camera.from_dict(fields, f"{run.folder / 'run.json'}: camera")
+
+
+def _skin_model(run: Run) -> Path | None:
+    path = run.configuration.get("skin_model")
+    return Path(path) if isinstance(path, str) else None
+
+
+def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:
+    """Raises InputError unless the run's frames are the recording's."""
+    outside = (run.index < 0) | (run.index >= len(sequence))
+    if outside.any():
+        raise InputError(
+            f"{path} has {len(sequence)} frames, but the run {run.folder} tracked frame {run.index[outside][0]}: "
+            "--sequence must name the recording that the run was made from"
+        )
+    apart = np.abs(sequence.timestamps[run.index] - run.timestamps)
+    if len(apart) and apart.max() > _SAME_TIME:
+        index = run.index[apart.argmax()]
+        raise InputError(
+            f"frame {index} of {path} was taken at {sequence.timestamps[index]:.6f} s, but at "
+            f"{run.timestamps[apart.argmax()]:.6f} s in the run {run.folder}: --sequence must name the recording that "
+            "the run was made from"
+        )
