@@ -114,7 +114,7 @@ def evaluate(replay: Replay, residuals: bool = True, progress: Progress | None =
         None if points is None else SuccessCurve.of(points),
         find_losses(run.status, run.timestamps),
         frame_time(run.stage_ms, len(run.index)),
-        stage_times(run.stage_ms),
+        stage_times(run.stage_ms, len(run.index)),
     )
 
 

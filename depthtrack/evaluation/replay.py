@@ -12,6 +12,7 @@ from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.evaluation.model_surface import ModelSurface
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
@@ -24,6 +25,9 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-6
+_UNIT_TOLERANCE = 1e-3
+_FARTHEST = 100.0
+"""Metres from the camera beyond which no pose lies."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,7 @@ class Replay:
     @classmethod
     def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
         """The run beside the recording it tracked, or beside `sequence` where that has moved. Raises InputError."""
+        _check_rows(run)
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(
@@ -114,6 +119,24 @@ def _camera(run: Run) -> Camera | None:
 def _skin_model(run: Run) -> Path | None:
     path = run.configuration.get("skin_model")
     return Path(path) if isinstance(path, str) else None
+
+
+def _check_rows(run: Run) -> None:
+    """Raises InputError for rows that no tracker writes: they would make no sense of anything they are held against."""
+    known = {status.value for status in Status}
+    posed = np.isfinite(run.poses).all(axis=1)
+    lengths = np.linalg.norm(run.poses[:, ORIENTATION], axis=1)
+    far = np.abs(run.poses[:, POSITION]).max(axis=1, initial=0) > _FARTHEST
+    for row, status in enumerate(run.status):
+        if status not in known:
+            reason = f"the status must be one of {', '.join(known)}, found '{status[:40]}'"
+        elif posed[row] and abs(lengths[row] - 1) > _UNIT_TOLERANCE:
+            reason = f"the quaternion must have length 1, found {lengths[row]:.4g}"
+        elif posed[row] and far[row]:
+            reason = f"the position must lie within {_FARTHEST:g} m"
+        else:
+            continue
+        raise InputError(f"{run.folder / 'poses.csv'}, frame {run.index[row]}: {reason}")
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

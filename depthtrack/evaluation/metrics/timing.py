@@ -12,10 +12,17 @@ Array = NDArray[np.float64]
 
 def frame_time(stage_ms: Mapping[str, Array], frames: int) -> Metric:
     """Milliseconds a frame, the sum of its stages (T,), by the wall clock of the machine that made the run."""
-    total = np.sum(list(stage_ms.values()), axis=0) if stage_ms else np.full(frames, np.nan)
+    stages = [metric.values for metric in stage_times(stage_ms, frames).values()]
+    total = np.sum(stages, axis=0) if stages else np.full(frames, np.nan)
     return Metric("ms_per_frame", "ms", np.asarray(total, dtype=np.float64))
 
 
-def stage_times(stage_ms: Mapping[str, Array]) -> dict[str, Metric]:
-    """Milliseconds of each stage, in the order in which they run."""
-    return {stage: Metric(f"{stage}_ms", "ms", values) for stage, values in stage_ms.items()}
+def stage_times(stage_ms: Mapping[str, Array], frames: int) -> dict[str, Metric]:
+    """Milliseconds of each stage, in the order in which they run; NaN for frames whose times were not kept."""
+    return {stage: Metric(f"{stage}_ms", "ms", _padded(values, frames)) for stage, values in stage_ms.items()}
+
+
+def _padded(values: Array, frames: int) -> Array:
+    out = np.full(frames, np.nan)
+    out[: len(values)] = values[:frames]
+    return out
