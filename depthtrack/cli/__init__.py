@@ -23,6 +23,7 @@ COMMANDS = {
     "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
     "track": CommandEntry("depthtrack.cli.track", "track the hand through a recording, into a run folder"),
+    "compare": CommandEntry("depthtrack.cli.compare", "trackers side by side: table, results, report"),
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
     "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),

@@ -52,7 +52,7 @@ class RunWriter:
             raise InputError(f"{folder} already holds a run: go on with --resume, or choose another folder")
         folder.mkdir(parents=True, exist_ok=True)
         if started:
-            _check_same(read_configuration(folder), configuration, folder)
+            check_same(read_configuration(folder), configuration, folder)
             self.rows = read_rows(folder)
             _rewrite(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
             kept = _read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
@@ -190,11 +190,11 @@ def _replace(path: Path, text: str) -> None:
     os.replace(aside, path)
 
 
-def _check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
-    """A run goes on only with the options it began with; threads and versions may differ."""
+def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
+    """A run goes on only with the configuration it began with; threads and versions may differ. Raises InputError."""
     for key in sorted(set(found) | set(wanted)):
         if key not in ("versions", "threads") and found.get(key) != wanted.get(key):
             raise InputError(
                 f"{folder} was begun with {key} = {found.get(key)!r}, not {wanted.get(key)!r}: "
-                "resume with the same options, or choose another folder"
+                "go on with the same options, or choose another folder"
             )

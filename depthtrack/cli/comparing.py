@@ -1,0 +1,56 @@
+"""What `compare` and `demo` share: a comparison shown as it goes on, then its table, files and report."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tqdm import tqdm
+
+from depthtrack.errors import InputError
+from depthtrack.evaluation.bench.machine import usable_cores
+from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
+from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
+from depthtrack.evaluation.sweep.cluster import DaskWorkers
+from depthtrack.evaluation.sweep.local import LocalWorkers
+from depthtrack.evaluation.sweep.run import Workers
+
+
+def chosen_workers(jobs: int | None, scheduler: str | None) -> Workers:
+    """A Dask cluster where its scheduler is named, else processes of this machine. Raises InputError."""
+    if scheduler is not None:
+        return DaskWorkers(scheduler)
+    jobs = usable_cores() if jobs is None else jobs
+    if not 1 <= jobs <= 1024:
+        raise InputError(f"--jobs must lie between 1 and 1024, found {jobs}")
+    return LocalWorkers(jobs)
+
+
+def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> Path:
+    """Make the runs, print the table (or JSON), and write results and report to `folder`; gives the report's path."""
+    with _bar() as listener:
+        plans = compare(comparison, folder, workers, listener)
+    folders = [Path(plan.folder) for plan in plans]
+    looked_at = evaluate_runs(folders, workers)
+    evaluations = list(tqdm(looked_at, "measuring", len(folders), unit="run", leave=False, disable=None))
+    write_results(evaluations, folder)
+    if as_json:
+        print(json.dumps([result(evaluation) for evaluation in evaluations], indent=2))
+    else:
+        print(as_table(lines_of(evaluations)))
+    return folder
+
+
+@contextmanager
+def _bar() -> Iterator[Listener]:
+    """A progress bar over the frames of all runs."""
+    with tqdm(unit="frame", leave=False, disable=None) as bar:
+
+        def listen(progress: Progress) -> None:
+            bar.set_description(progress.what)
+            if progress.total:
+                bar.total, bar.n = progress.total, progress.frames
+                bar.set_postfix_str("" if progress.frames else "the first use compiles kernels")
+            bar.refresh()
+
+        yield listen

@@ -1,0 +1,180 @@
+"""What came of a comparison: a row a run, a line a tracker and recording, as CSV, as JSON, and for a terminal."""
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from depthtrack.evaluation.bench.table import aligned
+from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
+from depthtrack.evaluation.metrics import Metric
+from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.evaluation.sweep.run import Workers
+
+TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
+"""Errors against a truth: of the phalanx endpoints of true poses, or of annotated joints."""
+
+TRACKER_MS = "tracker_ms"
+_SHOWN = ("mean", "median", "p95")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A tracker on a recording: its runs, which differ in their seeds, and the medians of their figures."""
+
+    recording: str
+    label: str
+    evaluations: tuple[Evaluation, ...]
+
+    def figure(self, metric: str, statistic: str) -> float | None:
+        """The median over the runs of a metric's statistic; None where the recording does not allow it."""
+        found = [figures_of(evaluation).get(metric) for evaluation in self.evaluations]
+        known = [metric.statistics().get(statistic) for metric in found if metric is not None]
+        numbers = [number for number in known if number is not None]
+        return float(np.median(numbers)) if numbers else None
+
+    @property
+    def truth(self) -> str | None:
+        """Which of TRUTH_METRICS the recording allows."""
+        return next((name for name in TRUTH_METRICS if self.figure(name, "mean") is not None), None)
+
+    def error(self, statistic: str) -> float | None:
+        """A statistic of the error against the truth there is, mm."""
+        return None if self.truth is None else self.figure(self.truth, statistic)
+
+    def within(self, threshold_mm: float) -> float | None:
+        """The median over the runs of the share of frames whose largest error is under a threshold."""
+        shares = [e.success.within(threshold_mm) for e in self.evaluations if e.success is not None]
+        return float(np.median(shares)) if shares else None
+
+    @property
+    def auc(self) -> float | None:
+        """The median over the runs of the area under the curve of those shares."""
+        areas = [e.success.auc for e in self.evaluations if e.success is not None]
+        return float(np.median(areas)) if areas else None
+
+    @property
+    def frames(self) -> int:
+        """Frames of all runs."""
+        return sum(evaluation.frames for evaluation in self.evaluations)
+
+    @property
+    def lost(self) -> int:
+        """Frames of all runs without a trusted pose although a hand was observed."""
+        return sum(int(evaluation.losses.lost.sum()) for evaluation in self.evaluations)
+
+
+def evaluate_runs(folders: Sequence[Path], workers: Workers) -> Iterator[Evaluation]:
+    """Evaluate run folders, in their order, wherever the workers are."""
+    found: dict[int, Evaluation] = {}
+    following = 0
+    for number, row in workers.measure(evaluate_cell, [{"run": str(folder)} for folder in folders]):
+        found[number] = row["evaluation"]
+        while following in found:
+            yield found.pop(following)
+            following += 1
+
+
+def evaluate_cell(cell: Cell) -> Row:
+    """Evaluate one run folder."""
+    return {"evaluation": evaluate_run(Path(cell["run"]))}
+
+
+def figures_of(evaluation: Evaluation) -> dict[str, Metric]:
+    """All of a run's figures a frame by name, with its times."""
+    times = (evaluation.ms_per_frame, _tracker_time(evaluation))
+    return {metric.name: metric for metric in (*evaluation.metrics, *times)}
+
+
+def _tracker_time(evaluation: Evaluation) -> Metric:
+    """Milliseconds of followed frames without segmentation: what a tracker's budget is about."""
+    stages = [metric.values for stage, metric in evaluation.stage_ms.items() if stage != "segment"]
+    total = np.sum(stages, axis=0) if stages else np.full(evaluation.frames, np.nan)
+    followed = np.array([status == "tracked" for status in evaluation.run.status], dtype=np.bool_)
+    return Metric(TRACKER_MS, "ms", np.where(followed, total, np.nan))
+
+
+def label_of(evaluation: Evaluation) -> str:
+    """What a run's tracker is called: as its comparison labelled it, or by its own name."""
+    configuration = evaluation.run.configuration
+    return str(configuration.get("label") or configuration.get("tracker") or evaluation.run.folder.name)
+
+
+def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
+    """A line for every recording and tracker, in the order in which they first come."""
+    groups: dict[tuple[str, str], list[Evaluation]] = {}
+    for evaluation in evaluations:
+        key = (str(evaluation.run.configuration.get("sequence")), label_of(evaluation))
+        groups.setdefault(key, []).append(evaluation)
+    recordings = list(dict.fromkeys(path for path, _ in groups))
+    ordered = sorted(groups.items(), key=lambda group: recordings.index(group[0][0]))
+    return [Line(runs[0].recording, label, tuple(runs)) for (_, label), runs in ordered]
+
+
+def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
+    """Write `results.json`, an object a run, and `results.csv`, the same in columns."""
+    rows = [result(evaluation) for evaluation in evaluations]
+    _write(folder / "results.json", json.dumps(rows, indent=2) + "\n")
+    flat = [dict(_flat(row)) for row in rows]
+    columns = list(dict.fromkeys(name for row in flat for name in row))
+    text = StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(flat)
+    _write(folder / "results.csv", text.getvalue())
+
+
+def result(evaluation: Evaluation) -> dict[str, Any]:
+    """All figures of a run, under the names that tell it from others."""
+    configuration = evaluation.run.configuration
+    return {
+        "label": label_of(evaluation),
+        "seed": configuration.get("seed"),
+        **evaluation.to_json(),
+        TRACKER_MS: _tracker_time(evaluation).statistics(),
+        "clock": configuration.get("clock", "wall"),
+        "budget": configuration.get("budget"),
+    }
+
+
+def as_table(lines: Sequence[Line]) -> str:
+    """The comparison for a terminal; columns that no recording allows are left out."""
+    columns: list[tuple[str, list[str]]] = [
+        ("recording", [line.recording for line in lines]),
+        ("tracker", [line.label for line in lines]),
+        ("runs", [str(len(line.evaluations)) for line in lines]),
+        *((f"error {name} mm", [_cell(line.error(name), ".2f") for line in lines]) for name in _SHOWN),
+        ("angles deg", [_cell(line.figure("angle_error_deg", "mean"), ".2f") for line in lines]),
+        ("< 20 mm", [_cell(line.within(20), ".1%") for line in lines]),
+        ("E3D mm", [_cell(line.figure("e3d_mm", "median"), ".2f") for line in lines]),
+        ("IoU", [_cell(line.figure("silhouette_iou", "median"), ".3f") for line in lines]),
+        ("lost", [f"{line.lost}/{line.frames}" for line in lines]),
+        ("ms a frame", [_cell(line.figure("ms_per_frame", "median"), ".1f") for line in lines]),
+        ("tracker's ms", [_cell(line.figure(TRACKER_MS, "mean"), ".1f") for line in lines]),
+    ]
+    kept = [[head, *cells] for head, cells in columns if any(cell != "-" for cell in cells)]
+    return "\n".join(aligned(list(zip(*kept, strict=True)), left=2))
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
+
+
+def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested objects as columns: their keys joined by underscores."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _flat(inner, f"{name}_{key}" if name else key)
+    else:
+        yield name, value
+
+
+def _write(path: Path, text: str) -> None:
+    aside = path.with_name(f".{path.name}.writing")
+    aside.write_text(text, encoding="utf-8", newline="")
+    aside.replace(path)

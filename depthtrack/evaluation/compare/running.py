@@ -1,0 +1,163 @@
+"""One run of a comparison: a contender on a recording with a seed, into its own run folder; goes on where it stood."""
+
+import json
+import time
+from collections.abc import Sequence as Rows
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from depthtrack.camera import Camera
+from depthtrack.evaluation.compare.budget import calibrate
+from depthtrack.evaluation.compare.clock import TimedByProcessor
+from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.observation.observation import Observer
+from depthtrack.recording import open_sequence
+from depthtrack.recording.run import RunWriter, check_same, read_configuration
+from depthtrack.recording.sequence import OnDamage, Sequence
+from depthtrack.tracking.configuration import chosen_hand, run_configuration
+from depthtrack.tracking.loop import track_sequence
+from depthtrack.tracking.trackers import create_tracker
+
+DONE = "done.json"
+"""Stands in a run folder once all of its frames are tracked."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A recording, and what to know beside it: `camera` None is its own, `hand` a file of sizes, `frames` None all."""
+
+    path: str
+    camera: dict[str, Any] | None = None
+    on_damage: OnDamage = "refuse"
+    hand: str | None = None
+    skin_model: str | None = None
+    frames: int | None = None
+
+    def open(self) -> Sequence:
+        camera = None if self.camera is None else Camera(**self.camera)
+        return open_sequence(self.path, camera, self.on_damage)
+
+    def hand_of(self, sequence: Sequence) -> HandShape:
+        return chosen_hand(sequence, None if self.hand is None else Path(self.hand))
+
+    def observer(self, sequence: Sequence) -> Observer:
+        return Observer.for_sequence(sequence, None if self.skin_model is None else Path(self.skin_model))
+
+    def count(self, sequence: Sequence) -> int:
+        """Frames to track."""
+        return len(sequence) if self.frames is None else min(self.frames, len(sequence))
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run to make in `folder`. `label` of the contender; `budget` tells how equal time was reached, where asked."""
+
+    folder: str
+    source: Source
+    label: str
+    tracker: str
+    options: dict[str, Any]
+    seed: int
+    budget: dict[str, Any] | None = field(default=None)
+
+    def to_cell(self) -> Cell:
+        return asdict(self)
+
+    @classmethod
+    def from_cell(cls, cell: Cell) -> "PlannedRun":
+        return cls(**{**cell, "source": Source(**cell["source"])})
+
+    def configuration(self, sequence: Sequence) -> dict[str, Any]:
+        """What its run.json tells."""
+        source = self.source
+        return run_configuration(
+            Path(source.path),
+            sequence,
+            source.hand_of(sequence),
+            self.tracker,
+            self.options,
+            frames=source.frames,
+            skin_model=None if source.skin_model is None else Path(source.skin_model),
+            on_damage=source.on_damage,
+            threads=1,
+            seed=self.seed,
+            label=self.label,
+            clock="cpu",
+            budget=self.budget,
+        )
+
+    def state(self) -> str:
+        """`new`, `begun` or `done`. Raises InputError where the folder holds another run."""
+        folder = Path(self.folder)
+        if not (folder / "run.json").exists():
+            return "new"
+        # As JSON would give it back.
+        wanted = json.loads(json.dumps(self.configuration(self.source.open())))
+        check_same(read_configuration(folder), wanted, folder)
+        return "done" if (folder / DONE).exists() else "begun"
+
+
+def track_cell(cell: Cell) -> Row:
+    """Track a planned run to its end, from where it stands; tells how many frames it has now."""
+    plan = PlannedRun.from_cell(cell)
+    # A run is worth one core: others run beside it.
+    cv2.setNumThreads(1)
+    sequence = plan.source.open()
+    hand = plan.source.hand_of(sequence)
+    observer = plan.source.observer(sequence)
+    options = plan.options | {"seed": plan.seed}
+    folder = Path(plan.folder)
+    with (
+        closing(TimedByProcessor(create_tracker(plan.tracker, hand, **options))) as tracker,
+        RunWriter(folder, plan.configuration(sequence), ("segment", *tracker.stages), resume=True) as run,
+    ):
+        count, clock = plan.source.count(sequence), time.process_time
+        rows = track_sequence(sequence, observer, tracker, HandModel(hand), run, count=count, clock=clock)
+        tracked_now = sum(1 for _ in rows)
+        done = {"frames": len(run.rows), "damaged": [asdict(damage) for damage in sequence.damaged]}
+    _write_done(folder, done)
+    return {"frames": done["frames"], "tracked_now": tracked_now}
+
+
+def calibrate_cell(cell: Cell) -> Row:
+    """The budget of a contender on a recording: the options chosen, and the CPU milliseconds they took."""
+    source = Source(**cell["source"])
+    cv2.setNumThreads(1)
+    sequence = source.open()
+    hand, observer = source.hand_of(sequence), source.observer(sequence)
+    budget = calibrate(sequence, source.count(sequence), observer, hand, cell["tracker"], cell["options"], cell["ms"])
+    return {"chosen": budget.options, "calibrated_ms": round(budget.ms, 3)}
+
+
+def _write_done(folder: Path, done: dict[str, Any]) -> None:
+    aside = folder / f".{DONE}.writing"
+    aside.write_text(json.dumps(done) + "\n", encoding="utf-8")
+    aside.replace(folder / DONE)
+
+
+class FrameCount:
+    """Counts the frames that run folders hold, reading only what was written since it was last asked."""
+
+    def __init__(self, folders: Rows[Path]) -> None:
+        self._lines = {folder / "poses.csv": 0 for folder in folders}
+        self._read = dict.fromkeys(self._lines, 0)
+
+    def __call__(self) -> int:
+        for path, read in self._read.items():
+            try:
+                if path.stat().st_size <= read:
+                    continue
+                with path.open("rb") as file:
+                    file.seek(read)
+                    while block := file.read(1 << 20):
+                        self._lines[path] += block.count(b"\n")
+                        self._read[path] += len(block)
+            except OSError:
+                continue
+        return sum(max(0, lines - 1) for lines in self._lines.values())
