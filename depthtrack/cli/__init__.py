@@ -27,6 +27,7 @@ COMMANDS = {
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
     "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
+    "video": CommandEntry("depthtrack.cli.video", "a film of a run: the tracked hand over the recording"),
     "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat the papers' experiments, our figures beside theirs"),
     "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring, in hypotheses a second"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),

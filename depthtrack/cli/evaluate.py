@@ -1,16 +1,16 @@
 """`depthtrack evaluate`: how good a run is, and how fast it was."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from depthtrack.cli.progress import bar
+
 if TYPE_CHECKING:
     from depthtrack.evaluation.evaluate import Evaluation
     from depthtrack.evaluation.metrics import Metric
-    from depthtrack.evaluation.replay import Replayed
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,12 @@ class Command:
 
         if not self.runs:
             raise InputError("name at least one run folder")
-        evaluations = [evaluate_run(folder, self.sequence, self.residuals, _progress) for folder in self.runs]
+        evaluations = [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
         if self.json:
             reports = [evaluation.to_json() for evaluation in evaluations]
             print(dumps(reports[0] if len(reports) == 1 else reports, indent=2))
         else:
             print("\n\n".join(map(_text, evaluations)))
-
-
-def _progress(frames: "Iterable[Replayed]") -> "Iterable[Replayed]":
-    from tqdm import tqdm
-
-    return tqdm(frames, unit="frame", delay=1, leave=False, disable=None)
 
 
 def _text(evaluation: "Evaluation") -> str:

@@ -69,6 +69,10 @@ class Replay:
     def __len__(self) -> int:
         return len(self.run.index)
 
+    def at(self, row: int) -> Replayed:
+        """One frame, without looking for the hand in it, which takes all frames before. Raises DamagedFrameError."""
+        return Replayed(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
+
     def __iter__(self) -> Iterator[Replayed]:
         """Every frame that is still readable, observed with the run's own settings and guided by its own poses."""
         run, model, memory = self.run, HandModel(self.hand), TrackMemory(LostBelow())

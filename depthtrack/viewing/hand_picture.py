@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.camera import Camera
-from depthtrack.hand.pose import FINGERS, make_pose, quaternion_exp, quaternion_product
+from depthtrack.hand.pose import make_pose, quaternion_exp, quaternion_product
 from depthtrack.hand.skin import Skin
 from depthtrack.rendering.triangles import rasterise
-from depthtrack.viewing.panels import smaller
-from depthtrack.viewing.theme import FINGER_COLOURS, PALM, SURFACE
+from depthtrack.viewing.panels import blank, smaller
+from depthtrack.viewing.shading import draw_surface
+from depthtrack.viewing.theme import SURFACE
 
 Image = NDArray[np.uint8]
 
@@ -18,12 +19,8 @@ _REACH = 0.22
 """Metres that a picture spans, of a hand of scale 1."""
 _TURN = np.radians(-50)
 """Away from the view into the palm, towards the thumb's side, from which flexion shows best."""
-_LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
-_AMBIENT = 0.3
 _FINER = 3
 """Rendered so many times larger, then averaged: smooth edges."""
-_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.float64)
-"""(16, 3) RGB of the bodies."""
 
 
 def hand_picture(skin: Skin, angles: ArrayLike, size: int) -> Image:
@@ -35,12 +32,7 @@ def hand_picture(skin: Skin, angles: ArrayLike, size: int) -> Image:
     # The hand in the middle of the picture, wherever its fingers are.
     vertices[:, :2] -= (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2
     surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
-    hit = surface.label >= 0
-    picture = np.empty((side, side, 3), dtype=np.uint8)
-    picture[:] = SURFACE
-    light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)
-    picture[hit] = _COLOURS[surface.label[hit]] * light[:, None]
-    return smaller(picture, size, size)
+    return smaller(draw_surface(blank(side, side, SURFACE), surface), size, size)
 
 
 def _orientation(mirror: float) -> NDArray[np.float64]:

@@ -24,3 +24,11 @@ FINGER_COLOURS: dict[str, Rgb] = {
 }
 OUTLINE: Rgb = (10, 12, 18)
 """Dark rim around lines and joints, so that they show on bright images too."""
+
+STATUS_COLOURS: dict[str, Rgb] = {
+    "tracked": (74, 222, 128),
+    "started": (56, 189, 248),
+    "lost": (251, 113, 133),
+    "absent": FAINT_TEXT,
+}
+"""What became of a frame of a run."""

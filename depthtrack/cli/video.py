@@ -1,0 +1,47 @@
+"""`depthtrack video`: a film of a run, with the tracked hand over it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from depthtrack.cli.progress import bar
+from depthtrack.errors import InputError
+
+
+@dataclass(frozen=True)
+class Command:
+    """Write a film of a run: the recording with the tracked hand over it, the hypothesis over depth, the residual, the
+    skeleton beside the true one if there is one, what the tracker said, and the energy over time.
+    """
+
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
+    """A run folder written by `depthtrack track`."""
+    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT.mp4")]
+    """The film to write."""
+    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    """Where the recording is, if it was moved since."""
+    height: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 360
+    """Height of each of the four views."""
+    speed: float = 1.0
+    """Slower below 1, faster above."""
+    codec: Literal["quick", "web"] = "quick"
+    """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
+
+    def run(self) -> None:
+        from depthtrack.evaluation.replay import Replay
+        from depthtrack.recording.run import Run
+        from depthtrack.viewing.run_film import write_run_film
+        from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS
+
+        if not 48 <= self.height <= 1080:
+            raise InputError(f"--height must be from 48 to 1080 pixels, found {self.height}")
+        if not 0.01 <= self.speed <= 100:
+            raise InputError(f"--speed must be from 0.01 to 100, found {self.speed}")
+        replay = Replay.open(Run.load(self.path), self.sequence)
+        codecs = WEB_CODECS if self.codec == "web" else QUICK_CODECS
+        count = write_run_film(replay, self.out, codecs, self.height, bar, self.speed)
+        if count == 0:
+            raise InputError(f"the run {self.path} holds no frame to show")
+        print(f"wrote the video {self.out}: {count} frames")

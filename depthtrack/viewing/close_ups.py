@@ -1,0 +1,36 @@
+"""Where to look closely: a window that follows the hand of a run as a steady hand would hold a camera."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from depthtrack.camera import Camera
+
+Array = NDArray[np.float64]
+Window = tuple[int, int, int, int]
+"""Left, top, width, height in pixels; it may reach outside the image."""
+
+_STEADY_FRAMES = 6.0
+"""Standard deviation, in frames, of the smoothing of the window's path."""
+_ROOM = 1.35
+"""Size of the window over that of the hand's keypoints, most of the time."""
+_LEAST = 24
+
+
+def close_ups(camera: Camera, keypoints: Array, trusted: NDArray[np.bool_]) -> list[Window]:
+    """A window a frame, all of one size and the image's shape; the whole image where no frame has a trusted pose.
+
+    `keypoints` (T, 21, 3) metres, NaN without a pose; `trusted` (T,) frames whose pose may lead the window.
+    """
+    pixels = camera.project(keypoints)
+    usable = trusted & np.isfinite(pixels).all(axis=(1, 2))
+    if not usable.any():
+        return [(0, 0, camera.width, camera.height)] * len(keypoints)
+    low, high = pixels[usable].min(axis=1), pixels[usable].max(axis=1)
+    extent = np.percentile((high - low) / [camera.width, camera.height], 90, axis=0).max()
+    share = float(np.clip(_ROOM * extent, _LEAST / min(camera.shape), 1.0))
+    width, height = round(share * camera.width), round(share * camera.height)
+    rows = np.arange(len(keypoints))
+    path = np.stack([np.interp(rows, rows[usable], ((low + high) / 2)[:, axis]) for axis in (0, 1)], axis=-1)
+    centres = gaussian_filter1d(path, _STEADY_FRAMES, axis=0, mode="nearest")
+    return [(round(x - width / 2), round(y - height / 2), width, height) for x, y in centres]

@@ -1,0 +1,174 @@
+"""A frame of a run in one picture: recording, hypothesis over depth, residual, skeleton, and the run at a glance."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.camera import Camera
+from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.rendering.surface import Surface
+from depthtrack.viewing.close_ups import Window, close_ups
+from depthtrack.viewing.depth_colours import depth_range
+from depthtrack.viewing.moments import Moment, true_keypoints
+from depthtrack.viewing.overlay import dimmed, draw_skeleton
+from depthtrack.viewing.panels import blank, captioned, paint, stacked, tile_grid
+from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb
+from depthtrack.viewing.shading import draw_surface
+from depthtrack.viewing.text import put_text, text_width
+from depthtrack.viewing.theme import FAINT_TEXT, OUTLINE, STATUS_COLOURS, TEXT, TRUE_MASK
+from depthtrack.viewing.timeline import Timeline
+
+Image = NDArray[np.uint8]
+RunLayer = Literal["recording", "hypothesis", "residual", "skeleton"]
+LAYERS: tuple[RunLayer, ...] = ("recording", "hypothesis", "residual", "skeleton")
+
+_TRUTH = dict.fromkeys(("palm", "thumb", "index", "middle", "ring", "little"), TRUE_MASK)
+
+
+class RunPainter:
+    """Paints frames of one run, all in the same sizes and colours; `height` pixels of each view."""
+
+    def __init__(self, replay: Replay, height: int = 360) -> None:
+        run, camera = replay.run, replay.sequence.camera
+        self._replay, self._surface, self._height = replay, replay.surface(), height
+        keypoints = HandModel(replay.hand).keypoints(run.poses)
+        trusted = np.array([status in ("tracked", "started") for status in run.status], dtype=np.bool_)
+        self._windows = close_ups(camera, keypoints, trusted)
+        self._near, self._far = _hand_range(keypoints[trusted, :, 2])
+        self._scene_near, self._scene_far = _hand_range(keypoints[trusted, :, 2], room=0.5)
+        self._timeline: Timeline | None = None
+
+    def picture(self, seen: Replayed) -> Image:
+        """All four views of a frame, what the tracker said of it, and its place in the run."""
+        tiles = [captioned(self.view(seen, layer), *self._caption(seen, layer)) for layer in LAYERS]
+        grid = tile_grid(tiles, columns=2)
+        if self._timeline is None:
+            self._timeline = Timeline(self._replay.run.energy, self._replay.run.status, grid.shape[1])
+        return stacked([self._headline(seen, grid.shape[1]), grid, self._timeline.at(seen.row)])
+
+    def view(self, seen: Replayed, layer: RunLayer) -> Image:
+        """One view (height, w, 3), without a caption: of the whole image for "recording", else close on the hand."""
+        moment = self._moment(seen)
+        close = moment.cropped(*self._windows[seen.row])
+        if layer == "recording":
+            image = self._recording(seen, moment)
+        elif layer == "hypothesis":
+            image = self._hypothesis(seen, close)
+        elif layer == "residual":
+            image = self._residual(seen, close)
+        else:
+            image = self._skeleton(seen, close)
+        return _of_width(image, moment.camera.resized(self._height / moment.camera.height).width)
+
+    def _recording(self, seen: Replayed, moment: Moment) -> Image:
+        image = paint(moment, "colour", self._height, self._scene_near, self._scene_far)
+        surface = self._rendered(seen, moment.camera)
+        if surface is not None:
+            image = draw_surface(image, surface, 0.6)
+        _draw_frame(image, self._windows[seen.row], self._height / moment.camera.height)
+        return image
+
+    def _hypothesis(self, seen: Replayed, close: Moment) -> Image:
+        image, surface = paint(close, "depth", self._height, self._near, self._far), self._rendered(seen, close.camera)
+        return image if surface is None else draw_surface(image, surface, 0.7)
+
+    def _residual(self, seen: Replayed, close: Moment) -> Image:
+        camera, surface = close.camera.resized(self._height / close.camera.height), self._rendered(seen, close.camera)
+        size = camera.width, camera.height
+        rendered = np.zeros(camera.shape) if surface is None else surface.depth
+        observed = None if close.mask is None else enlarged(close.mask.astype(np.float32), *size) > 0
+        image = residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed)
+        _draw_scale(image)
+        return image
+
+    def _skeleton(self, seen: Replayed, close: Moment) -> Image:
+        camera = close.camera.resized(self._height / close.camera.height)
+        image = dimmed(paint(close, "colour", self._height, self._near, self._far))
+        truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
+        if truth is not None:
+            image = draw_skeleton(image, camera, truth, thickness=1, colours=_TRUTH)
+        return image if close.keypoints is None else draw_skeleton(image, camera, close.keypoints)
+
+    def _moment(self, seen: Replayed) -> Moment:
+        """The frame with the observed silhouette and the tracked keypoints."""
+        moment = Moment(seen.frame)
+        if seen.observation is not None:
+            mask = np.zeros(seen.frame.camera.shape, dtype=np.bool_)
+            (left, top), (height, width) = seen.observation.origin, seen.observation.camera.shape
+            mask[top : top + height, left : left + width] = seen.observation.skin
+            moment = replace(moment, mask=mask)
+        if seen.estimate.pose is not None:
+            moment = replace(moment, keypoints=self._surface.model.keypoints(seen.estimate.pose))
+        return moment
+
+    def _rendered(self, seen: Replayed, camera: Camera) -> Surface | None:
+        """The hypothesis as a view of this camera shows it."""
+        if seen.estimate.pose is None:
+            return None
+        return self._surface.seen(seen.estimate.pose, camera.resized(self._height / camera.height))
+
+    def _caption(self, seen: Replayed, layer: RunLayer) -> tuple[str, str]:
+        if layer == "recording":
+            return "recording", f"frame {seen.frame.index}  ·  {seen.frame.timestamp:.2f} s"
+        if layer == "hypothesis":
+            return "hypothesis over depth", "" if seen.estimate.pose is not None else "no pose"
+        if layer == "residual":
+            return "residual: nearer, farther", f"within {1000 * LARGEST:.0f} mm"
+        truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
+        return "skeleton", "" if truth is None else "the true one thin"
+
+    def _headline(self, seen: Replayed, width: int) -> Image:
+        bar, estimate = blank(width, 34), seen.estimate
+        tracker = str(self._replay.run.configuration.get("tracker", "track"))[:20]
+        put_text(bar, f"{self._replay.sequence.name[:40]}  ·  {tracker}", (4, 17), 20)
+        told = "" if estimate.pose is None else f"energy {estimate.energy:.2f}  ·  confidence {estimate.confidence:.2f}"
+        x = width - 4 - text_width(told, 15)
+        put_text(bar, told, (x, 17), 15, FAINT_TEXT)
+        status = str(estimate.status.value)
+        put_text(bar, status, (x - 16 - text_width(status, 17), 17), 17, STATUS_COLOURS[status])
+        return bar
+
+
+def _hand_range(depths: NDArray[np.float64], room: float = 0.06) -> tuple[float, float]:
+    """Near and far (metres) that give the hand of a run most of the colours, with some room around it."""
+    if depths.size == 0:
+        return 0.3, 1.5
+    near, far = depth_range(depths.astype(np.float32), (1.0, 99.0))
+    return max(near - min(room, 0.06), 0.05), far + room
+
+
+def _of_width(image: Image, width: int) -> Image:
+    """`image` without, or with, the last few columns: close-ups have the whole image's shape but for rounding."""
+    missing = width - image.shape[1]
+    return image[:, :width] if missing <= 0 else np.pad(image, ((0, 0), (0, missing), (0, 0)), mode="edge")
+
+
+def _draw_frame(image: Image, window: Window, factor: float) -> None:
+    """The outline of a close-up, in place."""
+    left, top, right, bottom = (
+        round(edge * factor) for edge in (window[0], window[1], window[0] + window[2], window[1] + window[3])
+    )
+    height, width = image.shape[:2]
+    for colour, grow in ((OUTLINE, 1), (FAINT_TEXT, 0)):
+        rows = slice(max(top - grow, 0), max(bottom + grow, 0))
+        columns = slice(max(left - grow, 0), max(right + grow, 0))
+        for x in (left - grow, right + grow - 1):
+            if 0 <= x < width:
+                image[rows, x] = colour
+        for y in (top - grow, bottom + grow - 1):
+            if 0 <= y < height:
+                image[y, columns] = colour
+
+
+def _draw_scale(image: Image) -> None:
+    """The scale of the residual in the lower left corner, in place."""
+    height, width = image.shape[:2]
+    scale = residual_scale(min(120, width // 3), 8)
+    y, x = height - 16, 8
+    if y > 0:
+        image[y : y + 8, x : x + scale.shape[1]] = scale
+        label = f"{-1000 * LARGEST:.0f} to {1000 * LARGEST:.0f} mm"
+        put_text(image, label, (x + scale.shape[1] + 8, y + 4), 13, TEXT)

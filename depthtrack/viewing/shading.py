@@ -1,0 +1,24 @@
+"""A rendered hand in the colours of its fingers, lit from the upper left."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.pose import FINGERS
+from depthtrack.rendering.surface import Surface
+from depthtrack.viewing.theme import FINGER_COLOURS, PALM
+
+Image = NDArray[np.uint8]
+
+_LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
+_AMBIENT = 0.3
+_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.float64)
+"""(16, 3) RGB of the bodies."""
+
+
+def draw_surface(image: Image, surface: Surface, opacity: float = 1.0) -> Image:
+    """`image` (h, w, 3) with the hand of `surface` (h, w), labelled by body, over it."""
+    hit = surface.label >= 0
+    light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)
+    out = image.copy()
+    out[hit] = np.rint(image[hit] * (1 - opacity) + _COLOURS[surface.label[hit]] * light[:, None] * opacity)
+    return out

@@ -1,0 +1,58 @@
+"""A run at a glance: its energy over time, where it was lost, and where we are."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.viewing.panels import blank
+from depthtrack.viewing.text import put_text
+from depthtrack.viewing.theme import BACKGROUND, FAINT_TEXT, STATUS_COLOURS, SURFACE, TEXT
+
+Image = NDArray[np.uint8]
+
+HEIGHT = 84
+_TOP, _BOTTOM = 24, 12
+_SUBPIXEL_BITS = 4
+
+
+class Timeline:
+    """Draws once what all frames of a run share; `at` adds the cursor."""
+
+    def __init__(self, energy: NDArray[np.float64], status: tuple[str, ...], width: int) -> None:
+        """`energy` (T,), NaN where there is none, and `status` (T,) of a run."""
+        self._width, self._count = width, len(energy)
+        self._image = blank(width, HEIGHT, SURFACE)
+        known = energy[np.isfinite(energy)]
+        # A lost frame's energy must not flatten all others.
+        self._top = float(max(1.2 * np.percentile(known, 98), 1e-6)) if len(known) else 1.0
+        for row, said in enumerate(status):
+            if said in ("lost", "absent"):
+                left, right = self._x(row - 0.5), self._x(row + 0.5)
+                colour = np.array(STATUS_COLOURS[said]) * 0.35 + np.array(SURFACE) * 0.65
+                self._image[_TOP:, left : max(right, left + 1)] = np.rint(colour)
+        self._draw_curve(energy)
+        put_text(self._image, f"energy, 0 to {self._top:.3g}", (8, _TOP // 2), 13, FAINT_TEXT)
+
+    def at(self, row: int, note: str = "") -> Image:
+        """The picture (HEIGHT, width, 3) with a cursor at one frame and a note beside the title."""
+        image = self._image.copy()
+        x = self._x(row)
+        image[_TOP:, max(x - 1, 0) : x + 1] = TEXT
+        put_text(image, note, (180, _TOP // 2), 13, TEXT)
+        return image
+
+    def _x(self, row: float) -> int:
+        return round(np.clip((row + 0.5) / max(self._count, 1), 0, 1) * (self._width - 1))
+
+    def _draw_curve(self, energy: NDArray[np.float64]) -> None:
+        height = HEIGHT - _TOP - _BOTTOM
+        y = _TOP + height * (1 - np.clip(energy / self._top, 0, 1))
+        x = (np.arange(self._count) + 0.5) / max(self._count, 1) * (self._width - 1)
+        points = np.stack([x, y], axis=-1)
+        finite = np.isfinite(y)
+        # Each stretch without a gap is a line of its own.
+        for stretch in np.split(np.arange(self._count), np.flatnonzero(np.diff(finite)) + 1):
+            if len(stretch) and finite[stretch[0]]:
+                fixed = np.rint(points[stretch] * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+                cv2.polylines(self._image, [fixed], False, BACKGROUND, 4, cv2.LINE_AA, _SUBPIXEL_BITS)
+                cv2.polylines(self._image, [fixed], False, TEXT, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
