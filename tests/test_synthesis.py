@@ -12,6 +12,7 @@ import pytest
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ORIENTATION, rotation_matrix
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin import Skin
@@ -19,7 +20,7 @@ from depthtrack.recording.folder import FolderSequence
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.forearm import LARGEST_BEND, Forearm
-from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame, write_recording
 from depthtrack.synthesis.painting import SkinTone
 from depthtrack.synthesis.randomness import Stream, generator
 from depthtrack.synthesis.viewpoint import VIEWPOINT_COUNT, Viewpoint
@@ -63,13 +64,38 @@ def test_ground_truth_is_that_of_the_hand_alone_wherever_nothing_hides_it(model:
         skin = Skin.of(shape)
         vertices = skin.vertices(transforms)
         alone = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
-    np.testing.assert_array_equal(frame.exact_depth[frame.mask], alone.depth[frame.mask])
     # What the mask leaves out of the hand lies behind something else: the forearm.
     hidden = (alone.depth > 0) & ~frame.mask
     assert np.all(frame.exact_depth[hidden] < alone.depth[hidden])
     assert hidden.sum() < 0.1 * frame.mask.sum()
+    # What it adds is where the forearm lies over the hand's end, right before the wrist.
+    bare = frame.mask & (frame.exact_depth == alone.depth)
+    assert bare.sum() > 0.9 * frame.mask.sum()
+    beyond, _ = _beyond_wrist(made, frame)
+    added = frame.mask & ~bare
+    assert beyond[added].max() < 0
+    assert beyond[added].min() > -0.02
     np.testing.assert_allclose(frame.joints, HandModel(shape).keypoints(frame.pose), atol=1e-12)
     np.testing.assert_array_equal(frame.depth, frame.exact_depth)
+
+
+def _beyond_wrist(made: Synthesiser, frame: SyntheticFrame) -> tuple[Any, Any]:
+    """Metres (h, w) from the wrist's plane towards the forearm, and (h, w) where skin lies near the wrist."""
+    v, u = np.mgrid[: made.sensor.camera.height, : made.sensor.camera.width]
+    points = made.sensor.camera.unproject(np.stack([u, v], axis=-1), frame.exact_depth) - frame.joints[0]
+    towards_fingers = rotation_matrix(frame.pose[ORIENTATION])[:, 1]
+    return -points @ towards_fingers, frame.skin & (np.linalg.norm(points, axis=-1) < 0.05)
+
+
+@pytest.mark.parametrize("model", ["primitives", "skin"])
+@pytest.mark.parametrize("index", [0, 100, 258, 340])
+def test_every_kind_of_hand_ends_at_the_plane_of_the_wrist(model: Any, index: int) -> None:
+    made = _made(model=model, background="room", seed=2)
+    frame = made[index]
+    beyond, near = _beyond_wrist(made, frame)
+    assert frame.mask[near & (beyond < 0)].all()
+    # The skin's end bulges through the plane by a millimetre.
+    assert not frame.mask[near & (beyond > 0.002)].any()
 
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
@@ -97,7 +123,10 @@ def test_a_left_hand_gives_the_mirror_image() -> None:
     same = left.mask == right.mask[:, ::-1]
     assert np.sum(~same) <= 5  # pixels on an edge between two surfaces may fall either way
     both = same & left.mask
-    assert np.quantile(np.abs(left.exact_depth - right.exact_depth[:, ::-1])[both], 0.999) < 1e-6
+    apart = np.abs(left.exact_depth - right.exact_depth[:, ::-1])[both]
+    assert np.quantile(apart, 0.9) < 1e-6
+    # The mask's last stretch is the forearm's, whose facets are cut the same way on both sides.
+    assert np.quantile(apart, 0.999) < 5e-4
 
 
 def test_viewpoints_lie_apart_on_a_hemisphere_and_look_at_the_hand() -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from depthtrack import __version__
 from depthtrack.errors import InputError
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.writer import SequenceWriter
 from depthtrack.synthesis.backdrop import Backdrop
@@ -76,9 +76,9 @@ class Synthesis:
 class SyntheticFrame:
     """A frame and its ground truth.
 
-    `depth` (h, w) metres as the sensor read it; `colour` (h, w, 3) RGB; `mask` (h, w) where the hand without its
-    forearm is what the camera sees; `skin` (h, w) where skin is seen at all, with the flipped labels; `exact_depth`
-    (h, w) metres; `pose` (27,) and `joints` (21, 3) in the camera frame.
+    `depth` (h, w) metres as the sensor read it; `colour` (h, w, 3) RGB; `mask` (h, w) where the hand, up to its wrist,
+    is what the camera sees, whether the sensor has a reading there or not; `skin` (h, w) where skin is seen at all,
+    with the flipped labels; `exact_depth` (h, w) metres; `pose` (27,) and `joints` (21, 3) in the camera frame.
     """
 
     timestamp: float
@@ -143,7 +143,7 @@ class Synthesiser:
             timestamp=float(self.timestamps[index]),
             depth=depth,
             colour=colour,
-            mask=(surface.label >= 0) & (surface.label < BODY_COUNT),
+            mask=self._scene.hand_mask(view),
             skin=skin,
             exact_depth=surface.depth,
             pose=self.poses[index],

@@ -84,6 +84,23 @@ class Scene:
             rasterise(self.camera, vertices, faces, normals, np.full(len(faces), FOREARM), surface)
         return View(surface, transforms)
 
+    def hand_mask(self, view: View) -> NDArray[np.bool_]:
+        """Pixels (h, w) of a view that see the hand, up to the wrist: the plane across the palm through
+        `HandShape.wrist`.
+
+        The forearm's tube begins inside the palm, and how much of it shows before the wrist depends on what the hand
+        is drawn with. That stretch is hand too, so that hands of all kinds end at the same place.
+        """
+        label = view.surface.label
+        hand = (label >= 0) & (label < BODY_COUNT)
+        v, u = np.nonzero(label == FOREARM)
+        points = self.camera.unproject(np.stack([u, v], axis=-1), view.surface.depth[v, u])
+        T_camera_palm = view.transforms[0]
+        towards_fingers = T_camera_palm[:3, 1]
+        wrist = T_camera_palm[:3, :3] @ self.shape.wrist + T_camera_palm[:3, 3]
+        hand[v, u] = (points - wrist) @ towards_fingers > 0
+        return hand
+
     @cached_property
     def model(self) -> HandModel:
         """Kinematics of the hand."""
