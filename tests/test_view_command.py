@@ -16,7 +16,7 @@ from depthtrack.recording import open_sequence
 from depthtrack.viewing.moments import Moment, moments
 from depthtrack.viewing.rerun_viewer import RerunViewer
 from depthtrack.viewing.theme import ESTIMATED_MASK
-from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, VideoWriter
+from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, WEBM_CODECS, VideoWriter
 from tests.recording_samples import CAMERA, TIMES, write_sample
 
 needs_rerun = pytest.mark.skipif(find_spec("rerun") is None, reason="rerun-sdk is not installed (the extra 'view')")
@@ -67,13 +67,15 @@ def test_a_video_holds_every_image_in_order_and_size(out: Path) -> None:
     assert names(out) == ["film.mp4"]
 
 
-@pytest.mark.parametrize("codecs", [QUICK_CODECS, WEB_CODECS])
-def test_each_kind_of_video_can_be_encoded(out: Path, codecs: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("name", "codecs"), [("film.mp4", QUICK_CODECS), ("film.mp4", WEB_CODECS), ("film.webm", WEBM_CODECS)]
+)
+def test_each_kind_of_video_can_be_encoded(out: Path, name: str, codecs: tuple[str, ...]) -> None:
     image = np.zeros((48, 64, 3), dtype=np.uint8)
     image[:, 32:] = (30, 200, 90)
-    with VideoWriter(out / "film.mp4", 30, codecs) as writer:
+    with VideoWriter(out / name, 30, codecs) as writer:
         writer.write(image)
-    found = cv2.VideoCapture(str(out / "film.mp4")).read()[1]
+    found = cv2.VideoCapture(str(out / name)).read()[1]
     assert np.abs(found[:, 40:].astype(int) - (90, 200, 30)).mean() < 10
     assert found[:, :24].mean() < 10
 

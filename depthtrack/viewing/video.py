@@ -1,6 +1,9 @@
 """Video files through OpenCV's own encoder, complete or absent."""
 
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -17,26 +20,29 @@ QUICK_CODECS = ("avc1", "mp4v")
 WEB_CODECS = ("avc1", "vp09")
 """H.264, else VP9: plays in browsers too, and takes some thirty times as long to encode."""
 
+WEBM_CODECS = ("VP80",)
+"""VP8, in files that end in .webm: plays in browsers, and takes a sixth of VP9's time to encode."""
+
 
 class VideoWriter:
-    """Context manager that writes RGB images (h, w, 3) uint8 as an mp4 film.
+    """Context manager that writes RGB images (h, w, 3) uint8 as an mp4 (or webm) film.
 
     The size is the first image's, made even as encoders want it; later images must have the same. The file appears
     under its name when the block ends well; after an exception, or without any image, nothing is left behind.
     """
 
-    def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] = QUICK_CODECS) -> None:
-        if path.suffix.lower() != ".mp4":
-            raise InputError(f"a video file must end in .mp4, found '{path.name}'")
+    def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] | None = None) -> None:
+        if path.suffix.lower() not in (".mp4", ".webm"):
+            raise InputError(f"a video file must end in .mp4 (or .webm), found '{path.name}'")
         if not path.parent.is_dir():
             raise InputError(f"the folder {path.parent} for the video does not exist: create it first")
         if not (np.isfinite(rate) and rate > 0):
             raise InputError(f"the frame rate of a video must be positive, found {rate!r}")
         self.path = path
         self.rate = rate
-        self.codecs = codecs
+        self.codecs = codecs or (QUICK_CODECS if path.suffix.lower() == ".mp4" else WEBM_CODECS)
         self.frame_count = 0
-        self._aside = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
+        self._aside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
         self._shape: tuple[int, ...] = ()
         self._encoder: cv2.VideoWriter | None = None
 
@@ -83,7 +89,8 @@ class VideoWriter:
         try:
             for codec in self.codecs:
                 fourcc = cv2.VideoWriter.fourcc(*codec)
-                encoder = cv2.VideoWriter(str(self._aside), fourcc, self.rate, (width, height))
+                with _silent_stderr():
+                    encoder = cv2.VideoWriter(str(self._aside), fourcc, self.rate, (width, height))
                 if encoder.isOpened():
                     return encoder
                 self._aside.unlink(missing_ok=True)
@@ -93,3 +100,17 @@ class VideoWriter:
             f"this OpenCV ({cv2.__version__}) can encode none of {', '.join(self.codecs)} at {width}x{height}: "
             "install opencv-python-headless from PyPI, or write a contact sheet instead"
         )
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """Drops what C libraries print: OpenCV tells of every tag that a webm file has no use for."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
