@@ -25,21 +25,26 @@ class Command:
     """
 
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
-    """Figures by name, as oikonomidis-2a or fig2a; all; or list, which tells what there is."""
+    """Figures by name, as schroeder-8 or fig8; all of a paper by its author, as schroeder; all; or list, which tells
+    what there is."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = None
     """Folder to write to."""
     quick: bool = False
-    """A coarse version: fewer cells and repetitions, at 96 pixels; two minutes a figure on two cores."""
+    """A coarse version: fewer cells and repetitions, swarms at 96 pixels; two minutes a figure on two cores, less than
+    one for those of schroeder."""
     variant: Literal["default", "paper"] = "default"
-    """The swarm as we measured it best, or as the paper has it."""
+    """The trackers as we measured them best, or as their papers have them."""
     renderer: Literal["raster", "egl", "osmesa"] = "raster"
-    """What renders and scores the hypotheses."""
+    """What renders and scores the swarm's hypotheses."""
     repetitions: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Times every measurement is repeated with another seed; unless given, as often as in the paper."""
+    """Times every measurement of the swarm is repeated with another seed; unless given, as often as in the paper."""
     resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
-    """Longest side of the region that hypotheses are rendered at; the sensor's own unless given."""
+    """Longest side of the region that the swarm's hypotheses are rendered at; the sensor's own unless given."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Only the first so many frames of the motion."""
+    synergies: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH")] = None
+    """In place of each figure's own synergies: a set by name, as leap; those of a motion's own postures, as signs; a
+    .json of `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Processes on this machine; as many as there are cores unless given."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
@@ -57,11 +62,11 @@ class Command:
         names = [name for name in self.figures if name != "list"]
         experiments = chosen_experiments(names or ["all"])
         options = ExperimentOptions(
-            self.quick, self.variant, self.renderer, self.repetitions, self.resolution, self.frames
+            self.quick, self.variant, self.renderer, self.repetitions, self.resolution, self.frames, self.synergies
         )
         if "list" in self.figures:
             for experiment in experiments:
-                print(f"{experiment.name}  {len(experiment.cells(options)):4} cells  {experiment.title}")
+                print(f"{experiment.name:15} {len(experiment.cells(options)):4} cells  {experiment.title}")
             return
         if self.out is None or not self.figures:
             raise InputError("name the figures and a folder to write to, as in  depthtrack reproduce all -o DIR")

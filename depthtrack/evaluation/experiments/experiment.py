@@ -14,11 +14,12 @@ QUICK_RESOLUTION = 96
 
 @dataclass(frozen=True)
 class ExperimentOptions:
-    """What a user may choose of every experiment.
+    """What a user may choose; an experiment takes note of what it varies or leaves open.
 
-    `quick`: few cells and repetitions at a reduced resolution. `repetitions` with different seeds, None for the
-    experiment's own number; `resolution` of the region of interest, its longest side in pixels, None for the sensor's
-    own (QUICK_RESOLUTION when quick); `frames` at the beginning of the motion, None for all.
+    `quick`: few cells and repetitions, swarms at a reduced resolution. `repetitions` with different seeds,
+    None for the experiment's own number; `resolution` of the region of interest, its longest side in pixels, None for
+    the sensor's own (QUICK_RESOLUTION when quick); `frames` at the beginning of the motion, None for all; `synergies`
+    in place of the experiment's own, by a name that `bases.basis` knows.
     """
 
     quick: bool = False
@@ -27,6 +28,7 @@ class ExperimentOptions:
     repetitions: int | None = None
     resolution: int | None = None
     frames: int | None = None
+    synergies: str | None = None
 
     @property
     def side(self) -> int | None:

@@ -60,3 +60,25 @@ def _head() -> tuple[str, str, str]:
 
 def _line(comparison: Comparison) -> tuple[str, str, str]:
     return comparison.what, comparison.paper, comparison.ours_text
+
+
+def error_and_time(
+    axes: Axes, x: Sequence[float], rows: Sequence[Row], at: float, paper_deg: float, paper_ms: float
+) -> None:
+    """Mean joint angle error over `x` on the left axis, milliseconds of the median frame on the right one.
+
+    In the paper, the error is less than `paper_deg` at x = `at`, and the time about `paper_ms`.
+    """
+    box = axes.get_position()
+    axes.set_position((box.x0, box.y0, 0.945 * box.width, box.height))
+    clock = axes.twinx()
+    axes.plot(x, [row["error_deg"] for row in rows], marker="o", label="ours: error, left")
+    clock.plot(x, [row["ms_per_frame"] for row in rows], marker="s", color="C1", label="ours: time on one core, right")
+    axes.plot([at - 0.4, at + 0.4], [paper_deg] * 2, color="C0", linestyle="--", label="paper: error, less than this")
+    clock.plot(at, paper_ms, "D", color="C1", mec="black", ms=6, label="paper: time on eight threads")
+    axes.set(ylabel="joint angle error (deg)", ylim=(0, 1.4 * axes.get_ylim()[1]))
+    clock.set(ylabel="time of a frame (ms)", ylim=(0, 1.2 * clock.get_ylim()[1]))
+    clock.grid(visible=False)
+    clock.spines["right"].set_visible(True)
+    handles = [handle for each in (axes, clock) for handle in each.get_legend_handles_labels()[0]]
+    clock.legend(handles=handles, loc="upper right")

@@ -15,10 +15,21 @@ EXPERIMENTS = {
     "oikonomidis-2c": f"{_HERE}.oikonomidis_2c",
     "oikonomidis-2d": f"{_HERE}.oikonomidis_2d",
     "oikonomidis-4": f"{_HERE}.oikonomidis_4",
+    "schroeder-7": f"{_HERE}.schroeder_7",
+    "schroeder-8": f"{_HERE}.schroeder_8",
+    "schroeder-9": f"{_HERE}.schroeder_9",
+    "schroeder-10": f"{_HERE}.schroeder_10",
+    "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
 }
-"""Modules that hold an `EXPERIMENT`."""
+"""Modules that hold an `EXPERIMENT`; a name is the paper's first author, and the figure or section."""
 
-SHORT_NAMES = {f"fig{name.rpartition('-')[2]}": name for name in EXPERIMENTS}
+PAPERS = tuple(dict.fromkeys(name.partition("-")[0] for name in EXPERIMENTS))
+
+SHORT_NAMES = {
+    tail if tail.startswith("sec") else f"fig{tail}": name
+    for name, tail in ((name, name.rpartition("-")[2]) for name in EXPERIMENTS)
+}
+"""Names without the paper's: no two papers here have a figure of the same number."""
 
 
 def load_experiment(name: str) -> Experiment:
@@ -28,14 +39,20 @@ def load_experiment(name: str) -> Experiment:
 
 
 def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Experiments by full or short name, or `all`, each once. Raises InputError for others, naming those there are."""
-    found = []
+    """Experiments by full or short name, all of a paper by its author, or `all`; each once.
+
+    Raises InputError for others, naming those there are.
+    """
+    found: list[str] = []
     for name in names:
         full = SHORT_NAMES.get(name, name)
-        if name != "all" and full not in EXPERIMENTS:
+        if name == "all" or name in PAPERS:
+            found += [each for each in EXPERIMENTS if name == "all" or each.startswith(f"{name}-")]
+        elif full in EXPERIMENTS:
+            found.append(full)
+        else:
             known = ", ".join(f"{short} ({full})" for short, full in SHORT_NAMES.items())
-            raise InputError(f"no figure '{name}': choose all or some of {known}")
-        found += list(EXPERIMENTS) if name == "all" else [full]
+            raise InputError(f"no figure '{name}': choose all, {', '.join(PAPERS)}, or some of {known}")
     return [load_experiment(name) for name in dict.fromkeys(found)]
 
 

@@ -17,7 +17,7 @@ from depthtrack.evaluation.bench.machine import Machine, describe_machine
 from depthtrack.evaluation.experiments.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.evaluation.experiments.plot import draw_png
 from depthtrack.evaluation.experiments.registry import full_cell, measure_cell
-from depthtrack.evaluation.sweep.rows import Journal, Row
+from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
 
 Progress = Callable[[Iterator[Row], int, int], Iterable[Row]]
@@ -77,19 +77,24 @@ def reproduce(
         table=experiment.tabulate(rows),
     )
     _write(folder / "table.csv", as_csv(done.table).encode())
-    _write(folder / "figure.png", draw_png(experiment, rows, done.comparisons, as_note(done)))
+    _write(folder / "figure.png", draw_png(experiment, rows, done.comparisons, as_note(done, cells[0])))
     _write(folder / "summary.json", json.dumps(done.to_json(), indent=2).encode() + b"\n")
     return done
 
 
-def as_note(done: Reproduction) -> str:
-    """How the rows came to be, in one line."""
+def as_note(done: Reproduction, cell: Cell) -> str:
+    """How the rows came to be, in one line; `cell`, any of them, tells what the experiment takes note of."""
     options = done.options
-    rendered = "native resolution" if options.side is None else f"{options.side} pixels"
-    return (
-        f"variant {options.variant}, {options.renderer}, {rendered}, {done.cells} cells, "
-        f"{done.cell_seconds:,.0f} s in all workers{', --quick' if options.quick else ''}"
-    )
+    side = "native resolution" if options.side is None else f"{options.side} pixels"
+    parts = [
+        f"variant {options.variant}" if "variant" in cell else "",
+        f"{options.renderer}, {side}" if "renderer" in cell else "",
+        f"{cell['frames']} frames" if cell.get("frames") else "",
+        f"{done.cells} cells",
+        f"{done.cell_seconds:,.0f} s in all workers",
+        "--quick" if options.quick else "",
+    ]
+    return ", ".join(part for part in parts if part)
 
 
 def as_csv(table: Sequence[Row]) -> str:
