@@ -33,14 +33,14 @@ class Command:
         from depthtrack.evaluation.replay import Replay
         from depthtrack.recording.run import Run
         from depthtrack.viewing.run_film import write_run_film
-        from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS
+        from depthtrack.viewing.video import WEB_CODECS
 
         if not 48 <= self.height <= 1080:
             raise InputError(f"--height must be from 48 to 1080 pixels, found {self.height}")
         if not 0.01 <= self.speed <= 100:
             raise InputError(f"--speed must be from 0.01 to 100, found {self.speed}")
         replay = Replay.open(Run.load(self.path), self.sequence)
-        codecs = WEB_CODECS if self.codec == "web" else QUICK_CODECS
+        codecs = WEB_CODECS if self.codec == "web" else None
         count = write_run_film(replay, self.out, codecs, self.height, bar, self.speed)
         if count == 0:
             raise InputError(f"the run {self.path} holds no frame to show")

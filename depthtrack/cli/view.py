@@ -1,4 +1,4 @@
-"""`depthtrack view`: look at a recording."""
+"""`depthtrack view`: look at a recording, or at a run beside its recording."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -21,7 +21,8 @@ INSTALL_HINT = "pip install 'depthtrack[view]'"
 
 @dataclass(frozen=True)
 class Command:
-    """Look at a recording: depth, colour, the hand's mask and the true skeleton.
+    """Look at a recording: depth, colour, the hand's mask and the true skeleton. Or at a run (a folder that `depthtrack
+    track` wrote): the tracked hand over its recording, the residual, skeletons, and the energies over time.
 
     Opens the interactive viewer where it is installed and there is a screen, and else writes a contact sheet. The
     options below write files instead; several may be given at once.
@@ -49,10 +50,18 @@ class Command:
     codec: Literal["quick", "web"] = "quick"
     """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
 
+    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    """Where the recording of a run is, if it was moved since."""
+
     def run(self) -> None:
         from depthtrack.viewing.moments import sequence_depth_range
 
         self._check_options()
+        if (self.recording.path / "run.json").exists():
+            from depthtrack.cli.view_run import view_run
+
+            view_run(self)
+            return
         sequence = self.recording.open()
         near, far = self.depth_range or sequence_depth_range(sequence)
         if self.sheet is not None:
@@ -80,7 +89,7 @@ class Command:
 
     def _show(self, sequence: "Sequence", near: float, far: float) -> None:
         """The interactive viewer, or the next best thing."""
-        reason = _why_no_window()
+        reason = why_no_window()
         if reason is None:
             viewer = _viewer(sequence, near, far)
             viewer.open_window()
@@ -162,7 +171,7 @@ class Command:
         return mask_estimator()
 
 
-def _why_no_window() -> str | None:
+def why_no_window() -> str | None:
     """What keeps the interactive viewer from opening, and what to do; None when nothing does."""
     import os
     import sys

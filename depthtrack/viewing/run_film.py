@@ -6,7 +6,7 @@ from pathlib import Path
 from depthtrack.evaluation.replay import Replay, Replayed
 from depthtrack.viewing.contact_sheet import frame_rate
 from depthtrack.viewing.run_pictures import RunPainter
-from depthtrack.viewing.video import QUICK_CODECS, VideoWriter
+from depthtrack.viewing.video import VideoWriter
 
 Progress = Callable[[Iterable[Replayed]], Iterable[Replayed]]
 
@@ -14,12 +14,12 @@ Progress = Callable[[Iterable[Replayed]], Iterable[Replayed]]
 def write_run_film(
     replay: Replay,
     path: Path,
-    codecs: tuple[str, ...] = QUICK_CODECS,
+    codecs: tuple[str, ...] | None = None,
     height: int = 360,
     progress: Progress | None = None,
     speed: float = 1.0,
 ) -> int:
-    """Write an mp4 of a run at its own pace times `speed`, complete or not at all; returns how many frames.
+    """Write an mp4 (or webm) of a run at its own pace times `speed`, complete or not at all; returns how many frames.
 
     `height` pixels of each of the four views; frames stream. Raises InputError.
     """

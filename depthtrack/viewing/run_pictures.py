@@ -18,14 +18,13 @@ from depthtrack.viewing.panels import blank, captioned, paint, stacked, tile_gri
 from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import FAINT_TEXT, OUTLINE, STATUS_COLOURS, TEXT, TRUE_MASK
+from depthtrack.viewing.theme import FAINT_TEXT, FINGER_TRUTH, OUTLINE, STATUS_COLOURS, TEXT
 from depthtrack.viewing.timeline import Timeline
 
 Image = NDArray[np.uint8]
-RunLayer = Literal["recording", "hypothesis", "residual", "skeleton"]
+RunLayer = Literal["recording", "overlay", "hypothesis", "residual", "skeleton"]
 LAYERS: tuple[RunLayer, ...] = ("recording", "hypothesis", "residual", "skeleton")
-
-_TRUTH = dict.fromkeys(("palm", "thumb", "index", "middle", "ring", "little"), TRUE_MASK)
+"""The views of `RunPainter.picture`."""
 
 
 class RunPainter:
@@ -35,10 +34,9 @@ class RunPainter:
         run, camera = replay.run, replay.sequence.camera
         self._replay, self._surface, self._height = replay, replay.surface(), height
         keypoints = HandModel(replay.hand).keypoints(run.poses)
-        trusted = np.array([status in ("tracked", "started") for status in run.status], dtype=np.bool_)
-        self._windows = close_ups(camera, keypoints, trusted)
-        self._near, self._far = _hand_range(keypoints[trusted, :, 2])
-        self._scene_near, self._scene_far = _hand_range(keypoints[trusted, :, 2], room=0.5)
+        self._windows = close_ups(camera, keypoints, _trusted(replay))
+        self._near, self._far = hand_range(replay)
+        self._scene_near, self._scene_far = hand_range(replay, room=0.5)
         self._timeline: Timeline | None = None
 
     def picture(self, seen: Replayed) -> Image:
@@ -50,11 +48,17 @@ class RunPainter:
         return stacked([self._headline(seen, grid.shape[1]), grid, self._timeline.at(seen.row)])
 
     def view(self, seen: Replayed, layer: RunLayer) -> Image:
-        """One view (height, w, 3), without a caption: of the whole image for "recording", else close on the hand."""
-        moment = self._moment(seen)
+        """One view (height, w, 3), without a caption: of the whole image for "recording", else close on the hand.
+
+        "recording" and "overlay" show the hypothesis over the colour image, where there is one.
+        """
+        moment = run_moment(seen, self._surface.model)
         close = moment.cropped(*self._windows[seen.row])
         if layer == "recording":
-            image = self._recording(seen, moment)
+            image = self._overlay(seen, moment, self._scene_near, self._scene_far)
+            _draw_frame(image, self._windows[seen.row], self._height / moment.camera.height)
+        elif layer == "overlay":
+            image = self._overlay(seen, close, self._near, self._far)
         elif layer == "hypothesis":
             image = self._hypothesis(seen, close)
         elif layer == "residual":
@@ -63,13 +67,9 @@ class RunPainter:
             image = self._skeleton(seen, close)
         return _of_width(image, moment.camera.resized(self._height / moment.camera.height).width)
 
-    def _recording(self, seen: Replayed, moment: Moment) -> Image:
-        image = paint(moment, "colour", self._height, self._scene_near, self._scene_far)
-        surface = self._rendered(seen, moment.camera)
-        if surface is not None:
-            image = draw_surface(image, surface, 0.6)
-        _draw_frame(image, self._windows[seen.row], self._height / moment.camera.height)
-        return image
+    def _overlay(self, seen: Replayed, moment: Moment, near: float, far: float) -> Image:
+        image, surface = paint(moment, "colour", self._height, near, far), self._rendered(seen, moment.camera)
+        return image if surface is None else draw_surface(image, surface, 0.6)
 
     def _hypothesis(self, seen: Replayed, close: Moment) -> Image:
         image, surface = paint(close, "depth", self._height, self._near, self._far), self._rendered(seen, close.camera)
@@ -89,20 +89,8 @@ class RunPainter:
         image = dimmed(paint(close, "colour", self._height, self._near, self._far))
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
         if truth is not None:
-            image = draw_skeleton(image, camera, truth, thickness=1, colours=_TRUTH)
+            image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
         return image if close.keypoints is None else draw_skeleton(image, camera, close.keypoints)
-
-    def _moment(self, seen: Replayed) -> Moment:
-        """The frame with the observed silhouette and the tracked keypoints."""
-        moment = Moment(seen.frame)
-        if seen.observation is not None:
-            mask = np.zeros(seen.frame.camera.shape, dtype=np.bool_)
-            (left, top), (height, width) = seen.observation.origin, seen.observation.camera.shape
-            mask[top : top + height, left : left + width] = seen.observation.skin
-            moment = replace(moment, mask=mask)
-        if seen.estimate.pose is not None:
-            moment = replace(moment, keypoints=self._surface.model.keypoints(seen.estimate.pose))
-        return moment
 
     def _rendered(self, seen: Replayed, camera: Camera) -> Surface | None:
         """The hypothesis as a view of this camera shows it."""
@@ -132,12 +120,30 @@ class RunPainter:
         return bar
 
 
-def _hand_range(depths: NDArray[np.float64], room: float = 0.06) -> tuple[float, float]:
-    """Near and far (metres) that give the hand of a run most of the colours, with some room around it."""
+def run_moment(seen: Replayed, model: HandModel) -> Moment:
+    """The frame with the observed silhouette and the tracked keypoints."""
+    moment = Moment(seen.frame)
+    if seen.observation is not None:
+        mask = np.zeros(seen.frame.camera.shape, dtype=np.bool_)
+        (left, top), (height, width) = seen.observation.origin, seen.observation.camera.shape
+        mask[top : top + height, left : left + width] = seen.observation.skin
+        moment = replace(moment, mask=mask)
+    if seen.estimate.pose is not None:
+        moment = replace(moment, keypoints=model.keypoints(seen.estimate.pose))
+    return moment
+
+
+def hand_range(replay: Replay, room: float = 0.06) -> tuple[float, float]:
+    """Near and far (metres) that give the hand of a run most of the colours, with `room` metres behind it."""
+    depths = HandModel(replay.hand).keypoints(replay.run.poses[_trusted(replay)])[..., 2]
     if depths.size == 0:
         return 0.3, 1.5
     near, far = depth_range(depths.astype(np.float32), (1.0, 99.0))
-    return max(near - min(room, 0.06), 0.05), far + room
+    return max(near - 0.06, 0.05), far + room
+
+
+def _trusted(replay: Replay) -> NDArray[np.bool_]:
+    return np.array([status in ("tracked", "started") for status in replay.run.status], dtype=np.bool_)
 
 
 def _of_width(image: Image, width: int) -> Image:

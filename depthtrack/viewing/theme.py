@@ -22,6 +22,8 @@ FINGER_COLOURS: dict[str, Rgb] = {
     "ring": (56, 189, 248),
     "little": (192, 132, 252),
 }
+FINGER_TRUTH: dict[str, Rgb] = dict.fromkeys(("palm", *FINGER_COLOURS), TRUE_MASK)
+"""A true skeleton beside a tracked one."""
 OUTLINE: Rgb = (10, 12, 18)
 """Dark rim around lines and joints, so that they show on bright images too."""
 

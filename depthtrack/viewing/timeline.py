@@ -16,12 +16,12 @@ _SUBPIXEL_BITS = 4
 
 
 class Timeline:
-    """Draws once what all frames of a run share; `at` adds the cursor."""
+    """`image` (HEIGHT, width, 3), drawn once, is what all frames of a run share; `at` adds the cursor."""
 
     def __init__(self, energy: NDArray[np.float64], status: tuple[str, ...], width: int) -> None:
         """`energy` (T,), NaN where there is none, and `status` (T,) of a run."""
         self._width, self._count = width, len(energy)
-        self._image = blank(width, HEIGHT, SURFACE)
+        self.image = blank(width, HEIGHT, SURFACE)
         known = energy[np.isfinite(energy)]
         # A lost frame's energy must not flatten all others.
         self._top = float(max(1.2 * np.percentile(known, 98), 1e-6)) if len(known) else 1.0
@@ -29,13 +29,13 @@ class Timeline:
             if said in ("lost", "absent"):
                 left, right = self._x(row - 0.5), self._x(row + 0.5)
                 colour = np.array(STATUS_COLOURS[said]) * 0.35 + np.array(SURFACE) * 0.65
-                self._image[_TOP:, left : max(right, left + 1)] = np.rint(colour)
+                self.image[_TOP:, left : max(right, left + 1)] = np.rint(colour)
         self._draw_curve(energy)
-        put_text(self._image, f"energy, 0 to {self._top:.3g}", (8, _TOP // 2), 13, FAINT_TEXT)
+        put_text(self.image, f"energy, 0 to {self._top:.3g}", (8, _TOP // 2), 13, FAINT_TEXT)
 
     def at(self, row: int, note: str = "") -> Image:
         """The picture (HEIGHT, width, 3) with a cursor at one frame and a note beside the title."""
-        image = self._image.copy()
+        image = self.image.copy()
         x = self._x(row)
         image[_TOP:, max(x - 1, 0) : x + 1] = TEXT
         put_text(image, note, (180, _TOP // 2), 13, TEXT)
@@ -54,5 +54,5 @@ class Timeline:
         for stretch in np.split(np.arange(self._count), np.flatnonzero(np.diff(finite)) + 1):
             if len(stretch) and finite[stretch[0]]:
                 fixed = np.rint(points[stretch] * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-                cv2.polylines(self._image, [fixed], False, BACKGROUND, 4, cv2.LINE_AA, _SUBPIXEL_BITS)
-                cv2.polylines(self._image, [fixed], False, TEXT, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
+                cv2.polylines(self.image, [fixed], False, BACKGROUND, 4, cv2.LINE_AA, _SUBPIXEL_BITS)
+                cv2.polylines(self.image, [fixed], False, TEXT, 1, cv2.LINE_AA, _SUBPIXEL_BITS)

@@ -1,0 +1,96 @@
+"""`depthtrack view` on a run: the same options, for the tracked hand over its recording."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from depthtrack.cli.progress import bar
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from depthtrack.cli.view import Command
+    from depthtrack.evaluation.replay import Replay
+
+_NOT_FOR_RUNS = ("strip", "depth_range")
+
+
+def view_run(options: "Command") -> None:
+    """Show the run that the options name. Raises InputError, and MissingExtraError for a viewer without its extra."""
+    from depthtrack.evaluation.replay import Replay
+    from depthtrack.recording.run import Run
+
+    for name in _NOT_FOR_RUNS:
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')} is for recordings: leave it out for the run")
+    replay = Replay.open(Run.load(options.recording.path), options.sequence)
+    if options.sheet is not None:
+        _write_sheet(replay, options, options.sheet)
+    if options.video is not None:
+        _write_video(replay, options, options.video)
+    if options.rrd is not None:
+        from depthtrack.viewing.rerun_run_viewer import RerunRunViewer
+
+        count = RerunRunViewer(replay).save(options.rrd, bar(replay))
+        print(f"wrote {options.rrd}: {count} frames; open it with  rerun {options.rrd}")
+    if options.web:
+        _serve(replay)
+    if not (options.sheet or options.video or options.rrd or options.web):
+        _show(replay, options)
+
+
+def _show(replay: "Replay", options: "Command") -> None:
+    """The interactive viewer, or the next best thing."""
+    from depthtrack.cli.view import why_no_window
+
+    reason = why_no_window()
+    if reason is not None:
+        _write_sheet(replay, options, Path(f"{replay.run.folder.resolve().name}-contact-sheet.png"))
+        print(reason)
+        return
+    from depthtrack.viewing.rerun_run_viewer import RerunRunViewer
+
+    viewer = RerunRunViewer(replay)
+    viewer.open_window()
+    for seen in bar(replay):
+        viewer.log(seen)
+    viewer.close()
+
+
+def _serve(replay: "Replay") -> None:
+    from time import sleep
+
+    from depthtrack.viewing.rerun_run_viewer import RerunRunViewer
+
+    viewer = RerunRunViewer(replay)
+    print(f"the viewer is at {viewer.serve()}  (Ctrl-C ends it)", flush=True)
+    try:
+        for seen in bar(replay):
+            viewer.log(seen)
+        while True:
+            sleep(3600)
+    except KeyboardInterrupt:
+        print()
+
+
+def _write_sheet(replay: "Replay", options: "Command", path: Path) -> None:
+    from depthtrack.viewing.contact_sheet import save_picture
+    from depthtrack.viewing.moments import evenly_chosen
+    from depthtrack.viewing.run_sheet import run_sheet
+
+    row_of = {int(index): row for row, index in enumerate(replay.run.index)}
+    outside = [index for index in options.frames if index not in row_of]
+    if outside:
+        raise InputError(
+            f"--frames must be frames of the run {replay.run.folder}, which has none numbered {outside[0]}"
+        )
+    rows = [row_of[index] for index in options.frames] or evenly_chosen(len(replay), options.count or 12)
+    save_picture(run_sheet(replay, rows), path)
+    print(f"wrote the contact sheet {path}")
+
+
+def _write_video(replay: "Replay", options: "Command", path: Path) -> None:
+    from depthtrack.viewing.run_film import write_run_film
+    from depthtrack.viewing.video import WEB_CODECS
+
+    codecs = WEB_CODECS if options.codec == "web" else None
+    count = write_run_film(replay, path, codecs, progress=bar)
+    print(f"wrote the video {path}: {count} frames")

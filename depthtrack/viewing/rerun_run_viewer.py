@@ -1,0 +1,108 @@
+"""The interactive viewer of a run: hypothesis, residual and skeleton on the recording's time line, and its energies."""
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from depthtrack.evaluation.evaluate import evaluate
+from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.hand.pose import FINGERS
+from depthtrack.rendering.surface import Surface
+from depthtrack.viewing.moments import true_keypoints
+from depthtrack.viewing.rerun_stream import CAMERA
+from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, MomentStream, bones, jpeg
+from depthtrack.viewing.residual_colours import residual_to_rgb
+from depthtrack.viewing.run_pictures import hand_range, run_moment
+from depthtrack.viewing.theme import FINGER_COLOURS, FINGER_TRUTH, PALM, STATUS_COLOURS, Rgb
+
+_FIRST_BODY = 10
+"""Mask number of the palm; the 15 phalanges follow."""
+_HAND_IMAGES = ("hypothesis", "residual", "true_skeleton")
+_SERIES = {"energy": (230, 237, 243), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
+
+
+class RerunRunViewer(MomentStream[Replayed]):
+    """Shows a run as it is replayed.
+
+    Beside what recordings show: `world/hypothesis`, the tracked hand's visible surface (metres, camera frame);
+    `world/camera/hypothesis` and `/residual` in pixels; `world/true_skeleton` where the recording knows it; and
+    `run/energy`, `run/confidence`, `run/error_mm` and `run/status` over time.
+    """
+
+    def __init__(self, replay: Replay) -> None:
+        near, far = hand_range(replay)
+        super().__init__(
+            f"{replay.run.folder.resolve().name} on {replay.sequence.name}", replay.sequence.camera, near, far
+        )
+        self._surface, self._truth = replay.surface(), replay.sequence.ground_truth
+        points = evaluate(replay, residuals=False).points
+        self._error = None if points is None else points.mean().values
+
+    def log(self, item: Replayed) -> None:
+        """See `RerunStream`."""
+        rr, stream, estimate, frame = self._rr, self._stream, item.estimate, item.frame
+        moment = run_moment(item, self._surface.model)
+        self.log_moment(moment)
+        surface = None if estimate.pose is None else self._surface.seen(estimate.pose, frame.camera)
+        labels = None if surface is None else (surface.label + _FIRST_BODY) * (surface.label >= 0)
+        self._log_or_clear(
+            f"{CAMERA}/hypothesis",
+            None if labels is None else rr.SegmentationImage(labels.astype(np.uint8), opacity=0.65),
+        )
+        rendered = np.zeros(frame.camera.shape) if surface is None else surface.depth
+        stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, moment.mask), -7))
+        self._log_or_clear("world/hypothesis", None if surface is None else self._points(surface))
+        truth = true_keypoints(self._truth, frame.timestamp)
+        in_pixels = None if truth is None else frame.camera.project(truth)
+        self._log_or_clear("world/true_skeleton", bones(rr.LineStrips3D, truth, 0.0008, FINGER_TRUTH))
+        self._log_or_clear(f"{CAMERA}/true_skeleton", bones(rr.LineStrips2D, in_pixels, 0.8, FINGER_TRUTH))
+        self._log_numbers(item)
+
+    def _log_numbers(self, item: Replayed) -> None:
+        rr, stream, estimate = self._rr, self._stream, item.estimate
+        values = {"energy": estimate.energy, "confidence": estimate.confidence}
+        if self._error is not None:
+            values["error_mm"] = float(self._error[item.row])
+        for name, value in values.items():
+            self._log_or_clear(f"run/{name}", rr.Scalars(value) if np.isfinite(value) else None)
+        status = str(estimate.status.value)
+        stream.log("run/status", rr.TextLog(f"frame {item.frame.index}: {status}", color=STATUS_COLOURS[status]))
+
+    def _points(self, surface: Surface) -> Any:
+        """The visible surface in the colours of its fingers, a point for every second pixel."""
+        depth, label = surface.depth[::2, ::2], surface.label[::2, ::2]
+        v, u = np.nonzero(label >= 0)
+        points = self._camera.unproject(2 * np.stack([u, v], axis=-1), depth[v, u])
+        colours = np.array(_body_colours(), dtype=np.uint8)[label[v, u]]
+        return self._rr.Points3D(points.astype(np.float32), colors=colours, radii=points[:, 2] / self._camera.fx)
+
+    def _log_static(self) -> None:
+        super()._log_static()
+        for name, colour in _SERIES.items():
+            self._stream.log(f"run/{name}", self._rr.SeriesLines(colors=colour, names=name), static=True)
+
+    def _classes(self) -> list[tuple[int, str, Rgb]]:
+        names = ["palm", *(f"{finger} {k}" for finger in FINGERS for k in (1, 2, 3))]
+        bodies = zip(names, _body_colours(), strict=True)
+        return super()._classes() + [(_FIRST_BODY + n, name, colour) for n, (name, colour) in enumerate(bodies)]
+
+    def _layout(self) -> Any:
+        rrb = importlib.import_module("rerun.blueprint")
+        series = [
+            rrb.TimeSeriesView(origin=f"run/{name}", name=title)
+            for name, title in (("energy", "energy"), ("error_mm", "error, mm"), ("confidence", "confidence"))
+            if name != "error_mm" or self._error is not None
+        ]
+        images = rrb.Vertical(
+            self._image("hypothesis", "depth_picture", "colour", "hypothesis", "skeleton", "true_skeleton"),
+            self._image("residual, +-20 mm: red nearer, blue farther", "depth_picture", "residual"),
+        )
+        scene = self._scene((*FLAT_IMAGES, *_HAND_IMAGES))
+        numbers = rrb.Vertical(*series, rrb.TextLogView(origin="run/status", name="status"))
+        return self._blueprint(rrb.Horizontal(scene, images, numbers, column_shares=[3, 3, 2]))
+
+
+def _body_colours() -> list[Rgb]:
+    """RGB of the 16 bodies."""
+    return [PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))]

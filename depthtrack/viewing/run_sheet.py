@@ -1,0 +1,52 @@
+"""A page of a run: moments with the tracked hand over the recording, and what it does not explain."""
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.evaluation.replay import Replay
+from depthtrack.viewing.contact_sheet import framed
+from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked, tile_grid
+from depthtrack.viewing.run_pictures import RunPainter
+from depthtrack.viewing.text import put_text, text_width
+from depthtrack.viewing.theme import FAINT_TEXT, STATUS_COLOURS
+from depthtrack.viewing.timeline import Timeline
+
+Image = NDArray[np.uint8]
+
+
+def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns: int = 3) -> Image:
+    """An RGB page (h, w, 3) of the frames in these `rows` of the run; `height` pixels of a view.
+
+    Raises InputError when none of them can be read any more.
+    """
+    painter, tiles = RunPainter(replay, 2 * height), []
+    last = max(rows, default=-1)
+    for seen in replay:
+        if seen.row in rows:
+            views = [painter.view(seen, layer) for layer in ("overlay", "residual")]
+            small = [smaller(view, view.shape[1] // 2, height) for view in views]
+            status = str(seen.estimate.status.value)
+            told = f"{seen.frame.timestamp:.2f} s  ·  {status}"
+            tiles.append(captioned(beside(small, gap=0), f"frame {seen.frame.index}", told, STATUS_COLOURS[status]))
+        if seen.row >= last:
+            break
+    if not tiles:
+        raise InputError(f"the run {replay.run.folder} holds no frame to show")
+    grid = tile_grid(tiles, min(columns, len(tiles)))
+    timeline = Timeline(replay.run.energy, replay.run.status, grid.shape[1])
+    return framed(stacked([_title(replay, grid.shape[1]), grid, timeline.image], gap=12))
+
+
+def _title(replay: Replay, width: int) -> Image:
+    bar, run = blank(width, 34), replay.run
+    name = f"{run.folder.resolve().name[:40]}: {str(run.configuration.get('tracker', 'track'))[:20]}"
+    put_text(bar, name, (0, 17), 24)
+    lost = sum(status in ("lost", "absent") for status in run.status)
+    told = f"{len(run.index)} frames of {replay.sequence.name[:40]}  ·  {lost} without a trusted pose"
+    start = text_width(name, 24) + 18
+    if start + text_width(told, 14) <= width:
+        put_text(bar, told, (start, 19), 14, FAINT_TEXT)
+    return bar
