@@ -228,7 +228,7 @@ def test_what_is_wrong_with_a_motion_file_is_said(tmp_path: Path, text: str, com
 
 
 def test_an_unknown_motion_is_answered_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match="everyday, fast, grasp, random, signs"):
+    with pytest.raises(InputError, match="everyday, fast, grasp, other-grasps, random, signs"):
         load_motion("evryday")
 
 

@@ -12,6 +12,7 @@ from depthtrack.observation.observation import Observation
 from depthtrack.tracking.ik.chain import Bodies, Chain, place
 from depthtrack.tracking.ik.matching import Cloud, Matches, Surface
 from depthtrack.tracking.ik.moments import Moments, clear
+from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.residuals import Residual, add_matches
 from depthtrack.tracking.ik.solver import Damping, Solution, limit_slope, solve
 from depthtrack.tracking.ik.space import FULL, Space
@@ -31,7 +32,8 @@ class FitOptions:
     `rounds` of correspondences with at most `inner` Gauss-Newton steps each, after `rigid` rounds that move the hand
     as a whole. `residual` and `softness` (m, in the first and in the last round, 0 for none) say how correspondences
     count, `reach` (m) and `agreement` (cosine between normals) which do. `damping` is lambda of Eq. (4) and `hold` how
-    firmly the angles are tied to those given, both in m^2/rad^2 beside the sum over 3000 points.
+    firmly the angles are tied to those of the frame before, both in m^2/rad^2 beside the sum over 3000 points;
+    `likely` (m^2) how firmly to what synergies call likely: see `prior.Prior`.
     """
 
     rounds: int = 5
@@ -43,6 +45,7 @@ class FitOptions:
     agreement: float = 0.3
     damping: float = 1e-4
     hold: float = 5e-5
+    likely: float = 3e-7
     avoid_limits: bool = False
 
     def softness_at(self, round_: int, rounds: int) -> float:
@@ -54,7 +57,7 @@ class FitOptions:
 
 
 PAPER_FIT = FitOptions(
-    rigid=1, residual="point", softness=(0.0, 0.0), agreement=0.0, damping=1e-6, hold=0.0, avoid_limits=True
+    rigid=1, residual="point", softness=(0.0, 0.0), agreement=0.0, damping=1e-6, hold=0.0, likely=0.0, avoid_limits=True
 )
 """Schroeder et al. 2014: point to point, all points alike, damping by the step alone, joint limit avoidance."""
 
@@ -75,14 +78,23 @@ class Fitter:
         self._coarse = Cloud.of(observation, every * _COARSE)
         self._coarse_matches = Matches.room(len(self._coarse.points))
         self._surface.observe(observation, self._cloud, self.options.reach)
-        self._share = len(self._cloud.points) / _STANDARD_COUNT
 
-    def fit(self, pose: Array, space: Space = FULL, rounds: int | None = None, held: Array | None = None) -> Array:
+    def fit(
+        self,
+        pose: Array,
+        space: Space = FULL,
+        rounds: int | None = None,
+        prior: Prior | None = None,
+        coarse: bool = False,
+    ) -> Array:
         """The pose (27,) reached from `pose` by moving what `space` lets move.
 
-        `held` (20,) are the angles that those which the observation says nothing of are drawn to; None lets go.
+        `coarse` looks at every fourth of the points alone.
         """
         options = self.options
+        cloud, matches = (self._coarse, self._coarse_matches) if coarse else (self._cloud, self._matches)
+        share = len(cloud.points) / _STANDARD_COUNT
+        pull = (prior or Prior.none()).scaled(share)
         pose = pose.copy()
         coordinates = space.project(pose[ANGLES])
         pose[ANGLES] = space.angles(coordinates)
@@ -90,12 +102,10 @@ class Fitter:
             self._align(pose)
         slope = np.array([limit_slope(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
         state = Solution(pose, coordinates, slope)
-        hold = np.zeros((20, 20)) if held is None else options.hold * self._share * np.eye(20)
-        rest = np.zeros(20) if held is None else held
-        damping = Damping(options.damping * self._share, 1e-9, hold, rest, options.avoid_limits)
+        damping = Damping(options.damping * share, 1e-9, pull.precision, pull.rest, options.avoid_limits)
         rounds = options.rounds if rounds is None else rounds
         for k in range(rounds):
-            self._match(pose, self._cloud, self._matches, options.softness_at(k, rounds))
+            self._match(pose, cloud, matches, options.softness_at(k, rounds))
             solve(self._chain, self._moments, space, damping, options.inner, self._bodies, state)
         return pose
 

@@ -1,113 +1,135 @@
 """From few synergies to all angles, on one frame alone (Schroeder et al. 2014, Sec. V-B); and its starts.
 
-A single descent depends on where it begins. Postures drawn from the synergies, and orientations where none is given,
-are therefore first looked at through the renderer, which tells in microseconds whether one resembles the observation.
+A single descent depends on where it begins. Several postures therefore go on from stage to stage, fewer each time;
+the renderer tells in microseconds which of them resemble the observation.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ANGLES, ORIENTATION, make_pose, quaternion_log, quaternion_product
-from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.pose import ANGLES
+from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
+from depthtrack.observation.observation import Observation
+from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.tracking.ik.fit import Fitter
+from depthtrack.rendering.target import Target
+from depthtrack.tracking.ik.fit import FitOptions, Fitter
+from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.space import FULL, Space
+from depthtrack.tracking.ik.surfaces import Model, make_surface
 
 Array = NDArray[np.float64]
+
+_LONGEST_SIDE = 128
+"""Pixels of the longest side at which poses are rendered to compare them."""
+
+
+class Stage(NamedTuple):
+    """A stage takes up the best `keep` poses and fits each of them in so many `synergies`, None for all angles, for
+    `rounds` of matches; while `coarse`, to a quarter of the points."""
+
+    keep: int
+    synergies: int | None
+    rounds: int
+    coarse: bool = False
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Stages of the hierarchy: how many synergies each solves for, None for all angles; `rounds` of matches in each.
+    """The hierarchy: `stages`, and the `samples` postures from which the first of them takes the best that differ by
+    `apart` (rad, root mean square) or more. One sample is the mean posture."""
 
-    Of `samples` postures, the one that looks most like the observation is where the first stage begins; 0 begins at
-    the mean posture.
-    """
-
-    stages: tuple[int | None, ...] = (4, 8, None)
-    rounds: int = 10
+    stages: tuple[Stage, ...] = (
+        Stage(16, 4, 3, True),
+        Stage(8, 8, 4, True),
+        Stage(3, None, 6, True),
+        Stage(1, None, 8),
+    )
     samples: int = 400
+    apart: float = 0.15
 
 
-@dataclass(frozen=True)
-class SearchOptions:
-    """How a pose is found from nothing: `hypotheses` drawn at random, of which ever fewer go on.
+PAPER_LADDER = Ladder((Stage(1, 1, 10), Stage(1, 4, 10), Stage(1, None, 10)), samples=1)
+"""Schroeder et al. 2014, Fig. 11: 1 synergy, 4, all angles, from the mean posture, ten ICP iterations each."""
 
-    The first `starts` to go on differ in orientation by at least `apart` radians, so that likely errors are tried and
-    lose; `stages` gives for each stage after that how many go on, in how many synergies (None: all angles), and for
-    how many rounds.
+FLAT_LADDER = Ladder((Stage(1, None, 10),), samples=1)
+"""No hierarchy: all angles at once, from the mean posture."""
+
+
+class SingleFrameFitter:
+    """Estimates a hand's posture from one frame alone, where only its global pose is known.
+
+    `fit` says how, `PAPER_FIT` as the paper does; every `subsample`-th point is used. Equal calls give equal bits.
     """
 
-    hypotheses: int = 3000
-    apart: float = 0.5
-    stages: tuple[tuple[int, int | None, int], ...] = ((48, 8, 3), (16, None, 4), (6, None, 8), (2, None, 12))
-    good_energy: float = 12.0
-    attempts: int = 4
+    def __init__(
+        self,
+        shape: HandShape,
+        synergies: Synergies,
+        ladder: Ladder | None = None,
+        fit: FitOptions | None = None,
+        model: Model = "skin",
+        subsample: int = 1,
+        seed: int = 0,
+    ) -> None:
+        options = fit or FitOptions()
+        self._fitter = Fitter(shape, make_surface(model, shape, options.agreement), options)
+        self._scorer = RasterScorer(shape)
+        self._synergies, self._ladder = synergies, ladder or Ladder()
+        self._subsample, self._seed = subsample, seed
+
+    def estimate(self, observation: Observation, pose: ArrayLike) -> Array:
+        """The pose (27,) of the observed hand: `pose` (27,) tells about where it is; its angles are not looked at."""
+        target = Target(observation.camera, observation.skin, observation.depth)
+        self._scorer.observe(target.reduced(_LONGEST_SIDE))
+        self._fitter.observe(observation, self._subsample)
+        generator = np.random.Generator(np.random.Philox(key=[self._seed, observation.frame_index]))
+        start = np.array(pose, dtype=np.float64)
+        return climb(self._fitter, self._scorer, start, self._synergies, self._ladder, generator)
 
 
 def climb(
     fitter: Fitter, scorer: Scorer, pose: Array, synergies: Synergies, ladder: Ladder, generator: np.random.Generator
 ) -> Array:
-    """The pose (27,) that a hierarchy of stages finds when the global pose of `pose` is about right.
+    """The pose (27,) that a hierarchy of stages finds when the global part of `pose` is about right."""
+    poses = np.tile(pose, (ladder.samples, 1))
+    poses[0, ANGLES] = synergies.mean
+    poses[1:, ANGLES] = postures(synergies, generator, ladder.samples - 1)
+    poses = by_energy(scorer, within_limits(poses))[0]
+    poses = poses[_different(poses[:, ANGLES], ladder.apart, ladder.stages[0].keep)]
+    return descend(fitter, scorer, poses, synergies, ladder.stages)[0][0]
 
-    Nothing is known of the angles: those of `pose` are not looked at.
+
+def descend(
+    fitter: Fitter, scorer: Scorer, poses: Array, synergies: Synergies, stages: Sequence[Stage]
+) -> tuple[Array, Array]:
+    """Poses (N, 27), best first, and their energies (N,) after all stages; `poses` (B, 27) are best first too.
+
+    A stage of all angles keeps those that the observation says nothing of near where the synergies led.
     """
-    start = pose.copy()
-    start[ANGLES] = synergies.mean
-    if ladder.samples > 0:
-        drawn = np.tile(start, (ladder.samples, 1))
-        drawn[1:, ANGLES] = postures(synergies, generator, ladder.samples - 1)
-        drawn = within_limits(drawn)
-        start = drawn[np.argmin(scorer.score(drawn))]
-    for count in ladder.stages:
-        start = fitter.fit(start, space_of(synergies, count), ladder.rounds)
-    return start
+    energies = np.full(len(poses), np.inf)
+    for keep, count, rounds, coarse in stages:
+        poses = np.stack([_fit(fitter, pose, space_of(synergies, count), rounds, coarse) for pose in poses[:keep]])
+        poses, energies = by_energy(scorer, poses)
+    return poses, energies
 
 
-def find_pose(
-    fitter: Fitter,
-    scorer: Scorer,
-    centre: Array,
-    synergies: Synergies,
-    options: SearchOptions,
-    generator: np.random.Generator,
-) -> tuple[Array, float]:
-    """Pose (27,) and energy that best explain the observation, with the palm near `centre` (3,) metres."""
-    best: tuple[Array, float] | None = None
-    for _ in range(options.attempts):
-        found = _search_once(fitter, scorer, centre, synergies, options, generator)
-        if best is None or found[1] < best[1]:
-            best = found
-        if best[1] <= options.good_energy:
-            break
-    assert best is not None
-    return best
+def _fit(fitter: Fitter, pose: Array, space: Space, rounds: int, coarse: bool) -> Array:
+    prior = Prior.held(pose[ANGLES], fitter.options.hold) if space.full else None
+    return fitter.fit(pose, space, rounds, prior, coarse)
 
 
-def _search_once(
-    fitter: Fitter,
-    scorer: Scorer,
-    centre: Array,
-    synergies: Synergies,
-    options: SearchOptions,
-    generator: np.random.Generator,
-) -> tuple[Array, float]:
-    poses = _hypotheses(centre, synergies, generator, options.hypotheses)
+def by_energy(scorer: Scorer, poses: Array) -> tuple[Array, Array]:
+    """Poses (N, 27) sorted by how well they explain the observation, best first, and their energies (N,)."""
     energies = scorer.score(poses)
     order = np.argsort(energies, kind="stable")
-    poses = poses[order][_apart(poses[order], options.apart, options.stages[0][0])]
-    for keep, count, rounds in options.stages:
-        space = space_of(synergies, count)
-        poses = np.stack([fitter.fit(pose, space, rounds) for pose in poses[:keep]])
-        energies = scorer.score(poses)
-        order = np.argsort(energies, kind="stable")
-        poses, energies = poses[order], energies[order]
-    return poses[0], float(energies[0])
+    return poses[order], energies[order]
 
 
 def space_of(synergies: Synergies, count: int | None) -> Space:
@@ -121,25 +143,11 @@ def postures(synergies: Synergies, generator: np.random.Generator, count: int) -
     return synergies.angles(np.clip(coefficients, synergies.lower, synergies.upper))
 
 
-def _hypotheses(centre: Array, synergies: Synergies, generator: np.random.Generator, count: int) -> Array:
-    """Postures in every orientation, the palm near the observed centre: half of them after the synergies, half after
-    typical postures, some of which may be rare in recordings."""
-    quaternions = Rotation.random(count, rng=generator).as_quat()[:, [3, 0, 1, 2]]
-    positions = centre + generator.standard_normal((count, 3)) * [0.025, 0.025, 0.012]
-    typical = np.stack(list(POSTURES.values()))[generator.integers(0, len(POSTURES), count)]
-    typical = typical + 0.15 * generator.standard_normal((count, 20))
-    half = np.arange(count)[:, None] % 2 == 0
-    angles = np.where(half, postures(synergies, generator, count), typical)
-    return within_limits(make_pose(positions, quaternions, angles))
-
-
-def _apart(poses: Array, angle: float, count: int) -> list[int]:
-    """The first `count` poses, in order, whose orientations differ from those before by at least `angle`."""
+def _different(angles: Array, apart: float, count: int) -> list[int]:
+    """The first `count` of angles (N, 20), in order, that differ from those before by `apart`, root mean square."""
     chosen: list[int] = []
-    conjugate = poses[:, ORIENTATION] * [1, -1, -1, -1]
-    for i in range(len(poses)):
-        between = quaternion_log(quaternion_product(poses[i, ORIENTATION], conjugate[chosen]))
-        if not chosen or np.linalg.norm(between, axis=-1).min() >= angle:
+    for i, one in enumerate(angles):
+        if not chosen or np.sqrt(np.mean((angles[chosen] - one) ** 2, axis=1)).min() >= apart:
             chosen.append(i)
         if len(chosen) == count:
             break

@@ -17,18 +17,17 @@ from depthtrack.observation.observation import Observation
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from depthtrack.tracking.ik.capsules import CapsuleSurface
 from depthtrack.tracking.ik.fit import PAPER_FIT, FitOptions, Fitter
-from depthtrack.tracking.ik.hierarchy import SearchOptions, find_pose
-from depthtrack.tracking.ik.matching import Surface
-from depthtrack.tracking.ik.mesh import MeshSurface
+from depthtrack.tracking.ik.hierarchy import by_energy
+from depthtrack.tracking.ik.prior import Prior
+from depthtrack.tracking.ik.search import SearchOptions, find_pose
 from depthtrack.tracking.ik.space import FULL, Space
+from depthtrack.tracking.ik.surfaces import Model, make_surface
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
-Model = Literal["skin", "cylinders"]
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,9 @@ class IkOptions:
     along normals with graduated robust weights, chooses among predictions by rendering them, and tries again where the
     result does not look like the observation: each measured to help. `fit` overrides either's way of fitting.
     `model` is what the observation is matched to: the skin mesh, or tapered capsules. Every `subsample`-th point is
-    used. With `synergies`, only they and the global pose are solved for; the search for a start, which needs some in
-    any case, then uses them too.
+    used. With `synergies`, only they and the global pose are solved for (the paper's reduced degrees of freedom), or,
+    if `soft`, all angles, drawn to postures that are likely by the synergies: see `prior.Prior.likely`. The search for
+    a start, which needs some in any case, then uses them too.
     """
 
     variant: Variant = "default"
@@ -49,6 +49,7 @@ class IkOptions:
     inner: int = 5
     subsample: int = 3
     synergies: Synergies | None = None
+    soft: bool = False
     seed: int = 0
     lost: LostBelow = field(default_factory=LostBelow)
     fit: FitOptions | None = None
@@ -67,15 +68,6 @@ class IkOptions:
         return (1.0,) if self.variant == "paper" else (0.0, 0.5, 1.0)
 
 
-def make_surface(model: Model, shape: HandShape, agreement: float) -> Surface:
-    """The surface of a hand that observations are matched to. Raises InputError for another name."""
-    if model == "skin":
-        return MeshSurface(shape, agreement)
-    if model == "cylinders":
-        return CapsuleSurface(shape, agreement)
-    raise InputError(f"no hand model '{model}' for fitting: choose skin or cylinders")
-
-
 class IkTracker:
     """Follows a hand by fitting its surface: see `tracker.Tracker`."""
 
@@ -92,8 +84,12 @@ class IkTracker:
         fitting = options.fitting
         self._fitter = Fitter(shape, make_surface(options.model, shape, fitting.agreement), fitting)
         self._scorer = RasterScorer(shape, options.objective)
-        self._space: Space = FULL if options.synergies is None else Space.of(options.synergies)
-        self._synergies = options.synergies or load_synergies()
+        if options.soft and options.synergies is None:
+            raise InputError("soft synergies need synergies: say which")
+        given = options.synergies
+        self._space: Space = FULL if given is None or options.soft else Space.of(given)
+        self._likely = None if given is None else Prior.likely(given, fitting.likely)
+        self._synergies = given or load_synergies()
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -108,7 +104,7 @@ class IkTracker:
             given = np.asarray(pose, dtype=np.float64)
             if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
                 raise InputError(f"a start pose must be {POSE_SIZE} finite numbers, found shape {given.shape}")
-            found = self._fitter.fit(within_limits(given), self._space, 2 * self.options.rounds)
+            found = self._fitter.fit(within_limits(given), self._space, 2 * self.options.rounds, self._likely)
             clock.lap("fit")
         return self._settle(found, Status.STARTED, clock)
 
@@ -124,11 +120,11 @@ class IkTracker:
         ahead = within_limits(retract(last, steps))
         ahead = ahead[np.argsort(self._scorer.score(ahead), kind="stable")]
         clock.lap("predict")
-        held = last[ANGLES] if self._space.full else None
-        found = self._fitter.fit(ahead[0], self._space, held=held)
+        prior = self._likely or Prior.held(last[ANGLES], self._fitter.options.hold)
+        found = self._fitter.fit(ahead[0], self._space, prior=prior)
         clock.lap("fit")
         if self.options.variant == "default":
-            found = self._reconsider(found, ahead[1:], held)
+            found = self._reconsider(found, ahead[1:], prior)
             clock.lap("retry")
         return self._settle(found, Status.TRACKED, clock)
 
@@ -149,18 +145,18 @@ class IkTracker:
         self._scorer.observe(Target(observation.camera, observation.skin, observation.depth))
         self._fitter.observe(observation, self.options.subsample)
 
-    def _reconsider(self, found: Array, others: Array, held: Array | None) -> Array:
+    def _reconsider(self, found: Array, others: Array, prior: Prior) -> Array:
         """The best of what further descents find, where the first one ended much higher than the frame before."""
         satisfied = 1.3 * self._memory.energy + 2.0
         if self._scorer.score(found[None])[0] <= satisfied:
             return found
-        tried = np.stack([found, *(self._fitter.fit(pose, self._space, held=held) for pose in others)])
+        tried = np.stack([found, *(self._fitter.fit(pose, self._space, prior=prior) for pose in others)])
         energies = self._scorer.score(tried)
         best = tried[np.argmin(energies)]
         if energies.min() <= satisfied:
             return best
-        further = self._fitter.fit(best, self._space, 2 * self.options.rounds, held)
-        return np.stack([best, further])[np.argmin(self._scorer.score(np.stack([best, further])))]
+        further = self._fitter.fit(best, self._space, 2 * self.options.rounds, prior)
+        return by_energy(self._scorer, np.stack([best, further]))[0][0]
 
     def _search(self, observation: Observation) -> Array:
         # Philox keyed by seed and frame: the same whatever happened before.
@@ -168,7 +164,7 @@ class IkTracker:
         found = find_pose(
             self._fitter, self._scorer, observation.centre, self._synergies, self.options.search, generator
         )[0]
-        return found if self._space.full else self._fitter.fit(found, self._space)
+        return found if self.options.synergies is None else self._fitter.fit(found, self._space, prior=self._likely)
 
     def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
         terms = self._scorer.terms(pose[None])

@@ -1,0 +1,20 @@
+"""The surfaces that a hand can be fitted by, by name."""
+
+from typing import Literal
+
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.tracking.ik.capsules import CapsuleSurface
+from depthtrack.tracking.ik.matching import Surface
+from depthtrack.tracking.ik.mesh import MeshSurface
+
+Model = Literal["skin", "cylinders"]
+
+
+def make_surface(model: Model, shape: HandShape, agreement: float) -> Surface:
+    """The surface of a hand that observations are matched to. Raises InputError for another name."""
+    if model == "skin":
+        return MeshSurface(shape, agreement)
+    if model == "cylinders":
+        return CapsuleSurface(shape, agreement)
+    raise InputError(f"no hand model '{model}' for fitting: choose skin or cylinders")
