@@ -28,8 +28,9 @@ COMMANDS = {
     "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
     "video": CommandEntry("depthtrack.cli.video", "a film of a run: the tracked hand over the recording"),
+    "export": CommandEntry("depthtrack.cli.export", "the joints of a run, as a table, arrays or a benchmark's text"),
     "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat the papers' experiments, our figures beside theirs"),
-    "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring, in hypotheses a second"),
+    "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring hypotheses, and of fitting the surface"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),
 }
 

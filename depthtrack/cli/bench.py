@@ -2,30 +2,18 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from depthtrack.errors import DepthtrackError
 
-_MODULES = {"score": "depthtrack.evaluation.bench.scoring"}
-"""Where each benchmark lives: `plan(backends, seconds)` checks and counts, `run(plan, progress)` measures, and
-`as_text(report)` tells it to people; the report, a dataclass, has `rows`, and none where nothing could run."""
+if TYPE_CHECKING:
+    from types import ModuleType
 
 
 @dataclass(frozen=True)
-class Command:
-    """Measure speed on this machine.
-
-    score: from poses to energies, kinematics and objective included, in hypotheses a second, for every backend that
-    runs here, at the sensor's resolution and at 96 and 64 pixels a side; and, where they are installed, for pyrender,
-    Open3D and embree on a mesh of the same hand.
-    """
-
-    what: tyro.conf.Positional[Literal["score"]]
-    """What to measure."""
-    backends: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="NAME ...")] = None
-    """Only these, of raster, egl, osmesa, oracle, pyrender, open3d, embree; unless told, all but the slow oracle."""
+class _Benchmark:
     seconds: float = 1.0
     """Time spent on each row of the table; the best and the median call count."""
     json: bool = False
@@ -33,15 +21,14 @@ class Command:
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the JSON to a file as well."""
 
-    def run(self) -> None:
+    def _measure(self, benchmark: "ModuleType", plan: Any) -> None:
+        """Run and report. `benchmark` has `run(plan, progress)`, which measures, and `as_text(report)`, which tells it
+        to people; the report, a dataclass, has `rows`, and none where nothing could run."""
         from dataclasses import asdict
-        from importlib import import_module
         from json import dumps
 
         from tqdm import tqdm
 
-        benchmark = import_module(_MODULES[self.what])
-        plan = benchmark.plan(self.backends, self.seconds)
         report = benchmark.run(
             plan, lambda rows: tqdm(rows, total=plan.row_count, unit="row", leave=False, disable=None)
         )
@@ -51,6 +38,48 @@ class Command:
         print(text if self.json else benchmark.as_text(report))
         if not report.rows:
             raise DepthtrackError("nothing asked for can run here: the reasons are above")
+
+
+@dataclass(frozen=True)
+class Score(_Benchmark):
+    """From poses to energies, kinematics and objective included, in hypotheses a second.
+
+    For every backend that runs here, at the sensor's resolution and at 96 and 64 pixels a side; and, where they are
+    installed, for pyrender, Open3D and embree on a mesh of the same hand.
+    """
+
+    backends: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="NAME ...")] = None
+    """Only these, of raster, egl, osmesa, oracle, pyrender, open3d, embree; unless told, all but the slow oracle."""
+
+    def run(self) -> None:
+        from depthtrack.evaluation.bench import scoring
+
+        self._measure(scoring, scoring.plan(self.backends, self.seconds))
+
+
+@dataclass(frozen=True)
+class Ik(_Benchmark):
+    """From a segmented depth map to a pose by fitting the hand's surface, on one core, in frames a second.
+
+    For the skin and the cylinders, all residuals, 26 and 6+6 degrees of freedom, and several numbers of points.
+    """
+
+    def run(self) -> None:
+        from depthtrack.evaluation.bench import ik
+
+        self._measure(ik, ik.plan(self.seconds))
+
+
+@dataclass(frozen=True)
+class Command:
+    """Measure speed on this machine."""
+
+    what: tyro.conf.OmitSubcommandPrefixes[
+        Annotated[Score, tyro.conf.subcommand("score")] | Annotated[Ik, tyro.conf.subcommand("ik")]
+    ]
+
+    def run(self) -> None:
+        self.what.run()
 
 
 def _write(path: Path, text: str) -> None:
