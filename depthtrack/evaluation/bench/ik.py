@@ -29,7 +29,8 @@ from depthtrack.synthesis.generate import Synthesis
 from depthtrack.tracking.ik.fit import FitOptions, Fitter
 from depthtrack.tracking.ik.residuals import Residual
 from depthtrack.tracking.ik.space import FULL, Space
-from depthtrack.tracking.ik.tracker import IkOptions, IkTracker, Model, make_surface
+from depthtrack.tracking.ik.surfaces import Model, make_surface
+from depthtrack.tracking.ik.tracker import IkOptions, IkTracker
 from depthtrack.tracking.tracker import Estimate
 
 Array = NDArray[np.float64]
