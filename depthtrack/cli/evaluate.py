@@ -2,46 +2,74 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.evaluate import Evaluation
-    from depthtrack.evaluation.metrics import Metric
+    from depthtrack.evaluation.metrics import Metric, SuccessCurve
+    from depthtrack.evaluation.predictions import PredictionEvaluation
 
 
 @dataclass(frozen=True)
 class Command:
     """Tell how good runs are: against the truth their recordings know (phalanx endpoints or annotated joints in mm,
     joint angles in degrees), by how they explain what the sensor saw (e3d, e2d, silhouettes), and how fast.
+
+    Or, with --predictions, how good somebody's predictions for a public benchmark are.
     """
 
-    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")]
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
     """Run folders written by `depthtrack track`."""
     sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Where the recording is, if it was moved since."""
+    """Where the recording is, if it was moved since; or the recording that --predictions are for."""
     residuals: bool = True
     """Look at every frame again, for the metrics that need no truth; without, this is quick."""
     json: bool = False
     """Print JSON instead of a table: an object for one run, a list for several."""
 
+    predictions: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
+    """A public prediction file: a line a frame, u v d of each joint, pixels and millimetres."""
+    labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
+    """The true joints of the same frames, in the same format; or give --sequence."""
+    benchmark: Annotated[Literal["nyu", "icvl", "msra"] | None, tyro.conf.arg(metavar="nyu|icvl|msra")] = None
+    """Whose joints, order and camera both files have."""
+
     def run(self) -> None:
         from json import dumps
 
-        from depthtrack.errors import InputError
+        reports, texts = self._runs() if self.predictions is None else self._predictions(self.predictions)
+        print(dumps(reports[0] if len(reports) == 1 else reports, indent=2) if self.json else "\n\n".join(texts))
+
+    def _runs(self) -> tuple[list[dict[str, Any]], list[str]]:
         from depthtrack.evaluation.evaluate import evaluate_run
 
         if not self.runs:
             raise InputError("name at least one run folder")
+        if self.labels is not None or self.benchmark is not None:
+            raise InputError("--labels and --benchmark belong to --predictions: a run is held against its recording")
         evaluations = [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
-        if self.json:
-            reports = [evaluation.to_json() for evaluation in evaluations]
-            print(dumps(reports[0] if len(reports) == 1 else reports, indent=2))
-        else:
-            print("\n\n".join(map(_text, evaluations)))
+        return [evaluation.to_json() for evaluation in evaluations], list(map(_text, evaluations))
+
+    def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:
+        from depthtrack.evaluation.predictions import evaluate_predictions
+        from depthtrack.recording import open_sequence
+        from depthtrack.recording.joints.benchmarks import find_benchmark
+
+        if self.runs:
+            raise InputError("name run folders or --predictions, not both")
+        if self.benchmark is None:
+            raise InputError("--predictions need --benchmark nyu, icvl or msra, which tells their joints and camera")
+        if (self.labels is None) == (self.sequence is None):
+            raise InputError("--predictions are held against --labels FILE.txt or a --sequence PATH: give one of them")
+        truth = self.labels if self.sequence is None else open_sequence(self.sequence)
+        assert truth is not None
+        evaluation = evaluate_predictions(path, find_benchmark(self.benchmark), truth)
+        return [evaluation.to_json()], [_prediction_text(evaluation)]
 
 
 def _text(evaluation: "Evaluation") -> str:
@@ -54,7 +82,7 @@ def _text(evaluation: "Evaluation") -> str:
         mean = losses.time_to_recovery().statistics()["mean"]
         after = "" if mean is None else f" after {mean:.2f} s on average"
         lines.append(f"  lost {len(losses.losses)} times, found again {losses.recovered} times{after}")
-    lines.append(f"  {'':28}{'mean':>9}{'median':>9}{'p95':>9}{'max':>9}")
+    lines.append(_HEAD)
     lines += [_row(metric.name, metric) for metric in evaluation.metrics]
     lines += [_row(f"  {finger} (mm)", metric) for finger, metric in evaluation.finger_errors.items()]
     lines.append(_row("ms_per_frame", evaluation.ms_per_frame))
@@ -62,9 +90,27 @@ def _text(evaluation: "Evaluation") -> str:
     if evaluation.success is None:
         lines.append("  (the recording knows neither true poses nor joints)")
     else:
-        shares = ", ".join(f"{100 * evaluation.success.within(mm):.0f} % within {mm} mm" for mm in (10, 20, 30, 40))
-        lines.append(f"  largest error of a frame: {shares}; area under the curve {evaluation.success.auc:.3f}")
+        lines.append(_shares(evaluation.success))
     return "\n".join(lines)
+
+
+def _prediction_text(evaluation: "PredictionEvaluation") -> str:
+    lines = [
+        f"{evaluation.predictions}: {evaluation.frames} frames of {evaluation.benchmark.name}, "
+        f"{evaluation.missed_frames} without a prediction",
+        _HEAD,
+        *(_row(metric.name, metric) for metric in (evaluation.points.mean(), evaluation.points.largest())),
+        *(_row(f"  {name} (mm)", metric) for name, metric in evaluation.by_joint.items()),
+    ]
+    return "\n".join(lines if evaluation.success is None else [*lines, _shares(evaluation.success)])
+
+
+_HEAD = f"  {'':28}{'mean':>9}{'median':>9}{'p95':>9}{'max':>9}"
+
+
+def _shares(success: "SuccessCurve") -> str:
+    shares = ", ".join(f"{100 * success.within(mm):.0f} % within {mm} mm" for mm in (10, 20, 30, 40))
+    return f"  largest error of a frame: {shares}; area under the curve {success.auc:.3f}"
 
 
 def _row(name: str, metric: "Metric") -> str:

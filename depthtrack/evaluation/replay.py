@@ -16,6 +16,7 @@ from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
+from depthtrack.recording.lists import MAX_FRAMES
 from depthtrack.recording.run import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.tracking.loop import hand_place
@@ -52,7 +53,7 @@ class Replay:
     @classmethod
     def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
         """The run beside the recording it tracked, or beside `sequence` where that has moved. Raises InputError."""
-        _check_rows(run)
+        check_rows(run)
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(
@@ -125,14 +126,16 @@ def _skin_model(run: Run) -> Path | None:
     return Path(path) if isinstance(path, str) else None
 
 
-def _check_rows(run: Run) -> None:
+def check_rows(run: Run) -> None:
     """Raises InputError for rows that no tracker writes: they would make no sense of anything they are held against."""
     known = {status.value for status in Status}
-    posed = np.isfinite(run.poses).all(axis=1)
-    lengths = np.linalg.norm(run.poses[:, ORIENTATION], axis=1)
-    far = np.abs(run.poses[:, POSITION]).max(axis=1, initial=0) > _FARTHEST
+    posed = np.asarray(np.isfinite(run.poses).all(axis=1), dtype=np.bool_)
+    lengths = np.asarray(np.linalg.norm(run.poses[:, ORIENTATION], axis=1))
+    far = np.asarray(np.abs(run.poses[:, POSITION]).max(axis=1, initial=0)) > _FARTHEST
     for row, status in enumerate(run.status):
-        if status not in known:
+        if not 0 <= run.index[row] < MAX_FRAMES:
+            reason = f"frames are numbered from 0 to {MAX_FRAMES - 1}"
+        elif status not in known:
             reason = f"the status must be one of {', '.join(known)}, found '{status[:40]}'"
         elif posed[row] and abs(lengths[row] - 1) > _UNIT_TOLERANCE:
             reason = f"the quaternion must have length 1, found {lengths[row]:.4g}"

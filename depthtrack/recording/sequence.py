@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.camera import Camera
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 
 
@@ -46,6 +47,17 @@ class GroundTruth:
         rows = [row for row in (after - 1, after) if 0 <= row < len(self.timestamps)]
         nearest = min(rows, key=lambda row: abs(self.timestamps[row] - timestamp), default=None)
         return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
+
+    def keypoints_at(self, timestamp: float) -> NDArray[np.float64] | None:
+        """The 21 keypoints (21, 3) at `timestamp`, metres: the joints as annotated, else those of the pose."""
+        row = self.at(timestamp)
+        if row is None:
+            return None
+        if self.joints is not None:
+            return self.joints[row]
+        if self.poses is not None and self.hand is not None:
+            return HandModel(self.hand).keypoints(self.poses[row])
+        return None
 
 
 OnDamage = Literal["refuse", "skip"]

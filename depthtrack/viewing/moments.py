@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.camera import Camera
-from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
 from depthtrack.viewing.depth_colours import depth_range
 
@@ -89,15 +88,8 @@ def moments(
 
 
 def true_keypoints(truth: GroundTruth | None, timestamp: float) -> NDArray[np.float64] | None:
-    """The 21 keypoints (21, 3) annotated at `timestamp`, metres: the joints as given, else those of the pose."""
-    row = None if truth is None else truth.at(timestamp)
-    if truth is None or row is None:
-        return None
-    if truth.joints is not None:
-        return truth.joints[row]
-    if truth.poses is not None and truth.hand is not None:
-        return HandModel(truth.hand).keypoints(truth.poses[row])
-    return None
+    """The 21 keypoints (21, 3) known at `timestamp`, metres."""
+    return None if truth is None else truth.keypoints_at(timestamp)
 
 
 def evenly_chosen(length: int, count: int) -> list[int]:
