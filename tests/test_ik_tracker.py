@@ -7,8 +7,8 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.tracking.ik.tracker import IkOptions, IkTracker
 from depthtrack.tracking.ik.surfaces import Model
+from depthtrack.tracking.ik.tracker import IkOptions, IkTracker
 from depthtrack.tracking.tracker import Estimate, Status
 from depthtrack.tracking.trackers import create_tracker
 from tests.synthetic_observations import observe
