@@ -2,13 +2,13 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from depthtrack.errors import InputError
-from depthtrack.evaluation.experiments import bases, schroeder, schroeder_7
+from depthtrack.evaluation.experiments import bases, schroeder, schroeder_7, schroeder_11
 from depthtrack.evaluation.experiments.bases import basis
 from depthtrack.evaluation.experiments.experiment import ExperimentOptions
 from depthtrack.evaluation.experiments.registry import EXPERIMENTS, load_experiment
@@ -69,14 +69,29 @@ def test_the_cells_are_the_papers() -> None:
     assert {cell["subsampling"] for cell in cells_of("schroeder-8")} == {3}
     assert [cell["subsampling"] for cell in cells_of("schroeder-9")] == list(range(1, 11))
     assert {cell["icp_iterations"] for cell in cells_of("schroeder-9")} == {5}
-    full, reduced = cells_of("schroeder-10")
+    full, *reduced = cells_of("schroeder-10")
     assert (full["motion"], full["synergies"], full["components"]) == ("grasp", None, None)
-    covered = basis(reduced["synergies"]).synergies.variance_share(reduced["components"])
-    assert 0.99 <= covered < 0.995
+    assert [(cell["synergies"], cell["soft"]) for cell in reduced] == [
+        (name, soft) for name in ("other-grasps", "grasp") for soft in (False, True)
+    ]
+    for cell in reduced:
+        synergies, count = basis(cell["synergies"]).synergies, cell["components"]
+        assert synergies.variance_share(count - 1) < 0.99 <= synergies.variance_share(count)
     spaces = {(cell["model"], cell["synergies"], cell["components"]) for cell in cells_of("schroeder-sec6c")}
     assert {(model, None, None) for model in ("skin", "cylinders")} < spaces
     assert {(model, name, 6) for model in ("skin", "cylinders") for name in ("everyday", "leap")} < spaces
     assert {cell["components"] for cell in cells_of("schroeder-7")} == set(range(1, 21))
+    signs = cells_of("schroeder-11")
+    assert {cell["sign"] for cell in signs} == set(range(30))
+    for way, name, times in (
+        ("hierarchical", "signs", 5),
+        ("hierarchical", schroeder_11.OTHERS, 5),
+        ("all angles at once", "signs", 1),
+    ):
+        mine = [cell for cell in signs if (cell["way"], cell["synergies"], cell["sign"]) == (way, name, 3)]
+        assert [cell["repetition"] for cell in mine] == list(range(times))
+    with pytest.raises(InputError, match="hold no sign"):
+        cells_of("schroeder-11", frames=3)
 
 
 @pytest.mark.parametrize("name", FITTING)
@@ -86,11 +101,12 @@ def test_quick_is_coarser_and_options_reach_the_cells(name: str, tmp_path: Path)
     assert {tuple(cell) for cell in [*full, *quick]} == {tuple(full[0])}
     assert len({json.dumps(cell) for cell in full}) == len(full)
     assert all(json.loads(json.dumps(cell)) == cell for cell in full)
-    chosen = cells_of(name, variant="paper", frames=7)
-    assert {(cell.get("variant", "paper"), cell.get("frames", 7)) for cell in chosen} == {("paper", 7)}
+    chosen = cells_of(name, variant="paper", frames=30)
+    assert {(cell.get("variant", "paper"), cell.get("frames", 30)) for cell in chosen} == {("paper", 30)}
     if any(cell["synergies"] for cell in full):
         own = write_postures(tmp_path / "own.csv", bases.motion_postures("everyday")[::20])
-        assert {cell["synergies"] for cell in cells_of(name, synergies=str(own))} <= {None, str(own)}
+        used = {cell["synergies"] for cell in cells_of(name, synergies=str(own))}
+        assert str(own) in used <= {None, str(own), "grasp"}
 
 
 # What is measured
@@ -118,6 +134,26 @@ def test_following_takes_model_and_space_from_the_cell() -> None:
     # One synergy cannot tell the postures of a moving hand apart.
     assert follow(synergies="leap", components=1)["error_deg"] > 3 * follow()["error_deg"]
     assert follow(synergies="everyday", components=12)["error_deg"] < 1.5
+
+
+@pytest.mark.parametrize(("variant", "highest_deg"), [("default", 0.5), ("paper", 4)])
+def test_a_sign_is_found_from_its_frame_alone(variant: Literal["default", "paper"], highest_deg: float) -> None:
+    """One of the signs that need the hierarchy."""
+
+    def row(way: schroeder_11.Way, synergies: str = "signs") -> Row:
+        return schroeder_11.measure(sign=19, way=way, synergies=synergies, variant=variant, repetition=0)
+
+    found, again, flat = row("hierarchical"), row("hierarchical"), row("all angles at once")
+    assert 0 < found["error_deg"] < highest_deg < flat["error_deg"]
+    assert 0 < found["error_mm"] < flat["error_mm"]
+    assert {**found, "s_per_frame": 0} == {**again, "s_per_frame": 0}
+    assert row("hierarchical", schroeder_11.OTHERS)["error_deg"] not in (found["error_deg"], flat["error_deg"])
+
+
+def test_signs_are_where_nothing_moves() -> None:
+    poses = np.zeros((30, 27))
+    poses[:, 9] = np.concatenate([np.zeros(6), np.linspace(0.1, 1, 10), np.ones(9), [2, 3, 3, 3, 4]])
+    assert schroeder_11.held(poses) == [(0, 5), (15, 24)]
 
 
 def test_postures_are_approximated_the_better_the_more_components() -> None:
@@ -158,9 +194,32 @@ def test_iterations_and_subsampling() -> None:
 
 
 def test_grasps_with_all_angles_and_with_synergies() -> None:
-    rows = [row(12.0), row(4.0, synergies="leap-grasps", components=6, ms_per_frame=4.0)]
-    assert list(said("schroeder-10", rows).values()) == [12.0, 4.0, 6.0, 24.0, 8.0, 200.0, 250.0]
-    assert said("schroeder-10", rows[:1])["joint angle error, synergies of grasps"] is None
+    rows = [
+        row(12.0),
+        row(4.0, synergies="other-grasps", components=5, ms_per_frame=4.0),
+        row(3.0, synergies="other-grasps", components=5, soft=True),
+        row(2.0, synergies="grasp", components=3),
+    ]
+    assert list(said("schroeder-10", rows).values()) == [12.0, 4.0, 2.0, 3.0, 5.0, 24.0, 8.0, 200.0, 250.0]
+    assert said("schroeder-10", rows[:1])["synergies of other grasps alone"] is None
+
+
+def test_signs_by_way_and_synergies() -> None:
+    def row(way: str, synergies: str, error: float) -> Row:
+        return {
+            "way": way,
+            "synergies": synergies,
+            "sign": 0,
+            "error_deg": error,
+            "error_mm": 2 * error,
+            "s_per_frame": 0.1,
+        }
+
+    rows = [row("hierarchical", "signs", error) for error in (0.2, 0.3, 1.6)]
+    rows += [row("hierarchical", schroeder_11.OTHERS, 2.0), row("all angles at once", "signs", 9.0)]
+    assert list(said("schroeder-11", rows).values()) == [pytest.approx(0.7), 9, 0.1, pytest.approx(1.4), 2, 0.3, 1.6]
+    first = load_experiment("schroeder-11").tabulate(rows)[0]
+    assert (first["estimates"], first["within_1_deg_percent"]) == (3, pytest.approx(200 / 3))
 
 
 def test_cylinders_beside_the_mesh() -> None:

@@ -170,8 +170,7 @@ def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> t
 
     def track() -> Estimate:
         tracker.recall(before)
-        # A copy, whose point cloud is yet to be made.
-        return tracker.track(replace(film[index]))
+        return tracker.track(film.again(index))
 
     pose, last = track().pose, before[-1].pose
     assert pose is not None

@@ -4,6 +4,7 @@ No colour is segmented: the maps are the renderer's, with whatever noise the exp
 lies around the true hand, with the room that a segmentation would leave.
 """
 
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from threading import Lock
 
@@ -47,6 +48,10 @@ class Film:
             if index not in self._observations:
                 self._observations[index] = observe(self._made[index], self._made, index)
             return self._observations[index]
+
+    def again(self, index: int) -> Observation:
+        """As if observed anew: its point cloud is yet to be made, and does not stay in memory."""
+        return replace(self[index])
 
     @cached_property
     def _made(self) -> Synthesiser:

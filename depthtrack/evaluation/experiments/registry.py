@@ -19,6 +19,7 @@ EXPERIMENTS = {
     "schroeder-8": f"{_HERE}.schroeder_8",
     "schroeder-9": f"{_HERE}.schroeder_9",
     "schroeder-10": f"{_HERE}.schroeder_10",
+    "schroeder-11": f"{_HERE}.schroeder_11",
     "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
 }
 """Modules that hold an `EXPERIMENT`; a name is the paper's first author, and the figure or section."""

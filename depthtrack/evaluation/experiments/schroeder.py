@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
 from time import process_time
 from typing import Any, Literal
 
@@ -27,6 +26,7 @@ USUAL: Cell = {
     "subsampling": 3,
     "synergies": None,
     "components": None,
+    "soft": False,
 }
 """What an experiment leaves as it is: five ICP iterations on a third of the points, all degrees of freedom."""
 
@@ -44,13 +44,15 @@ def follow(
     subsampling: int,
     synergies: str | None,
     components: int | None,
+    soft: bool,
     variant: Literal["default", "paper"],
     frames: int | None,
 ) -> Row:
     """Track from the true first pose on, by fitting alone.
 
     The hand is rendered from the skin, as the paper's is, by a perfect sensor half a metre away. Of `synergies`, a
-    name that `bases.basis` knows, the first `components` are solved for; None solves for all angles.
+    name that `bases.basis` knows, the first `components` are solved for; None solves for all angles, and so does
+    `soft`, drawn to what those synergies hold likely.
 
     `error_deg` is the paper's posture error, the mean difference of the joint angles; `error_mm` the phalanx
     endpoints' distance from the truth; both over all frames, and `frame_errors_deg` of each. `ms_per_frame` is the
@@ -64,14 +66,14 @@ def follow(
         rounds=icp_iterations,
         subsample=subsampling,
         synergies=None if synergies is None else basis(synergies).synergies.truncated(components or 20),
+        soft=soft,
         # Never lost: what is measured is following, and a search would put right what an experiment is about.
         lost=LostBelow(confidence=0.0, energy=np.inf),
     )
     points, seconds, estimates = [], [], list[Estimate]()
     with closing(IkTracker(seen.hand, options)) as tracker:
         for index in range(len(seen)):
-            # A copy whose point cloud is yet to be made, and does not stay in memory.
-            observation, begun = replace(seen[index]), process_time()
+            observation, begun = seen.again(index), process_time()
             if index == 0:
                 estimates.append(tracker.start(observation, seen.poses[0]))
             else:
