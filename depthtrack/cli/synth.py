@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 class Command:
     """Synthesise a recording of a moving hand, with exact ground truth: poses, joints, hand mask and depth.
 
-    Motions: everyday, grasp, signs, fast, random (any length), or a motion file of your own. The same options give
-    the same bytes.
+    Motions: everyday, grasp, other-grasps, signs, fast, random (any length), or a motion file of your own. The same
+    options give the same bytes.
     """
 
     motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")]

@@ -1,12 +1,13 @@
 """`depthtrack track`: a recording's hand, frame by frame, into a run folder."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.tracker_options import IkChoice, PsoChoice, chosen_options
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,26 +39,14 @@ class Command:
     """Go on with the run that the folder holds."""
     seed: int = 0
     """Chooses the random numbers: the same seed gives the same poses."""
-    threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Threads of pso; as many as there are cores unless given. Poses do not depend on it."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
 
     variant: Literal["default", "paper"] = "default"
     """The tracker as we measured it best, or as its paper has it."""
-    particles: int = 64
-    """Particles of the swarm."""
-    generations: int = 25
-    """Generations of the swarm, every frame."""
-    resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
-    """Longest side of the region that hypotheses are rendered at; the sensor's own unless given."""
-    renderer: Literal["raster", "egl", "osmesa", "oracle"] = "raster"
-    """What renders and scores the hypotheses."""
 
-    model: Literal["skin", "cylinders"] = "skin"
-    """What ik fits: the skin mesh, or the model of cylinders and spheres."""
-    subsample: int = 3
-    """Every so many-th point is used by ik."""
+    pso: tyro.conf.OmitArgPrefixes[PsoChoice] = field(default_factory=PsoChoice)
+    ik: tyro.conf.OmitArgPrefixes[IkChoice] = field(default_factory=IkChoice)
 
     def run(self) -> None:
         from contextlib import closing
@@ -84,7 +73,7 @@ class Command:
             frames=self.frames,
             skin_model=self.skin_model,
             on_damage=self.recording.on_damage,
-            threads=self.threads,
+            threads=options.get("threads"),
         )
         start_pose = self._start_pose(sequence)
         observer = Observer.for_sequence(sequence, self.skin_model)
@@ -102,20 +91,15 @@ class Command:
         print(f"see how good they are:  depthtrack evaluate {self.out}")
 
     def _options(self) -> dict[str, Any]:
-        """What the chosen tracker is made with."""
+        """What the chosen tracker is made with: what was given, and what it would do anyway."""
         import os
 
-        if self.tracker == "ik":
-            return {"variant": self.variant, "model": self.model, "subsample": self.subsample, "seed": self.seed}
-        return {
-            "variant": self.variant,
-            "particles": self.particles,
-            "generations": self.generations,
-            "seed": self.seed,
-            "renderer": self.renderer,
-            "threads": self.threads or len(os.sched_getaffinity(0)),
-            "resolution": self.resolution,
-        }
+        from depthtrack.tracking.trackers import complete_options
+
+        given = {"variant": self.variant, "seed": self.seed} | chosen_options(self.tracker, self.pso, self.ik)
+        if self.tracker == "pso":
+            given.setdefault("threads", len(os.sched_getaffinity(0)))
+        return complete_options(self.tracker, given)
 
     def _start_pose(self, sequence: "Sequence") -> "np.ndarray | None":
         if self.start == "auto":

@@ -3,11 +3,13 @@
 import json
 import platform
 from dataclasses import asdict
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.synergies import load_synergies
 from depthtrack.recording.sequence import Sequence
 
 
@@ -27,8 +29,12 @@ def run_configuration(
 ) -> dict[str, Any]:
     """The contents of run.json: recording at `path`, tracker and options, camera, hand, versions; and `more`.
 
-    Threads change no pose, so they are told apart from the options.
+    Threads change no pose, so they are told apart from the options; a file of synergies may change, so its contents
+    are told by their digest.
     """
+    synergies = options.get("synergies")
+    if synergies is not None:
+        more["synergies_sha256"] = sha256(load_synergies(synergies).to_json().encode()).hexdigest()
     return {
         "sequence": str(path.resolve()),
         "tracker": tracker,

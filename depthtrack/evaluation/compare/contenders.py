@@ -33,7 +33,7 @@ class Contender:
     @property
     def slug(self) -> str:
         """The label as a part of file names."""
-        return re.sub(r"[^A-Za-z0-9.=]+", "-", self.label).strip("-") or "tracker"
+        return re.sub(r"[^a-z0-9.=]+", "-", self.label.lower()).strip("-") or "tracker"
 
 
 def read_contenders(texts: Sequence[str]) -> list[Contender]:
@@ -65,7 +65,7 @@ def _from_text(text: str) -> list[Contender]:
             if not equals or not parts:
                 raise InputError(f"write a tracker's options as in ik:variant=paper,rounds=3; found '{piece}'")
             parts[-1][1][key.strip()] = _value(value.strip())
-    return [_checked(" ".join([name, *(f"{k}={v}" for k, v in o.items())]), name, o) for name, o in parts]
+    return [_checked(" ".join([name.upper(), *(f"{k}={v}" for k, v in o.items())]), name, o) for name, o in parts]
 
 
 def _from_file(path: Path) -> list[Contender]:
@@ -108,7 +108,7 @@ def _settable(tracker: str) -> dict[str, Any]:
     module, _, name = TRACKERS[tracker]
     options = getattr(import_module(module), name)
     hints = {name: kind for name, kind in get_type_hints(options).items() if name not in ("seed", "threads")}
-    return {name: kind for name, kind in hints.items() if all(map(_is_plain, _alternatives(kind)))}
+    return {name: kind for name, kind in hints.items() if any(_is_plain(each) for each in _alternatives(kind))}
 
 
 def _alternatives(kind: Any) -> tuple[Any, ...]:
@@ -119,7 +119,8 @@ def _alternatives(kind: Any) -> tuple[Any, ...]:
 
 
 def _is_plain(kind: Any) -> bool:
-    return kind in _PLAIN or isinstance(kind, str)
+    """Whether such values can be written; None alone says nothing."""
+    return (kind in _PLAIN and kind is not NoneType) or isinstance(kind, str)
 
 
 def _fits(value: Any, kind: Any) -> bool:

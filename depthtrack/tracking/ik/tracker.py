@@ -20,6 +20,7 @@ from depthtrack.rendering.target import Target
 from depthtrack.tracking.ik.fit import PAPER_FIT, FitOptions, Fitter
 from depthtrack.tracking.ik.hierarchy import by_energy
 from depthtrack.tracking.ik.prior import Prior
+from depthtrack.tracking.ik.residuals import Residual
 from depthtrack.tracking.ik.search import SearchOptions, find_pose
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
@@ -36,11 +37,14 @@ class IkOptions:
 
     `variant` "paper" is Schroeder et al. 2014: point to point, linear prediction, joint limit avoidance. "default" fits
     along normals with graduated robust weights, chooses among predictions by rendering them, and tries again where the
-    result does not look like the observation: each measured to help. `fit` overrides either's way of fitting.
-    `model` is what the observation is matched to: the skin mesh, or tapered capsules. Every `subsample`-th point is
-    used. With `synergies`, only they and the global pose are solved for (the paper's reduced degrees of freedom), or,
-    if `soft`, all angles, drawn to postures that are likely by the synergies: see `prior.Prior.likely`. The search for
-    a start, which needs some in any case, then uses them too.
+    result does not look like the observation: each measured to help. `fit` overrides either's way of fitting, and
+    `residual` its residual. `model` is what the observation is matched to: the skin mesh, or tapered capsules. Every
+    `subsample`-th point is used.
+
+    With `synergies` (as such, or the name of a set or a file), of which the first `components` count, only they and the
+    global pose are solved for: the paper's reduced degrees of freedom. If `soft`, all angles are, drawn to postures
+    that are likely by the synergies: see `prior.Prior.likely`. The search for a start, which needs synergies in any
+    case, then uses them too.
     """
 
     variant: Variant = "default"
@@ -48,7 +52,9 @@ class IkOptions:
     rounds: int = 5
     inner: int = 5
     subsample: int = 3
-    synergies: Synergies | None = None
+    residual: Residual | None = None
+    synergies: Synergies | str | None = None
+    components: int | None = None
     soft: bool = False
     seed: int = 0
     lost: LostBelow = field(default_factory=LostBelow)
@@ -60,7 +66,15 @@ class IkOptions:
     def fitting(self) -> FitOptions:
         """How each observation is fitted."""
         base = self.fit or (PAPER_FIT if self.variant == "paper" else FitOptions())
-        return replace(base, rounds=self.rounds, inner=self.inner)
+        return replace(base, rounds=self.rounds, inner=self.inner, residual=self.residual or base.residual)
+
+    @property
+    def chosen_synergies(self) -> Synergies | None:
+        """Those to solve for, or to be drawn to. Raises InputError for a file that is none."""
+        if self.synergies is None:
+            return None
+        found = load_synergies(self.synergies) if isinstance(self.synergies, str) else self.synergies
+        return found if self.components is None else found.truncated(self.components)
 
     @property
     def predictions(self) -> tuple[float, ...]:
@@ -84,9 +98,10 @@ class IkTracker:
         fitting = options.fitting
         self._fitter = Fitter(shape, make_surface(options.model, shape, fitting.agreement), fitting)
         self._scorer = RasterScorer(shape, options.objective)
-        if options.soft and options.synergies is None:
-            raise InputError("soft synergies need synergies: say which")
-        given = options.synergies
+        given = options.chosen_synergies
+        for name in ("components", "soft"):
+            if getattr(options, name) and given is None:
+                raise InputError(f"{name} tells how to use synergies: say which synergies")
         self._space: Space = FULL if given is None or options.soft else Space.of(given)
         self._likely = None if given is None else Prior.likely(given, fitting.likely)
         self._synergies = given or load_synergies()
