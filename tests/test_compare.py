@@ -48,9 +48,9 @@ def compared(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_contenders_are_read_as_people_write_them() -> None:
     assert read_contenders(["pso,ik:variant=paper,rounds=3", "pso:particles=16,resolution=64"]) == [
-        Contender("pso", "pso"),
-        Contender("ik variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
-        Contender("pso particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
+        Contender("PSO", "pso"),
+        Contender("IK variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
+        Contender("PSO particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
     ]
 
 
@@ -162,8 +162,8 @@ def test_a_table_has_a_line_for_each_tracker(
     assert main(arguments) == 0
     head, pso, ik = capsys.readouterr().out.splitlines()[:3]
     assert "error mean mm" in head
-    assert "pso particles=12" in pso
-    assert "ik rounds=1" in ik
+    assert "PSO particles=12" in pso
+    assert "IK rounds=1" in ik
     # Nothing was tracked again.
     assert before == {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
 

@@ -1,7 +1,7 @@
 """What `compare` and `demo` share: a comparison shown as it goes on, then its table, files and report."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,9 +11,12 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.bench.machine import usable_cores
 from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
+from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.cluster import DaskWorkers
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.evaluation.sweep.run import Workers
+from depthtrack.recording.sequence import Frame
+from depthtrack.report.build import write_report
 
 
 def chosen_workers(jobs: int | None, scheduler: str | None) -> Workers:
@@ -26,19 +29,33 @@ def chosen_workers(jobs: int | None, scheduler: str | None) -> Workers:
     return LocalWorkers(jobs)
 
 
-def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> Path:
-    """Make the runs, print the table (or JSON), and write results and report to `folder`; gives the report's path."""
+def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> None:
+    """Make the runs, print the table (or JSON), and write results and report to `folder`."""
     with _bar() as listener:
         plans = compare(comparison, folder, workers, listener)
     folders = [Path(plan.folder) for plan in plans]
     looked_at = evaluate_runs(folders, workers)
     evaluations = list(tqdm(looked_at, "measuring", len(folders), unit="run", leave=False, disable=None))
-    write_results(evaluations, folder)
     if as_json:
         print(json.dumps([result(evaluation) for evaluation in evaluations], indent=2))
     else:
         print(as_table(lines_of(evaluations)))
-    return folder
+    write_everything(evaluations, folder, quiet=as_json)
+
+
+def write_everything(
+    evaluations: Sequence[Evaluation], folder: Path, sequence: Path | None = None, quiet: bool = False
+) -> None:
+    """Write results.csv, results.json and report.html, and say where the report is."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_results(evaluations, folder)
+    write_report(evaluations, folder / "report.html", sequence, _frames)
+    if not quiet:
+        print(f"\nthe report: {(folder / 'report.html').resolve()}")
+
+
+def _frames(frames: Iterable[Frame], heading: str, total: int) -> Iterable[Frame]:
+    return tqdm(frames, heading, total, unit="frame", leave=False, disable=None)
 
 
 @contextmanager

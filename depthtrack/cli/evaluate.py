@@ -31,6 +31,8 @@ class Command:
     """Look at every frame again, for the metrics that need no truth; without, this is quick."""
     json: bool = False
     """Print JSON instead of a table: an object for one run, a list for several."""
+    report: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Also write report.html, results.csv and results.json to this folder."""
 
     predictions: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
     """A public prediction file: a line a frame, u v d of each joint, pixels and millimetres."""
@@ -42,26 +44,32 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
-        reports, texts = self._runs() if self.predictions is None else self._predictions(self.predictions)
+        evaluations = self._evaluations() if self.predictions is None else []
+        reports, texts = [each.to_json() for each in evaluations], list(map(_text, evaluations))
+        if self.predictions is not None:
+            reports, texts = self._predictions(self.predictions)
         print(dumps(reports[0] if len(reports) == 1 else reports, indent=2) if self.json else "\n\n".join(texts))
+        if self.report is not None:
+            from depthtrack.cli.comparing import write_everything
 
-    def _runs(self) -> tuple[list[dict[str, Any]], list[str]]:
+            write_everything(evaluations, self.report, self.sequence, quiet=self.json)
+
+    def _evaluations(self) -> "list[Evaluation]":
         from depthtrack.evaluation.evaluate import evaluate_run
 
         if not self.runs:
             raise InputError("name at least one run folder")
         if self.labels is not None or self.benchmark is not None:
             raise InputError("--labels and --benchmark belong to --predictions: a run is held against its recording")
-        evaluations = [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
-        return [evaluation.to_json() for evaluation in evaluations], list(map(_text, evaluations))
+        return [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
 
     def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:
         from depthtrack.evaluation.predictions import evaluate_predictions
         from depthtrack.recording import open_sequence
         from depthtrack.recording.joints.benchmarks import find_benchmark
 
-        if self.runs:
-            raise InputError("name run folders or --predictions, not both")
+        if self.runs or self.report is not None:
+            raise InputError("--report and run folders are about tracking: --predictions go without them")
         if self.benchmark is None:
             raise InputError("--predictions need --benchmark nyu, icvl or msra, which tells their joints and camera")
         if (self.labels is None) == (self.sequence is None):

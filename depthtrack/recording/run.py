@@ -191,9 +191,9 @@ def _replace(path: Path, text: str) -> None:
 
 
 def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
-    """A run goes on only with the configuration it began with; threads and versions may differ. Raises InputError."""
+    """A run goes on only with the configuration it began with; threads, versions and machine may differ. Raises InputError."""
     for key in sorted(set(found) | set(wanted)):
-        if key not in ("versions", "threads") and found.get(key) != wanted.get(key):
+        if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             raise InputError(
                 f"{folder} was begun with {key} = {found.get(key)!r}, not {wanted.get(key)!r}: "
                 "go on with the same options, or choose another folder"

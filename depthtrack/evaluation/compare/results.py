@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -20,7 +20,6 @@ TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
 """Errors against a truth: of the phalanx endpoints of true poses, or of annotated joints."""
 
 TRACKER_MS = "tracker_ms"
-_SHOWN = ("mean", "median", "p95")
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,11 @@ class Line:
         """The median over the runs of the area under the curve of those shares."""
         areas = [e.success.auc for e in self.evaluations if e.success is not None]
         return float(np.median(areas)) if areas else None
+
+    @property
+    def source(self) -> str:
+        """Where the recording was, which tells recordings of one name apart."""
+        return str(self.evaluations[0].run.configuration.get("sequence"))
 
     @property
     def frames(self) -> int:
@@ -102,7 +106,8 @@ def _tracker_time(evaluation: Evaluation) -> Metric:
 def label_of(evaluation: Evaluation) -> str:
     """What a run's tracker is called: as its comparison labelled it, or by its own name."""
     configuration = evaluation.run.configuration
-    return str(configuration.get("label") or configuration.get("tracker") or evaluation.run.folder.name)
+    tracker = str(configuration.get("tracker") or "").upper()
+    return str(configuration.get("label") or tracker or evaluation.run.folder.name)
 
 
 def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
@@ -142,23 +147,46 @@ def result(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
+@dataclass(frozen=True)
+class Column:
+    """A column of the comparison's table: its heading, unit, format, and the figure of a line (None: not known)."""
+
+    heading: str
+    unit: str
+    form: str
+    value: Callable[[Line], float | None]
+    higher_is_better: bool = False
+
+
+COLUMNS = (
+    Column("error mean", "mm", ".2f", lambda line: line.error("mean")),
+    Column("median", "mm", ".2f", lambda line: line.error("median")),
+    Column("p95", "mm", ".2f", lambda line: line.error("p95")),
+    Column("angles", "deg", ".2f", lambda line: line.figure("angle_error_deg", "mean")),
+    Column("< 20 mm", "frames", ".1%", lambda line: line.within(20), higher_is_better=True),
+    Column("E3D", "mm", ".2f", lambda line: line.figure("e3d_mm", "median")),
+    Column("IoU", "", ".3f", lambda line: line.figure("silhouette_iou", "median"), higher_is_better=True),
+    Column("jitter", "mm", ".2f", lambda line: line.figure("jitter_mm", "median")),
+    Column("lost", "frames", ".0f", lambda line: float(line.lost)),
+    Column("time", "ms", ".1f", lambda line: line.figure("ms_per_frame", "median")),
+    Column("tracker alone", "ms", ".1f", lambda line: line.figure(TRACKER_MS, "median")),
+)
+
+
+def shown_columns(lines: Sequence[Line]) -> list[Column]:
+    """The columns that any of the lines has a figure for."""
+    return [column for column in COLUMNS if any(column.value(line) is not None for line in lines)]
+
+
 def as_table(lines: Sequence[Line]) -> str:
     """The comparison for a terminal; columns that no recording allows are left out."""
-    columns: list[tuple[str, list[str]]] = [
-        ("recording", [line.recording for line in lines]),
-        ("tracker", [line.label for line in lines]),
-        ("runs", [str(len(line.evaluations)) for line in lines]),
-        *((f"error {name} mm", [_cell(line.error(name), ".2f") for line in lines]) for name in _SHOWN),
-        ("angles deg", [_cell(line.figure("angle_error_deg", "mean"), ".2f") for line in lines]),
-        ("< 20 mm", [_cell(line.within(20), ".1%") for line in lines]),
-        ("E3D mm", [_cell(line.figure("e3d_mm", "median"), ".2f") for line in lines]),
-        ("IoU", [_cell(line.figure("silhouette_iou", "median"), ".3f") for line in lines]),
-        ("lost", [f"{line.lost}/{line.frames}" for line in lines]),
-        ("ms a frame", [_cell(line.figure("ms_per_frame", "median"), ".1f") for line in lines]),
-        ("tracker's ms", [_cell(line.figure(TRACKER_MS, "mean"), ".1f") for line in lines]),
+    columns = shown_columns(lines)
+    head = ["recording", "tracker", "frames", *(f"{c.heading} {c.unit}".strip() for c in columns)]
+    rows = [
+        [line.recording, line.label, str(line.frames), *(_cell(c.value(line), c.form) for c in columns)]
+        for line in lines
     ]
-    kept = [[head, *cells] for head, cells in columns if any(cell != "-" for cell in cells)]
-    return "\n".join(aligned(list(zip(*kept, strict=True)), left=2))
+    return "\n".join(aligned([head, *rows], left=2))
 
 
 def _cell(value: float | None, form: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 
 from depthtrack.camera import Camera
+from depthtrack.evaluation.bench.machine import describe_machine
 from depthtrack.evaluation.compare.budget import calibrate
 from depthtrack.evaluation.compare.clock import TimedByProcessor
 from depthtrack.evaluation.sweep.rows import Cell, Row
@@ -75,7 +76,7 @@ class PlannedRun:
 
     def configuration(self, sequence: Sequence) -> dict[str, Any]:
         """What its run.json tells."""
-        source = self.source
+        source, machine = self.source, describe_machine()
         return run_configuration(
             Path(source.path),
             sequence,
@@ -90,6 +91,7 @@ class PlannedRun:
             label=self.label,
             clock="cpu",
             budget=self.budget,
+            machine={"cpu": machine.cpu, "cores": machine.cores, "system": machine.system},
         )
 
     def state(self) -> str:

@@ -1,0 +1,191 @@
+"""The page from evaluated runs: what it says and shows, recording by recording, within bounded size."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+
+from depthtrack import __version__
+from depthtrack.errors import InputError
+from depthtrack.evaluation.compare.results import Line, figures_of, lines_of
+from depthtrack.evaluation.evaluate import Evaluation
+from depthtrack.recording.sequence import Frame
+from depthtrack.report.colours import css_variables
+from depthtrack.report.facts import Fact, facts_of_recording, facts_of_tracker, fairness
+from depthtrack.report.film import Film, as_webp, film_of
+from depthtrack.report.pictures import SideBySide
+from depthtrack.report.plots import TIMELINE_FROM, TIMELINE_TO, finger_bars, share_curves, stage_bars, timeline
+from depthtrack.report.series import Shown, worst_frames
+from depthtrack.report.table import table_head, table_rows
+from depthtrack.report.words import ERRORS, Verdict, error_name, judged_by, standings, verdict, where
+
+FILM_BYTES, ALL_FILMS_BYTES = 5_000_000, 30_000_000
+"""A film, and all films of a page, take about so much at most."""
+MOST_DETAILED = 12
+"""Recordings with plots and pictures; further ones are in the table."""
+WORST = 2
+
+Progress = Callable[[Iterable[Frame], str, int], Iterable[Frame]]
+"""Watches frames go by, under a heading; told about how many there are."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A drawing with its title, what it shows, and a remark on how."""
+
+    title: str
+    about: str
+    svg: Markup
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A frame in which a tracker was at its worst: a picture of all trackers there."""
+
+    label: str
+    number: int
+    told: str
+    seconds: float
+    picture: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page shows of one recording."""
+
+    name: str
+    shown: list[Shown]
+    facts: list[Fact]
+    fairness: str
+    timeline: Plot
+    plots: list[Plot]
+    film: Film
+    end: float
+    worst: list[Worst]
+
+
+def write_report(
+    evaluations: Sequence[Evaluation],
+    path: Path,
+    sequence: Path | None = None,
+    progress: Progress = lambda frames, heading, total: frames,
+) -> None:
+    """Write the page; `sequence` is where the recording lies now, if it was moved. Raises InputError."""
+    if not evaluations:
+        raise InputError("a report needs at least one run")
+    for evaluation in evaluations:
+        if evaluation.frames == 0:
+            raise InputError(f"{evaluation.run.folder} holds no frame yet: track it first, or leave it out")
+    # In the order of their folders' names, so that the page is the same whoever asks for it.
+    lines = lines_of(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
+    numbers = {label: number for number, label in enumerate(dict.fromkeys(line.label for line in lines))}
+    shown = [Shown(line, numbers[line.label]) for line in lines]
+    recordings: dict[str, list[Shown]] = {}
+    for each in shown:
+        recordings.setdefault(each.line.source, []).append(each)
+    detailed = list(recordings.values())[:MOST_DETAILED]
+    most_bytes = min(FILM_BYTES, ALL_FILMS_BYTES // len(detailed))
+    page = {
+        "version": __version__,
+        "verdict": _verdict(lines),
+        "standings": [(standing, numbers[standing.label]) for standing in standings(lines)],
+        "judged_by": error_name(lines) + where(lines),
+        "head": table_head(lines),
+        "rows": table_rows(shown),
+        "sections": [_section(each, most_bytes, sequence, progress) for each in detailed],
+        "left_out": [each[0].line.recording for each in list(recordings.values())[MOST_DETAILED:]],
+        "trackers": [(label, number, facts_of_tracker(label, lines)) for label, number in numbers.items()],
+        "runs": len(evaluations),
+        "from_percent": 100 * TIMELINE_FROM,
+        "to_percent": 100 * TIMELINE_TO,
+        "light": Markup(css_variables(dark=False)),
+        "dark": Markup(css_variables(dark=True)),
+    }
+    _write(path, _template().render(page))
+
+
+def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
+    lines = [each.line for each in shown]
+    metric = judged_by(lines)
+    painter = SideBySide(shown, metric, sequence=sequence)
+    heading = f"film of {lines[0].recording}"
+    film = film_of(painter, most_bytes, lambda frames: progress(frames, heading, len(painter.indices)))
+    times = painter.sequence.timestamps[painter.indices]
+    return Section(
+        lines[0].recording,
+        shown,
+        facts_of_recording(painter.sequence, lines[0]),
+        fairness(painter.sequence.description, lines),
+        _timeline(shown, metric),
+        _plots(shown, metric),
+        film,
+        max(float(times[-1] - times[0]), 1e-3),
+        _worst(shown, metric, painter),
+    )
+
+
+def _timeline(shown: list[Shown], metric: str) -> Plot:
+    svg, remark = timeline(shown, metric, "mm")
+    title = "Distance to the sensor's points over time" if metric == "e3d_mm" else "Error over time"
+    return Plot(title, ERRORS[metric].replace("median ", "").replace("mean ", ""), Markup(svg), remark)
+
+
+def _plots(shown: list[Shown], metric: str) -> list[Plot]:
+    found = []
+    if (svg := share_curves(shown)) is not None:
+        judged = "E3D" if metric == "e3d_mm" else "largest error"
+        found.append(Plot("Share of frames under a threshold", f"by a frame's {judged}", Markup(svg)))
+    if (svg := finger_bars(shown)) is not None:
+        found.append(Plot("Error of each finger", "mean; whiskers to the 95th percentile", Markup(svg)))
+    else:
+        svg, _ = timeline(shown, "silhouette_iou", "IoU", small=True)
+        found.append(Plot("Agreement of silhouettes", "rendered and seen, over time", Markup(svg)))
+    if (svg := stage_bars(shown)) is not None:
+        clock = shown[0].line.evaluations[0].run.configuration.get("clock", "wall")
+        about = "CPU time" if clock == "cpu" else "by the clock on the wall"
+        found.append(Plot("Time per stage", about, Markup(svg)))
+    return found
+
+
+def _worst(shown: list[Shown], metric: str, painter: SideBySide) -> list[Worst]:
+    found = []
+    for each in shown:
+        evaluation = each.line.evaluations[0]
+        figures = figures_of(evaluation).get(metric)
+        if figures is None:
+            continue
+        run = evaluation.run
+        for row in worst_frames(figures.values, run.timestamps, WORST):
+            told = f"frame {run.index[row]}, {figures.values[row]:.1f} mm"
+            fingers = {finger: errors.values[row] for finger, errors in evaluation.finger_errors.items()}
+            known = {finger: error for finger, error in fingers.items() if np.isfinite(error)}
+            if known:
+                finger = max(known, key=lambda finger: known[finger])
+                told += f"; most in the {finger} finger" if finger != "thumb" else "; most in the thumb"
+            frame = next(iter(painter.sequence.frames([int(run.index[row])])))
+            seconds = float(run.timestamps[row] - painter.sequence.timestamps[painter.indices[0]])
+            found.append(Worst(each.label, each.number, told, seconds, as_webp(painter.picture(frame), quality=70)))
+    return found
+
+
+def _verdict(lines: Sequence[Line]) -> Verdict:
+    budgets = {(e.run.configuration.get("budget") or {}).get("equal_ms") for line in lines for e in line.evaluations}
+    return verdict(lines, next(iter(budgets)) if len(budgets) == 1 else None)
+
+
+def _template() -> Any:
+    pages = Environment(loader=PackageLoader("depthtrack.report", "page"), autoescape=True, trim_blocks=True)
+    pages.lstrip_blocks = True
+    return pages.get_template("report.html.jinja")
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f".{path.name}.writing")
+    aside.write_text(text, encoding="utf-8")
+    aside.replace(path)

@@ -1,0 +1,137 @@
+"""Overlays: what each tracker says of a frame, drawn on it side by side, close on the hand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.evaluation.compare.results import figures_of
+from depthtrack.evaluation.evaluate import Evaluation
+from depthtrack.evaluation.replay import Replay
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.recording.sequence import Frame
+from depthtrack.rendering.surface import Surface
+from depthtrack.report.colours import tracker_colour
+from depthtrack.report.series import Shown
+from depthtrack.viewing.close_ups import close_ups
+from depthtrack.viewing.depth_colours import depth_range
+from depthtrack.viewing.moments import Moment, true_keypoints
+from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
+from depthtrack.viewing.panels import captioned, paint, tile_grid
+from depthtrack.viewing.shading import draw_surface
+from depthtrack.viewing.theme import Rgb
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+_TRUE: Rgb = (255, 255, 255)
+_MOST_BESIDE = 3
+"""More panels than this go into a second row."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A tracker's run, where to find a frame in it, and the figure that its frames are told by."""
+
+    shown: Shown
+    replay: Replay
+    row_of: dict[int, int]
+    values: Array
+    unit: str
+
+
+class SideBySide:
+    """Paints frames of one recording with the first run of every tracker, all through the same window."""
+
+    def __init__(self, shown: Sequence[Shown], metric: str, height: int = 300, sequence: Path | None = None) -> None:
+        """`metric` is written under each picture. Raises InputError where the recording cannot be opened any more."""
+        self._height = height
+        self._panels = [_panel(each, metric, sequence) for each in shown]
+        self._surfaces = [panel.replay.surface() for panel in self._panels]
+        self.sequence = self._panels[0].replay.sequence
+        self.indices = sorted(set().union(*(panel.row_of for panel in self._panels)))
+        keypoints = self._keypoints()
+        known = np.asarray(np.isfinite(keypoints).all(axis=(1, 2)), dtype=np.bool_)
+        windows = close_ups(self.sequence.camera, keypoints, known)
+        self._windows = dict(zip(self.indices, windows, strict=True))
+        depths = keypoints[known, :, 2]
+        near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
+        self._range = max(near - 0.06, 0.05), far + 0.1
+
+    def picture(self, frame: Frame) -> Image:
+        """All trackers' panels of a frame, each under its tracker's name and error."""
+        tiles = [self._tile(k, frame) for k in range(len(self._panels))]
+        return tile_grid(tiles, columns=min(len(tiles), _MOST_BESIDE))
+
+    def _tile(self, k: int, frame: Frame) -> Image:
+        panel, row = self._panels[k], self._panels[k].row_of.get(frame.index)
+        status = "not tracked" if row is None else panel.replay.run.status[row]
+        value = np.nan if row is None else panel.values[row]
+        told = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
+        remark = "  ·  ".join(filter(None, (told, status if status not in ("tracked", "started") else "")))
+        colour = tracker_colour(panel.shown.number).rgb
+        close = Moment(frame).cropped(*self._windows[frame.index])
+        image = paint(close, "colour", self._height, *self._range)
+        pose = None if row is None else panel.replay.run.poses[row]
+        if pose is not None and np.isfinite(pose).all():
+            camera = close.camera.resized(self._height / close.camera.height)
+            surface = self._surfaces[k].seen(pose, camera)
+            image = _outlined(draw_surface(image, surface, 0.35), surface, colour)
+            image = self._with_truth(image, close)
+            image = draw_skeleton(image, camera, self._surfaces[k].model.keypoints(pose))
+        return captioned(image, panel.shown.label, remark, colour)
+
+    def _with_truth(self, image: Image, close: Moment) -> Image:
+        """The image with the true skeleton in thin white lines, which the tracker's covers where it is right."""
+        truth = true_keypoints(self.sequence.ground_truth, close.frame.timestamp)
+        if truth is None:
+            return image
+        camera = close.camera.resized(self._height / close.camera.height)
+        pixels = camera.project(truth)
+        out = image.copy()
+        for a, b in (*PALM_BONES, *(bone for bones in FINGER_BONES.values() for bone in bones)):
+            if np.isfinite(pixels[[a, b]]).all():
+                ends = np.rint(pixels[[a, b]].clip(-9999, 9999)).astype(int)
+                cv2.line(out, tuple(ends[0]), tuple(ends[1]), _TRUE, 1, cv2.LINE_AA)
+        return out
+
+    def _keypoints(self) -> Array:
+        """Where the hand is (N, 21, 3) in each of `indices`: the truth, else the trackers' median; NaN unknown."""
+        found = np.full((len(self.indices), len(self._panels) + 1, 21, 3), np.nan)
+        times = self.sequence.timestamps
+        for n, index in enumerate(self.indices):
+            truth = true_keypoints(self.sequence.ground_truth, float(times[index]))
+            if truth is not None and np.isfinite(truth).all():
+                found[n, :] = truth
+        for k, panel in enumerate(self._panels):
+            model = HandModel(panel.replay.hand)
+            for n, index in enumerate(self.indices):
+                row = panel.row_of.get(index)
+                if row is not None and np.isnan(found[n, -1, 0, 0]) and panel.replay.run.status[row] != "lost":
+                    found[n, k] = model.keypoints(panel.replay.run.poses[row])
+        out = np.full((len(self.indices), 21, 3), np.nan)
+        known = np.isfinite(found).all(axis=(2, 3))
+        some = known.any(axis=1)
+        out[some] = np.nanmedian(np.where(known[some][..., None, None], found[some], np.nan), axis=1)
+        return out
+
+
+def _panel(shown: Shown, metric: str, sequence: Path | None) -> _Panel:
+    evaluation: Evaluation = shown.line.evaluations[0]
+    replay = Replay.open(evaluation.run, sequence)
+    found = figures_of(evaluation).get(metric)
+    values = np.full(evaluation.frames, np.nan) if found is None else found.values
+    unit = "" if found is None else found.unit
+    return _Panel(shown, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
+
+
+def _outlined(image: Image, surface: Surface, colour: Rgb) -> Image:
+    """`image` with the rim of the surface in a colour."""
+    hit = (surface.label >= 0).astype(np.uint8)
+    rim = cv2.dilate(hit, np.ones((3, 3), dtype=np.uint8)) - cv2.erode(hit, np.ones((3, 3), dtype=np.uint8))
+    out = image.copy()
+    out[rim > 0] = colour
+    return out

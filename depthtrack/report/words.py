@@ -1,0 +1,179 @@
+"""The page in words: what came out, in a sentence or two that the figures bear out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from depthtrack.evaluation.compare.results import TRACKER_MS, Line
+
+ALIKE = 1.05
+"""Figures that differ by less than this factor are called the same."""
+_MOST_NAMED = 3
+_SPACE = "\u00a0"
+"""Between a number and its unit, where no line may break."""
+
+ERRORS = {"endpoint_error_mm": "mean endpoint error", "joint_error_mm": "mean joint error", "e3d_mm": "median E3D"}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A headline, and the sentences below it."""
+
+    headline: str
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A tracker over all recordings: the mean of its errors (mm) on them, the mean of its median milliseconds a frame
+    without segmentation, and how many of its frames were lost."""
+
+    label: str
+    error: float
+    ms: float | None
+    lost: int
+    frames: int
+
+
+def judged_by(lines: Sequence[Line]) -> str:
+    """The metric that trackers are judged by: the truth's, where any recording has one, else the distance E3D."""
+    return next((line.truth for line in lines if line.truth is not None), "e3d_mm")
+
+
+def error_name(lines: Sequence[Line]) -> str:
+    """What the errors are called that trackers are judged by."""
+    truths = {line.truth for line in lines if line.truth is not None}
+    return "mean error" if len(truths) > 1 else ERRORS[judged_by(lines)]
+
+
+def where(lines: Sequence[Line]) -> str:
+    """On which recordings trackers are judged, where that is not all there is to say."""
+    every = {line.source for line in lines}
+    judged = {line.source for line in lines if _error(line, lines) is not None}
+    if len(judged) < len(every):
+        return f" on the {_count(len(judged))} of {_count(len(every))} recordings with a known truth"
+    return " over all recordings" if len(every) > 1 else ""
+
+
+def standings(lines: Sequence[Line]) -> list[Standing]:
+    """All trackers, the closest first; trackers that could not be judged come last, with an infinite error."""
+    found = []
+    for label in dict.fromkeys(line.label for line in lines):
+        own = [line for line in lines if line.label == label]
+        errors = [error for line in own if (error := _error(line, lines)) is not None]
+        times = [ms for line in own if (ms := line.figure(TRACKER_MS, "median")) is not None]
+        found.append(
+            Standing(
+                label,
+                float(np.mean(errors)) if errors else float("inf"),
+                float(np.mean(times)) if times else None,
+                sum(line.lost for line in own),
+                sum(line.frames for line in own),
+            )
+        )
+    return sorted(found, key=lambda standing: standing.error)
+
+
+def verdict(lines: Sequence[Line], equal_ms: float | None = None) -> Verdict:
+    """What the comparison says; `equal_ms` where all trackers were given the same time a frame."""
+    found = standings(lines)
+    first = found[0]
+    if not np.isfinite(first.error):
+        return Verdict("No tracker followed the hand", (_losses(found),))
+    if len(found) == 1:
+        speed = "" if first.ms is None else f", at {first.ms:.1f}{_SPACE}ms a frame"
+        told = f"That is its {error_name(lines)}{speed}."
+        return Verdict(f"{first.label} follows the hand to {_mm(first.error)}", (told, _losses(found)))
+    winners = _winners(lines)
+    headline, told = _split(lines, winners) if len(set(winners.values())) > 1 else _clear(lines, found)
+    return Verdict(headline, tuple(filter(None, (told, _speeds(found, equal_ms), _losses(found)))))
+
+
+def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
+    """One tracker is closest on every recording, or several are alike."""
+    first, *others = [standing for standing in found if np.isfinite(standing.error)]
+    against = [f"{standing.label}'s {_mm(standing.error)}" for standing in others]
+    told = f"{first.label}'s {error_name(lines)} is {_mm(first.error)}{where(lines)}"
+    told += f", {_listed(against)}." if against else "."
+    alike = [standing.label for standing in found if standing.error < ALIKE * first.error]
+    if len(alike) > 1:
+        return f"{_listed(alike)} follow the hand equally closely", told
+    if len(found) == 2:
+        return f"{first.label} follows the hand more closely than {found[1].label}", told
+    return f"Of {_count(len(found))} trackers, {first.label} follows the hand most closely", told
+
+
+def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
+    """Different trackers are closest on different recordings: `winners` by the recordings' paths."""
+    labels = list(dict.fromkeys(line.label for line in lines))
+    headline = f"{'Neither' if len(labels) == 2 else 'No'} tracker is the closest everywhere"
+    if len(winners) > _MOST_NAMED:
+        counts = {label: list(winners.values()).count(label) for label in labels}
+        ordered = sorted((label for label in labels if counts[label]), key=lambda label: -counts[label])
+        parts = [f"{label} on {counts[label]}" for label in ordered]
+        return headline, f"Of {len(winners)} recordings, the closest is {_listed(parts)}."
+    parts = []
+    for source, label in winners.items():
+        own = [line for line in lines if line.source == source]
+        best = next(line for line in own if line.label == label)
+        errors = [(line.label, _error(line, lines)) for line in own if line.label != label]
+        others = _listed([f"{other} {_mm(error)}" for other, error in errors if error is not None] or ["none other"])
+        parts.append(f"{label} on {best.recording} ({_mm(_error(best, lines) or 0)} {_name(best)}; {others})")
+    return headline, f"Closest are {_listed(parts)}."
+
+
+def _winners(lines: Sequence[Line]) -> dict[str, str]:
+    """The label of the closest tracker on each recording that can be judged, by the recording's path."""
+    found: dict[str, tuple[float, str]] = {}
+    for line in lines:
+        error = _error(line, lines)
+        if error is not None and (line.source not in found or error < found[line.source][0]):
+            found[line.source] = (error, line.label)
+    return {source: label for source, (_, label) in found.items()}
+
+
+def _error(line: Line, lines: Sequence[Line]) -> float | None:
+    """What a line is judged by, mm: its error; where no recording knows a truth, its E3D."""
+    return line.figure("e3d_mm", "median") if judged_by(lines) == "e3d_mm" else line.error("mean")
+
+
+def _name(line: Line) -> str:
+    return ERRORS[line.truth or "e3d_mm"]
+
+
+def _speeds(found: Sequence[Standing], equal_ms: float | None) -> str:
+    timed = sorted(((s.ms, s.label) for s in found if s.ms is not None), key=lambda pair: pair[0])
+    if len(timed) < 2:
+        return ""
+    told = _listed([f"{label} {ms:.1f}{_SPACE}ms" for ms, label in timed])
+    if equal_ms is not None:
+        return f"Each was given {equal_ms:g}{_SPACE}ms a frame; taken were: {told}."
+    (fast, quickest), (slow, slowest) = timed[0], timed[-1]
+    if fast <= 0 or slow < ALIKE * fast:
+        return f"They take the same time a frame: {told}."
+    if len(timed) == 2:
+        return f"{quickest} is faster: {fast:.1f}{_SPACE}ms a frame, {slowest} {slow:.1f}{_SPACE}ms."
+    return f"{quickest} is the fastest: {told} a frame."
+
+
+def _losses(found: Sequence[Standing]) -> str:
+    if all(standing.lost == 0 for standing in found):
+        return "The hand was never lost."
+    lost = [f"{s.label} in {s.lost} of {s.frames} frames" for s in found if s.lost]
+    never = [s.label for s in found if not s.lost]
+    return f"The hand was lost by {_listed(lost)}" + (f"; never by {_listed(never)}." if never else ".")
+
+
+def _mm(value: float) -> str:
+    number = f"{value:.2f}" if value < 0.995 else f"{value:.1f}" if value < 99.5 else f"{value:.0f}"
+    return f"{number}{_SPACE}mm"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _count(number: int) -> str:
+    words = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+    return words[number] if number < len(words) else str(number)
