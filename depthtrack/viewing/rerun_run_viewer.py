@@ -3,23 +3,23 @@
 import importlib
 from typing import Any
 
+import cv2
 import numpy as np
 
 from depthtrack.evaluation.evaluate import evaluate
 from depthtrack.evaluation.replay import Replay, Replayed
-from depthtrack.hand.pose import FINGERS
 from depthtrack.rendering.surface import Surface
 from depthtrack.viewing.moments import true_keypoints
 from depthtrack.viewing.rerun_stream import CAMERA
 from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, MomentStream, bones, jpeg
 from depthtrack.viewing.residual_colours import residual_to_rgb
 from depthtrack.viewing.run_pictures import hand_range, run_moment
-from depthtrack.viewing.theme import FINGER_COLOURS, FINGER_TRUTH, PALM, STATUS_COLOURS, Rgb
+from depthtrack.viewing.shading import BODY_COLOURS, draw_surface
+from depthtrack.viewing.theme import FINGER_TRUTH, STATUS_COLOURS
 
-_FIRST_BODY = 10
-"""Mask number of the palm; the 15 phalanges follow."""
+_OPACITY = 170
 _HAND_IMAGES = ("hypothesis", "residual", "true_skeleton")
-_SERIES = {"energy": (230, 237, 243), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
+_SERIES = {"energy": (167, 110, 230), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
 
 
 class RerunRunViewer(MomentStream[Replayed]):
@@ -45,11 +45,7 @@ class RerunRunViewer(MomentStream[Replayed]):
         moment = run_moment(item, self._surface.model)
         self.log_moment(moment)
         surface = None if estimate.pose is None else self._surface.seen(estimate.pose, frame.camera)
-        labels = None if surface is None else (surface.label + _FIRST_BODY) * (surface.label >= 0)
-        self._log_or_clear(
-            f"{CAMERA}/hypothesis",
-            None if labels is None else rr.SegmentationImage(labels.astype(np.uint8), opacity=0.65),
-        )
+        self._log_or_clear(f"{CAMERA}/hypothesis", None if surface is None else _picture(rr, surface))
         rendered = np.zeros(frame.camera.shape) if surface is None else surface.depth
         stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, moment.mask), -7))
         self._log_or_clear("world/hypothesis", None if surface is None else self._points(surface))
@@ -74,18 +70,13 @@ class RerunRunViewer(MomentStream[Replayed]):
         depth, label = surface.depth[::2, ::2], surface.label[::2, ::2]
         v, u = np.nonzero(label >= 0)
         points = self._camera.unproject(2 * np.stack([u, v], axis=-1), depth[v, u])
-        colours = np.array(_body_colours(), dtype=np.uint8)[label[v, u]]
+        colours = BODY_COLOURS[label[v, u]]
         return self._rr.Points3D(points.astype(np.float32), colors=colours, radii=points[:, 2] / self._camera.fx)
 
     def _log_static(self) -> None:
         super()._log_static()
         for name, colour in _SERIES.items():
             self._stream.log(f"run/{name}", self._rr.SeriesLines(colors=colour, names=name), static=True)
-
-    def _classes(self) -> list[tuple[int, str, Rgb]]:
-        names = ["palm", *(f"{finger} {k}" for finger in FINGERS for k in (1, 2, 3))]
-        bodies = zip(names, _body_colours(), strict=True)
-        return super()._classes() + [(_FIRST_BODY + n, name, colour) for n, (name, colour) in enumerate(bodies)]
 
     def _layout(self) -> Any:
         rrb = importlib.import_module("rerun.blueprint")
@@ -96,13 +87,16 @@ class RerunRunViewer(MomentStream[Replayed]):
         ]
         images = rrb.Vertical(
             self._image("hypothesis", "depth_picture", "colour", "hypothesis", "skeleton", "true_skeleton"),
-            self._image("residual, +-20 mm: red nearer, blue farther", "depth_picture", "residual"),
+            self._image("residual, to 20 mm: red nearer, blue farther", "depth_picture", "residual"),
         )
         scene = self._scene((*FLAT_IMAGES, *_HAND_IMAGES))
         numbers = rrb.Vertical(*series, rrb.TextLogView(origin="run/status", name="status"))
         return self._blueprint(rrb.Horizontal(scene, images, numbers, column_shares=[3, 3, 2]))
 
 
-def _body_colours() -> list[Rgb]:
-    """RGB of the 16 bodies."""
-    return [PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))]
+def _picture(rr: Any, surface: Surface) -> Any:
+    """The hypothesis as a picture, clear where there is no hand."""
+    image = draw_surface(np.zeros((*surface.depth.shape, 3), dtype=np.uint8), surface)
+    alpha = np.where(surface.label >= 0, _OPACITY, 0).astype(np.uint8)
+    _, data = cv2.imencode(".png", np.dstack([image[..., ::-1], alpha]), [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    return rr.EncodedImage(contents=data.tobytes(), media_type="image/png", opacity=1, draw_order=-6)

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from depthtrack.camera import Camera
 from depthtrack.errors import InputError, MissingExtraError
-from depthtrack.viewing.theme import ESTIMATED_MASK, TRUE_MASK, Rgb
+from depthtrack.viewing.theme import ESTIMATED_MASK, TRUE_MASK
 
 CAMERA = "world/camera"
 TRUE_CLASS, ESTIMATED_CLASS = 1, 2
@@ -41,10 +41,6 @@ class RerunStream(ABC, Generic[Item]):
     @abstractmethod
     def _layout(self) -> Any:
         """The blueprint of the viewer's panels."""
-
-    def _classes(self) -> list[tuple[int, str, Rgb]]:
-        """What the numbers in mask images mean, beside 0: name and colour."""
-        return [(TRUE_CLASS, "true mask", TRUE_MASK), (ESTIMATED_CLASS, "estimated mask", ESTIMATED_MASK)]
 
     def open_window(self) -> None:
         """Start rerun's own window, which goes on after this program ends. Raises InputError where it cannot start."""
@@ -107,9 +103,12 @@ class RerunStream(ABC, Generic[Item]):
             image_plane_distance=0.1,
         )
         self._stream.log(CAMERA, pinhole, static=True)
-        names = [rr.AnnotationInfo(id=0, color=(0, 0, 0, 0))]
-        names += [rr.AnnotationInfo(id=number, label=label, color=rgb) for number, label, rgb in self._classes()]
-        self._stream.log(CAMERA, rr.AnnotationContext(names), static=True)
+        classes = [
+            rr.AnnotationInfo(id=0, color=(0, 0, 0, 0)),
+            rr.AnnotationInfo(id=TRUE_CLASS, label="true mask", color=TRUE_MASK),
+            rr.AnnotationInfo(id=ESTIMATED_CLASS, label="estimated mask", color=ESTIMATED_MASK),
+        ]
+        self._stream.log(CAMERA, rr.AnnotationContext(classes), static=True)
 
     def _log_or_clear(self, entity: str, content: Any | None) -> None:
         self._stream.log(entity, self._rr.Clear(recursive=False) if content is None else content)

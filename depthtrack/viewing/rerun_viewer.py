@@ -117,7 +117,8 @@ class RerunViewer(MomentStream[Moment]):
 def jpeg(rr: Any, image: NDArray[np.uint8], draw_order: float) -> Any:
     """A picture over rerun's depth images (order -20) and under its masks (0)."""
     _, data = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 90])
-    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg", draw_order=draw_order)
+    # Where one image lies on another, rerun makes it half clear unless told otherwise.
+    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg", opacity=1, draw_order=draw_order)
 
 
 def _mask_image(rr: Any, moment: Moment) -> Any | None:

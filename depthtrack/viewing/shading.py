@@ -11,7 +11,7 @@ Image = NDArray[np.uint8]
 
 _LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
 _AMBIENT = 0.3
-_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.float64)
+BODY_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.uint8)
 """(16, 3) RGB of the bodies."""
 
 
@@ -20,5 +20,5 @@ def draw_surface(image: Image, surface: Surface, opacity: float = 1.0) -> Image:
     hit = surface.label >= 0
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)
     out = image.copy()
-    out[hit] = np.rint(image[hit] * (1 - opacity) + _COLOURS[surface.label[hit]] * light[:, None] * opacity)
+    out[hit] = np.rint(image[hit] * (1 - opacity) + BODY_COLOURS[surface.label[hit]] * light[:, None] * opacity)
     return out
