@@ -233,6 +233,17 @@ def test_a_run_of_the_skin_is_held_against_the_skin(recording: Path, tmp_path: P
     assert overlap["cylinders"] > overlap["skin"] + 0.01
 
 
+def test_every_metric_is_documented_with_its_key(recording: Path, tmp_path: Path) -> None:
+    text = (Path(__file__).parent.parent / "docs" / "metrics.md").read_text()
+    annotated = shutil.copytree(recording, tmp_path / "annotated")
+    (annotated / "hand_poses.csv").unlink()
+    poses = true_poses(recording)
+    told = {"run", "recording", "tracker", "frames"}
+    for place in (recording, annotated):
+        run = write_run(tmp_path / f"run-{place.name}", place, poses)
+        assert [key for key in evaluate_run(run).to_json() if key not in told and f"`{key}`" not in text] == []
+
+
 def test_real_joints_of_another_skeleton(real_data: Path, tmp_path: Path) -> None:
     """A hand at the annotated joints' place, whatever its fingers do, is judged by all of them."""
     recording = real_data / "rgbd" / "open-close"
