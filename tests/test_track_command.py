@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 
 from depthtrack.cli import main
+from depthtrack.evaluation.replay import Replay
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run import Run
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
 
 FRAMES = 14
-_QUICK = ("--resolution", "64", "--generations", "12", "--threads", "1", "--start", "truth")
+RESOLUTION = 64
+_QUICK = ("--resolution", str(RESOLUTION), "--generations", "12", "--threads", "1", "--start", "truth")
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +69,18 @@ def test_a_killed_run_resumes_to_the_same_poses(recording: Path, run: Path, tmp_
     assert before >= 2
     assert main(["track", str(recording), "-o", str(folder), *_QUICK, "--resume"]) == 0
     assert (folder / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+
+
+def test_a_run_is_replayed_exactly_as_the_tracker_saw_it(run: Path) -> None:
+    """The energies that the tracker wrote down come back bit for bit, which no other segmentation of a frame gives."""
+    replay = Replay.open(Run.load(run))
+    with RasterScorer(replay.hand) as scorer:
+        for seen in replay:
+            assert seen.observation is not None
+            assert seen.estimate.pose is not None
+            observed = Target(seen.observation.camera, seen.observation.skin, seen.observation.depth)
+            scorer.observe(observed.reduced(RESOLUTION))
+            assert scorer.score(seen.estimate.pose[None])[0] == seen.estimate.energy
 
 
 def test_text_names_the_metrics(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
