@@ -238,4 +238,4 @@ def test_shares_of_the_variance_stand_beside_the_papers() -> None:
         for name, n in (("leap", 3), ("leap", 6), ("leap-grasps", 3))
     ]
     assert list(said("schroeder-7", rows).values())[:3] == [30.0, 60.0, 30.0]
-    assert said("schroeder-7", rows)["error with 6 of leap"] == 5.0
+    assert said("schroeder-7", rows)["mean error of grasp, 6 components of leap"] == 5.0

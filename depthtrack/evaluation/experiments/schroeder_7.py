@@ -83,7 +83,10 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
     ]
     return [line for line in lines if line.ours is not None] + [
         Comparison(
-            f"error with 6 of {_label(name)}", "not told", value(rows, "error_deg", synergies=name, components=6), "deg"
+            f"mean error of {_postures(rows, name)}, 6 components of {_label(name)}",
+            "not told",
+            value(rows, "error_deg", synergies=name, components=6),
+            "deg",
         )
         for name in _names(rows)
     ]
@@ -93,7 +96,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     for number, name in enumerate(_names(rows)):
         mine = [row for row in rows if row["synergies"] == name]
         counts, colour = [row["components"] for row in mine], f"C{number}"
-        label = f"{mine[0]['postures'] or 'its postures'}, by components of {_label(name)}"
+        label = f"{_postures(rows, name)}, by components of {_label(name)}"
         axes.plot(counts, [row["particular_deg"] for row in mine], marker="o", color=colour, label=label)
         axes.plot(counts, [row["error_deg"] for row in mine], linestyle="--", color=colour)
     axes.plot([], [], linestyle="--", color="0.3", label="mean of all postures")
@@ -104,6 +107,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 def _names(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(row["synergies"] for row in rows))
+
+
+def _postures(rows: Sequence[Row], name: str) -> str:
+    """What the synergies of this name are to approximate."""
+    motion = next(row["postures"] for row in rows if row["synergies"] == name)
+    return "its postures" if motion is None else str(motion)
 
 
 def _label(name: str) -> str:

@@ -1,6 +1,7 @@
 """Sec. VI-C of Schroeder et al. 2014: cylinders in place of the mesh, for all angles and for few synergies."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -9,6 +10,7 @@ from depthtrack.evaluation.experiments.experiment import Comparison, Experiment,
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 MODELS = ("skin", "cylinders")
+WORDS = {"skin": "mesh", "cylinders": "cylinders"}
 COMPONENTS, QUICK_COMPONENTS = (3, 6, 9, 12, 15, 18), (6, 12)
 REDUCED = 6
 """The paper's (6 + 6) degrees of freedom."""
@@ -66,14 +68,18 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
                 line,
                 marker="o",
                 color=colour,
-                label=f"ours, {model}, synergies {_label(name)}",
+                label=f"ours, {WORDS[model]}, synergies {_label(name)}",
             )
         full = schroeder.value(rows, "error_deg", model=model, components=None)
         if full is not None:
-            axes.plot(ALL_ANGLES, full, "s", color=colour, ms=7, label=f"ours, {model}, all angles")
-        axes.plot(
-            ALL_ANGLES, PAPER_DEG[model], "D", mec=colour, mfc="black", mew=1.5, label=f"paper, {model}, all angles"
-        )
+            axes.plot(ALL_ANGLES - 0.3, full, "s", color=colour, label=f"ours, {WORDS[model]}, all angles")
+        paper: dict[str, Any] = {
+            "mec": colour,
+            "mfc": "black",
+            "mew": 1.5,
+            "label": f"paper, {WORDS[model]}, all angles",
+        }
+        axes.plot(ALL_ANGLES + 0.3, PAPER_DEG[model], "D", **paper)
     axes.set(xlabel="synergies solved for, besides the 6 of the global pose", ylabel="joint angle error (deg)")
     axes.set(ylim=(0, 1.5 * axes.get_ylim()[1]), xlim=(0, ALL_ANGLES + 1))
     axes.set_xticks([*COMPONENTS, ALL_ANGLES], [*map(str, COMPONENTS), "all angles"])
