@@ -6,14 +6,8 @@ BIN := .venv/bin
 .PHONY: demo test lint clean
 
 demo: .venv/.ready
-	$(BIN)/depthtrack synth everyday out/everyday --model skin --sensor kinect1 --background room --overwrite
-	$(BIN)/depthtrack info out/everyday
-	$(BIN)/depthtrack segment out/everyday -o out/segmented
-	rm -rf out/run
-	$(BIN)/depthtrack track out/everyday -o out/run
-	$(BIN)/depthtrack evaluate out/run
-	$(BIN)/depthtrack view out/everyday --sheet out/everyday.png
-	@echo "Look at out/everyday.png, and at the hand found in every frame: out/segmented/overlay.mp4"
+	$(BIN)/depthtrack demo -o out/demo
+	@echo "All commands: $(BIN)/depthtrack --help"
 
 test: .venv/.ready-test lint
 	$(BIN)/python -m pytest
@@ -31,6 +25,7 @@ clean:
 	$(PYTHON) -m venv .venv
 
 .venv/.ready: pyproject.toml | .venv/bin/python
+	@echo "installing into .venv: the first time, this downloads about 200 MB"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
 

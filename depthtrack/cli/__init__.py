@@ -18,6 +18,9 @@ class CommandEntry:
 
 
 COMMANDS = {
+    "demo": CommandEntry(
+        "depthtrack.cli.demo", "one command to a report: both trackers on a synthetic recording, or yours"
+    ),
     "info": CommandEntry("depthtrack.cli.info", "tell what a recording holds"),
     "synth": CommandEntry("depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"),
     "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),

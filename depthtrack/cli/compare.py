@@ -1,17 +1,15 @@
 """`depthtrack compare`: trackers side by side on the same recordings, and a report that says which to take."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from depthtrack.cli.recording_options import PresetName
-from depthtrack.errors import InputError
+from depthtrack.cli.source_options import SourceOptions
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.comparison import Comparison
-    from depthtrack.evaluation.compare.running import Source
 
 
 @dataclass(frozen=True)
@@ -34,21 +32,10 @@ class Command:
     """Times that every tracker goes through every recording, each time with another seed."""
     equal_time: Annotated[float | None, tyro.conf.arg(metavar="MS")] = None
     """Give every tracker the same CPU milliseconds a frame: its work is chosen by timing a few frames."""
-    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Only the first so many frames of each recording."""
     seed: int = 0
     """The first seed."""
 
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
-    """Sizes of the hand; unless given, each recording's own, or the average adult's right hand."""
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Camera of recordings that bring none."""
-    camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
-    """Nominal camera of a sensor instead."""
-    on_damage: Literal["refuse", "skip"] = "refuse"
-    """At a frame that cannot be read: stop with an error, or skip and count it."""
+    recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
 
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Processes on this machine; as many as there are cores unless given."""
@@ -69,34 +56,9 @@ class Command:
         from depthtrack.evaluation.compare.contenders import read_contenders
 
         return Comparison(
-            sources=tuple(map(self._source, self.sequences)),
+            sources=tuple(map(self.recordings.source, self.sequences)),
             contenders=tuple(read_contenders(self.trackers)),
             repeats=self.repeats,
             seed=self.seed,
             equal_ms=self.equal_time,
         )
-
-    def _source(self, path: Path) -> "Source":
-        from depthtrack.evaluation.compare.running import Source
-
-        if self.frames is not None and self.frames < 1:
-            raise InputError(f"--frames must be at least 1, found {self.frames}")
-        files = {name: getattr(self, name) for name in ("hand", "skin_model")}
-        return Source(
-            path=str(path.resolve()),
-            camera=self._camera(),
-            on_damage=self.on_damage,
-            frames=self.frames,
-            **{name: None if file is None else str(file.resolve()) for name, file in files.items()},
-        )
-
-    def _camera(self) -> dict[str, Any] | None:
-        from dataclasses import asdict
-
-        from depthtrack.camera import PRESETS, Camera
-
-        if self.camera is not None and self.camera_preset is not None:
-            raise InputError("--camera and --camera-preset both name a camera: give one of them")
-        if self.camera is not None:
-            return asdict(Camera.from_json(self.camera))
-        return None if self.camera_preset is None else asdict(PRESETS[self.camera_preset])

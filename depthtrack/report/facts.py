@@ -37,7 +37,8 @@ def facts_of_recording(recording: Recording, line: Line) -> list[Fact]:
 def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
     """Tracker, options, seeds, versions and machine; values that differ between runs are told side by side."""
     runs = [evaluation.run.configuration for line in lines if line.label == label for evaluation in line.evaluations]
-    options = list(dict.fromkeys(name for run in runs for name in run if name not in _NOT_OPTIONS))
+    told = (name for run in runs for name, value in run.items() if name not in _NOT_OPTIONS and value is not None)
+    options = list(dict.fromkeys(told))
     budgets = [run["budget"] for run in runs if isinstance(run.get("budget"), dict)]
     facts = [
         ("tracker", _together([run.get("tracker") for run in runs])),

@@ -10,8 +10,10 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from depthtrack.errors import InputError
-from depthtrack.tracking.trackers import TRACKERS
+from depthtrack.tracking.trackers import TRACKERS, complete_options
 
+_COMPARISONS = ("seed", "threads")
+"""Options that the comparison chooses."""
 _PLAIN = (bool, int, float, str, NoneType)
 
 
@@ -26,9 +28,8 @@ class Contender:
     @property
     def complete_options(self) -> dict[str, Any]:
         """The options with those that were left to their defaults: what a run must tell to be made again."""
-        module, _, name = TRACKERS[self.tracker]
-        chosen = getattr(import_module(module), name)(**self.options)
-        return {name: getattr(chosen, name) for name in _settable(self.tracker)}
+        complete = complete_options(self.tracker, self.options)
+        return {name: value for name, value in complete.items() if name not in _COMPARISONS}
 
     @property
     def slug(self) -> str:
@@ -104,10 +105,10 @@ def _checked(label: str, tracker: str, options: dict[str, Any]) -> Contender:
 
 
 def _settable(tracker: str) -> dict[str, Any]:
-    """Options with plain values, and their types. Seed and threads are the comparison's to choose."""
+    """Options with plain values, and their types."""
     module, _, name = TRACKERS[tracker]
     options = getattr(import_module(module), name)
-    hints = {name: kind for name, kind in get_type_hints(options).items() if name not in ("seed", "threads")}
+    hints = {name: kind for name, kind in get_type_hints(options).items() if name not in _COMPARISONS}
     return {name: kind for name, kind in hints.items() if any(_is_plain(each) for each in _alternatives(kind))}
 
 

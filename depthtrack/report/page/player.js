@@ -6,7 +6,7 @@ for (const section of document.querySelectorAll("section.recording")) {
   const told = section.querySelector("output"), line = section.querySelector(".timeline"), head = line.querySelector(".playhead");
   const from = Number(line.dataset.from), to = Number(line.dataset.to), end = Number(line.dataset.end);
   const pictures = film.pictures.map((uri) => ({ uri, image: null }));
-  let number = 0, playing = false, begun = 0, since = 0;
+  let number = 0, drawn = -1, playing = false, begun = 0, since = 0;
 
   const nearest = (seconds) => {
     let best = 0;
@@ -22,7 +22,12 @@ for (const section of document.querySelectorAll("section.recording")) {
     number = k;
     const image = load(k);
     for (let ahead = 1; ahead < 12; ahead++) load(k + ahead);
-    const draw = () => { if (number === k) context.drawImage(image, 0, 0, canvas.width, canvas.height); };
+    const draw = () => {
+      // A picture that comes late is still better than the one before it.
+      if (number !== k && !(playing && k > drawn)) return;
+      drawn = k;
+      context.drawImage(image, 0, 0, canvas.width, canvas.height);
+    };
     if (image.complete && image.naturalWidth) draw(); else image.onload = draw;
     const seconds = film.seconds[k];
     slider.value = k;
@@ -40,7 +45,7 @@ for (const section of document.querySelectorAll("section.recording")) {
   };
   const play = () => {
     if (number >= film.seconds.length - 1) number = 0;
-    playing = true; button.textContent = "Pause"; begun = film.seconds[number]; since = performance.now();
+    playing = true; drawn = -1; button.textContent = "Pause"; begun = film.seconds[number]; since = performance.now();
     requestAnimationFrame(step);
   };
   const toggle = () => (playing ? stop() : play());

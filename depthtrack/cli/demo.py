@@ -1,0 +1,80 @@
+"""`depthtrack demo`: from nothing, or a recording of your own, to a report on both trackers, in one command."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from depthtrack.cli.source_options import SourceOptions
+
+if TYPE_CHECKING:
+    from depthtrack.evaluation.compare.running import Source
+
+FRAMES = 240
+"""Of each synthetic recording: eight seconds."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """Track a recording with every tracker, and write a report to open in a browser.
+
+    Without PATH, two recordings are synthesised first, as a Kinect would make them in a cluttered room: one of a
+    smooth skin, which ik fits, and one of spheres and cylinders, which pso fits, so that each tracker has a home
+    ground. With PATH, a recording of your own; it needs no ground truth.
+    """
+
+    path: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")] = None
+    """A recording of your own."""
+    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
+    """Folder to write to; given again, the demo goes on where it stood."""
+    recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Processes; as many as there are cores unless given."""
+    open: bool = False
+    """Open the report in the browser."""
+
+    def run(self) -> None:
+        from time import perf_counter
+
+        from depthtrack.cli.comparing import chosen_workers, compare_and_report
+        from depthtrack.evaluation.compare.comparison import Comparison
+        from depthtrack.evaluation.compare.contenders import read_contenders
+
+        begun = perf_counter()
+        workers = chosen_workers(self.jobs, None)
+        sources = self._synthesised() if self.path is None else (self.recordings.source(self.path),)
+        print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
+        comparison = Comparison(sources, tuple(read_contenders(["pso,ik"])))
+        compare_and_report(comparison, self.out, workers)
+        print(f"made in {perf_counter() - begun:.0f} s; open it in a browser")
+        if self.open:
+            import webbrowser
+
+            webbrowser.open((self.out / "report.html").resolve().as_uri())
+
+    def _synthesised(self) -> "tuple[Source, ...]":
+        """The two recordings, those that are there already as they are."""
+        return self._recording("skin-hand", "skin"), self._recording("primitive-hand", "primitives")
+
+    def _recording(self, name: str, model: Literal["skin", "primitives"]) -> "Source":
+        from tqdm import tqdm
+
+        from depthtrack.evaluation.bench.machine import usable_cores
+        from depthtrack.recording import open_sequence
+        from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+
+        folder = self.out / "recordings" / name
+        frames = self.recordings.frames or FRAMES
+        made = Synthesiser(Synthesis(model=model, sensor="kinect1", background="room", frames=frames))
+        found = open_sequence(folder).description if folder.exists() else {}
+        if not made.description().items() <= found.items():
+            print(f"synthesising {frames} frames of a hand of {model}: {folder}", flush=True)
+            write_recording(
+                made,
+                folder,
+                overwrite=True,
+                threads=usable_cores(),
+                progress=lambda each: tqdm(each, "synthesising", frames, unit="frame", leave=False, disable=None),
+            )
+        return self.recordings.source(folder)
