@@ -26,7 +26,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.tracking.ik.fit import FitOptions, Fitter
+from depthtrack.tracking.ik.fit import Fitter
 from depthtrack.tracking.ik.residuals import Residual
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
@@ -56,9 +56,14 @@ class Setting:
 
     def options(self, film: Film) -> IkOptions:
         """Of a tracker that works like this."""
-        synergies = None if self.freedom == "26" else Synergies.fit(film.poses[:, ANGLES]).truncated(SYNERGIES)
-        fit = FitOptions(residual=self.residual)
-        return IkOptions("default", self.model, self.icp, self.inner, self.subsample, synergies, fit=fit)
+        return IkOptions(
+            model=self.model,
+            residual=self.residual,
+            rounds=self.icp,
+            inner=self.inner,
+            subsample=self.subsample,
+            synergies=None if self.freedom == "26" else Synergies.fit(film.poses[:, ANGLES]).truncated(SYNERGIES),
+        )
 
 
 HEADLINE = Setting()
@@ -182,7 +187,8 @@ def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: fl
     """How long each fit to a frame took, from `pose` (27,), without the alignment of the whole hand before it."""
     options = setting.options(film)
     fitting = replace(options.fitting, rigid=0)
-    space = FULL if options.synergies is None else Space.of(options.synergies)
+    synergies = options.chosen_synergies
+    space = FULL if synergies is None else Space.of(synergies)
     fitter = Fitter(film.hand, make_surface(setting.model, film.hand, fitting.agreement), fitting)
     fitter.observe(film[index], setting.subsample)
     fitter.fit(pose, space)
