@@ -169,7 +169,8 @@ def test_skin_colours_that_have_moved_are_named(tmp_path: Path, capsys: pytest.C
     ("old", "new", "expected"),
     [
         ("started", "flying", "status must be one of"),
-        ("0.5", "5e200", "frame 0"),
+        ("0.5", "5e200", "frame 0: a pose must be numbers up to 100"),
+        ("0.5", "nan", "frame 0: a pose must be"),
     ],
 )
 def test_rows_that_no_tracker_writes_are_refused(
@@ -182,6 +183,13 @@ def test_rows_that_no_tracker_writes_are_refused(
     table.write_text(table.read_text().replace(old, new, 1))
     assert main(["evaluate", str(run)]) == 2
     assert expected in capsys.readouterr().err
+
+
+def test_a_rotation_must_be_one(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    poses = true_poses(recording)[:2].copy()
+    poses[1, 3:7] *= 1.1
+    assert main(["evaluate", str(write_run(tmp_path / "run", recording, poses))]) == 2
+    assert "frame 1: the quaternion must have length 1, found 1.1" in capsys.readouterr().err
 
 
 def test_another_recording_is_no_recording_of_this_run(

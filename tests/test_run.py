@@ -94,6 +94,9 @@ def test_resuming_nothing_begins_a_run(tmp_path: Path) -> None:
         ("run.json", "[]", "JSON object"),
         ("poses.csv", "index\n1\n", "columns"),
         ("poses.csv", None, "cannot read"),
+        ("timings.csv", "", "must begin with"),
+        ("timings.csv", "index,swarm\n0,1\n1,x\n", "line 3: expected milliseconds"),
+        ("timings.csv", "index,swarm\n0,1,2\n1,2\n", "line 2: expected 2 columns"),
     ],
 )
 def test_damaged_runs_are_refused_in_one_sentence(tmp_path: Path, name: str, text: str | None, message: str) -> None:

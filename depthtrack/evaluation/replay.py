@@ -12,7 +12,7 @@ from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.evaluation.model_surface import ModelSurface
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, POSITION
+from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-6
 _UNIT_TOLERANCE = 1e-3
-_FARTHEST = 100.0
-"""Metres from the camera beyond which no pose lies."""
+_LARGEST = 100.0
+"""Metres and radians that no pose reaches."""
 
 
 @dataclass(frozen=True)
@@ -129,21 +129,24 @@ def _skin_model(run: Run) -> Path | None:
 def check_rows(run: Run) -> None:
     """Raises InputError for rows that no tracker writes: they would make no sense of anything they are held against."""
     known = {status.value for status in Status}
-    posed = np.asarray(np.isfinite(run.poses).all(axis=1), dtype=np.bool_)
-    lengths = np.asarray(np.linalg.norm(run.poses[:, ORIENTATION], axis=1))
-    far = np.asarray(np.abs(run.poses[:, POSITION]).max(axis=1, initial=0)) > _FARTHEST
-    for row, status in enumerate(run.status):
+    for row, pose in enumerate(run.poses):
+        reason = None
         if not 0 <= run.index[row] < MAX_FRAMES:
             reason = f"frames are numbered from 0 to {MAX_FRAMES - 1}"
-        elif status not in known:
-            reason = f"the status must be one of {', '.join(known)}, found '{status[:40]}'"
-        elif posed[row] and abs(lengths[row] - 1) > _UNIT_TOLERANCE:
-            reason = f"the quaternion must have length 1, found {lengths[row]:.4g}"
-        elif posed[row] and far[row]:
-            reason = f"the position must lie within {_FARTHEST:g} m"
-        else:
-            continue
-        raise InputError(f"{run.folder / 'poses.csv'}, frame {run.index[row]}: {reason}")
+        elif run.status[row] not in known:
+            reason = f"the status must be one of {', '.join(known)}, found '{run.status[row][:40]}'"
+        elif not np.isnan(pose).all():
+            reason = _why_no_pose(pose)
+        if reason is not None:
+            raise InputError(f"{run.folder / 'poses.csv'}, frame {run.index[row]}: {reason}")
+
+
+def _why_no_pose(numbers: Array) -> str | None:
+    """What keeps 27 numbers from being a pose."""
+    if not np.all(np.abs(numbers) <= _LARGEST):  # false for NaN
+        return f"a pose must be numbers up to {_LARGEST:g} (metres, radians), or absent"
+    length = np.linalg.norm(numbers[ORIENTATION])
+    return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.4g}"
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

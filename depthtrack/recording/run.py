@@ -108,10 +108,6 @@ class Run:
         """Read a run folder. Raises InputError when it holds no run, or a damaged one."""
         configuration, rows = read_configuration(folder), read_rows(folder)
         nowhere = np.full(POSE_SIZE, np.nan)
-        header, *timings = _read_table(folder / "timings.csv", None)
-        columns = np.array([[float(x) for x in cells[1:]] for cells in timings[: len(rows)]]).reshape(
-            -1, len(header) - 1
-        )
         return cls(
             folder,
             configuration,
@@ -121,7 +117,7 @@ class Run:
             np.array([row.energy for row in rows], dtype=np.float64),
             np.array([row.confidence for row in rows], dtype=np.float64),
             np.array([nowhere if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
-            {stage: columns[:, k] for k, stage in enumerate(header[1:])},
+            _read_timings(folder / "timings.csv", len(rows)),
         )
 
 
@@ -148,6 +144,23 @@ def read_rows(folder: Path) -> list[RunRow]:
         except (ValueError, IndexError) as error:
             raise InputError(f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error}") from error
     return rows
+
+
+def _read_timings(path: Path, count: int) -> dict[str, NDArray[np.float64]]:
+    """Milliseconds (T,) of each stage, of at most `count` frames. Raises InputError."""
+    header, *lines = _read_table(path, None)
+    if header[:1] != ["index"]:
+        raise InputError(f"{path} must begin with a line of columns, 'index' and the tracker's stages")
+    rows = []
+    for number, cells in enumerate(lines[:count], start=2):
+        try:
+            rows.append([float(cell) for cell in cells[1:]])
+        except ValueError as error:
+            raise InputError(f"{path}, line {number}: expected milliseconds: {error}") from error
+        if len(cells) != len(header):
+            raise InputError(f"{path}, line {number}: expected {len(header)} columns, found {len(cells)}")
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(header) - 1)
+    return {stage: columns[:, k] for k, stage in enumerate(header[1:])}
 
 
 def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
@@ -191,7 +204,7 @@ def _replace(path: Path, text: str) -> None:
 
 
 def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
-    """A run goes on only with the configuration it began with; threads, versions and machine may differ. Raises InputError."""
+    """A run goes on only as it began; threads, versions and machine may differ. Raises InputError."""
     for key in sorted(set(found) | set(wanted)):
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             raise InputError(

@@ -86,7 +86,7 @@ class RunPainter:
 
     def _skeleton(self, seen: Replayed, close: Moment) -> Image:
         camera = close.camera.resized(self._height / close.camera.height)
-        image = dimmed(paint(close, "colour", self._height, self._near, self._far))
+        image = dimmed(paint(close, "colour", self._height, self._near, self._far), 0.6)
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
         if truth is not None:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
@@ -104,7 +104,7 @@ class RunPainter:
         if layer == "hypothesis":
             return "hypothesis over depth", "" if seen.estimate.pose is not None else "no pose"
         if layer == "residual":
-            return "residual: nearer, farther", f"within {1000 * LARGEST:.0f} mm"
+            return "residual", "seen nearer red, farther blue"
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
         return "skeleton", "" if truth is None else "the true one thin"
 
