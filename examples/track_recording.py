@@ -1,0 +1,35 @@
+"""Track the hand through a recording, and print where the index finger's tip is: track_recording.py RECORDING."""
+
+import sys
+from contextlib import closing
+
+from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.observation.observation import Observer
+from depthtrack.recording import open_sequence
+from depthtrack.tracking.tracker import Status
+from depthtrack.tracking.trackers import create_tracker
+
+
+def main(path: str, tracker_name: str = "ik") -> int:
+    """Print a line a frame; gives the number of frames with a trusted pose."""
+    recording = open_sequence(path)
+    truth = recording.ground_truth
+    hand = truth.hand if truth is not None and truth.hand is not None else HandShape()
+    model, observer, tip, trusted = HandModel(hand), Observer.for_sequence(recording), "index_tip", 0
+    with closing(create_tracker(tracker_name, hand)) as tracker:
+        for frame in recording:
+            observation = observer.observe(frame)
+            if observation is None:
+                continue
+            estimate = tracker.track(observation)
+            if estimate.pose is None or estimate.status is Status.LOST:
+                continue
+            trusted += 1
+            x, y, z = 1000 * model.keypoints(estimate.pose)[KEYPOINT_NAMES.index(tip)]
+            print(f"{frame.timestamp:8.3f} s  {tip} at {x:6.1f} {y:6.1f} {z:6.1f} mm")
+    return trusted
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
