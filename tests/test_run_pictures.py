@@ -189,6 +189,7 @@ def test_a_page_shows_the_frames_asked_for(run: Path) -> None:
         (["view", "{run}", "--sheet", "a.png", "--frames", "99"], "none numbered 99"),
         (["view", "{run}", "--strip", "a.png"], "--strip is for recordings"),
         (["view", "{run}", "--depth-range", "1", "2"], "--depth-range is for recordings"),
+        (["view", "{run}", "--camera-preset", "tum"], "--camera-preset is for recordings"),
     ],
 )
 def test_what_cannot_be_shown_is_refused_in_a_sentence(

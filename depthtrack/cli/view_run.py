@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from depthtrack.evaluation.replay import Replay
 
 _NOT_FOR_RUNS = ("strip", "depth_range")
+_CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy", "depth_scale")
+"""A run brings its own."""
 
 
 def view_run(options: "Command") -> None:
@@ -18,9 +20,10 @@ def view_run(options: "Command") -> None:
     from depthtrack.evaluation.replay import Replay
     from depthtrack.recording.run import Run
 
-    for name in _NOT_FOR_RUNS:
-        if getattr(options, name) is not None:
-            raise InputError(f"--{name.replace('_', '-')} is for recordings: leave it out for the run")
+    for owner, names in ((options, _NOT_FOR_RUNS), (options.recording, _CAMERA)):
+        for name in names:
+            if getattr(owner, name) is not None:
+                raise InputError(f"--{name.replace('_', '-')} is for recordings: leave it out for a run")
     replay = Replay.open(Run.load(options.recording.path), options.sequence)
     if options.sheet is not None:
         _write_sheet(replay, options, options.sheet)
