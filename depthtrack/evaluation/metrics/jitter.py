@@ -15,9 +15,9 @@ def jitter(points: Array, timestamps: Array) -> Metric:
     """Distance of each point from the straight line between where it was and where it will be; mean, each frame, mm.
 
     `points` (T, P, 3) metres, NaN rows where there are none; `timestamps` (T,) seconds. Half the second difference of
-    the positions, the measure of smoothness of Kanazawa et al., "Learning 3D human dynamics from video", CVPR 2019,
-    Sec. 5 (the acceleration), in millimetres and without the frame rate squared. A hand that accelerates has some of
-    it without any trembling: 5 m/s^2 give 2.8 mm at 30 Hz. Noise of sigma in every coordinate gives about 1.95 sigma.
+    the positions, the measure of smoothness of Kanazawa et al., "Learning 3D human dynamics from video", CVPR 2019
+    (their acceleration), in millimetres and without the frame rate squared. A hand that accelerates has some of it
+    without any trembling: 5 m/s^2 give 2.8 mm at 30 Hz. Noise of sigma in every coordinate gives about 1.95 sigma.
     """
     return Metric("jitter_mm", "mm", _trembling(points, timestamps))
 

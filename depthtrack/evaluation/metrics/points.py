@@ -38,12 +38,12 @@ class PointErrors:
 
     def mean(self) -> Metric:
         """Mean over the points, each frame, mm. For endpoints, its mean over all frames is the error estimate Delta of
-        Oikonomidis et al. 2011, Sec. 3.1."""
+        Oikonomidis et al. 2011, Sec. 3."""
         return Metric(self.metric, "mm", _reduced(np.nanmean, self.mm))
 
     def largest(self) -> Metric:
         """The largest over the points, each frame, mm: what success is judged by in Taylor et al., "The Vitruvian
-        manifold", CVPR 2012, Sec. 5."""
+        manifold", CVPR 2012."""
         return Metric(f"largest_{self.metric}", "mm", _reduced(np.nanmax, self.mm))
 
     def of_finger(self, finger: str) -> Metric:
@@ -57,7 +57,7 @@ class PointErrors:
 
 
 def endpoint_errors(model: HandModel, poses: Array, true_model: HandModel, true_poses: Array) -> PointErrors:
-    """Distances of the 20 phalanx endpoints from the true ones (Oikonomidis et al. 2011, Sec. 3.1).
+    """Distances of the 20 phalanx endpoints from the true ones (Oikonomidis et al. 2011, Sec. 3).
 
     `poses`, `true_poses` (T, 27), NaN rows where there is none.
     """
@@ -76,7 +76,7 @@ def joint_errors(model: HandModel, poses: Array, joints: Array, names: tuple[str
 
     `poses` (T, 27), `joints` (T, J, 3) metres, camera frame, NaN where unknown; `names` (J,) of
     `kinematics.KEYPOINT_NAMES`, any of them in any order. The mean over joints and frames is the "mean joint error" of
-    Oberweger, Wohlhart and Lepetit, "Hands deep in deep learning", CVWW 2015, Sec. 4.1. Where skeletons place joints
+    Oberweger, Wohlhart and Lepetit, "Hands deep in deep learning", CVWW 2015. Where skeletons place joints
     differently, that difference is in the error.
     """
     order = [KEYPOINT_NAMES.index(name) for name in names]

@@ -34,7 +34,7 @@ def e3d(points: Array, model_points: Array) -> float:
     """Mean distance of observed points (N, 3) to the nearest of the model's visible surface (M, 3): mm, from metres.
 
     E3D of Tkach, Pauly and Tagliasacchi, "Sphere-meshes for real-time hand modeling and tracking", SIGGRAPH Asia
-    2016, Sec. 6. NaN without observed points, infinite without a visible model.
+    2016. NaN without observed points, infinite without a visible model.
     """
     if len(points) == 0:
         return float("nan")
@@ -49,8 +49,8 @@ def e3d(points: Array, model_points: Array) -> float:
 def e2d(rendered: Mask, observed: Mask) -> float:
     """Mean distance of the rendered pixels outside the observed silhouette to it, pixels; maps (h, w).
 
-    E2D of Tkach et al. 2016, Sec. 6, as Euclidean distance. 0 where none lies outside, NaN without an observed
-    silhouette.
+    E2D of Tkach et al. 2016, as Euclidean distance; their code takes half the city-block distance. 0 where none lies
+    outside, NaN without an observed silhouette.
     """
     if not observed.any():
         return float("nan")

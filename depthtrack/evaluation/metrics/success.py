@@ -17,7 +17,7 @@ REPORTED_MM = (10, 20, 30, 40)
 
 @dataclass(frozen=True)
 class SuccessCurve:
-    """Share of the frames whose largest error is under each threshold (Taylor et al., CVPR 2012, Sec. 5).
+    """Share of the frames whose largest error is under each threshold (Taylor et al., CVPR 2012).
 
     `thresholds_mm`, `shares` (K,), from 0 to LIMIT_MM; `auc` the area under the curve there, 1 for a perfect tracker;
     `frames` judged, of which those with a truth but without an estimate never succeed. `errors_mm` (frames,) are the
