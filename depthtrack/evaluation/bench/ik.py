@@ -10,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,9 +81,12 @@ SETTINGS: tuple[Setting, ...] = tuple(
 
 @dataclass(frozen=True)
 class IkRow:
-    """One setting. `points` matched, on average over the frames; best and median of many calls, averaged over the
-    frames: `iteration_us` microseconds an ICP iteration, `frame_ms` milliseconds a frame; `frames_per_s` from the best,
-    `frames_per_s_median` from the median; `calls` timed. `error_deg` and `error_mm` of the frames' poses."""
+    """One setting, over all frames.
+
+    `points` matched, on average. Best and median of many calls: `iteration_us` microseconds an ICP iteration,
+    `frame_ms` milliseconds a frame, of which median `stage_ms`; `frames_per_s` from the best, `frames_per_s_median`
+    from the median; `calls` timed. `error_deg` and `error_mm` of the frames' poses.
+    """
 
     points: int
     model: Model
@@ -96,6 +99,7 @@ class IkRow:
     iteration_us_median: float
     frame_ms: float
     frame_ms_median: float
+    stage_ms: dict[str, float]
     frames_per_s: float
     frames_per_s_median: float
     calls: int
@@ -144,8 +148,10 @@ def measure(film: Film, setting: Setting, seconds: float) -> IkRow:
     share = seconds / len(frames) / 2
     with closing(IkTracker(film.hand, setting.options(film))) as tracker:
         timed = [_time_frame(tracker, film, index, share) for index in frames]
-    poses, before, frame_s = (list(each) for each in zip(*timed, strict=True))
-    iteration_s = [_time_fit(film, setting, *each, share) for each in zip(frames, before, strict=True)]
+    poses, frame_s = np.array([each.pose for each in timed]), [each.seconds for each in timed]
+    iteration_s = [
+        _time_fit(film, setting, index, each.before, share) for index, each in zip(frames, timed, strict=True)
+    ]
     hand, truth = HandModel(film.hand), film.poses[frames]
     frame, frame_median = _best_and_median(frame_s)
     iteration, iteration_median = (each / setting.icp for each in _best_and_median(iteration_s))
@@ -161,26 +167,40 @@ def measure(film: Film, setting: Setting, seconds: float) -> IkRow:
         iteration_us_median=1e6 * iteration_median,
         frame_ms=1e3 * frame,
         frame_ms_median=1e3 * frame_median,
+        stage_ms={stage: float(np.mean([each.stage_ms[stage] for each in timed])) for stage in IkTracker.stages},
         frames_per_s=1 / frame,
         frames_per_s_median=1 / frame_median,
         calls=sum(map(len, frame_s)),
-        error_deg=float(angle_error(np.array(poses), truth).values.mean()),
-        error_mm=float(endpoint_error(hand, np.array(poses), hand, truth).values.mean()),
+        error_deg=float(angle_error(poses, truth).values.mean()),
+        error_mm=float(endpoint_error(hand, poses, hand, truth).values.mean()),
     )
 
 
-def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> tuple[Array, Array, Array]:
-    """Pose (27,) of a frame and of the one before it, and how long each call of the tracker took for it."""
+class _Timed(NamedTuple):
+    """A frame's `pose` (27,) and that of the frame `before` it; `seconds` of each call, median `stage_ms`."""
+
+    pose: Array
+    before: Array
+    seconds: Array
+    stage_ms: dict[str, float]
+
+
+def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> _Timed:
+    """How long the tracker takes from the frame before to this one."""
     before = [tracker.start(film[index - 2], film.poses[index - 2]), tracker.track(film[index - 1])]
+    made = list[Estimate]()
 
-    def track() -> Estimate:
+    def track() -> None:
         tracker.recall(before)
-        return tracker.track(film.again(index))
+        made.append(tracker.track(film.again(index)))
 
-    pose, last = track().pose, before[-1].pose
+    track()
+    durations = time_calls(track, seconds)
+    pose, last = made[-1].pose, before[-1].pose
     assert pose is not None
     assert last is not None
-    return pose, last, time_calls(track, seconds)
+    stages = {stage: float(np.median([each.stage_ms[stage] for each in made])) for stage in tracker.stages}
+    return _Timed(pose, last, durations, stages)
 
 
 def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
@@ -227,8 +247,14 @@ def as_text(report: IkReport) -> str:
             "",
             *aligned([head, *lines], left=2),
             "",
-            "frame: point cloud and normals of all pixels, prediction, alignment, ICP, energy and confidence",
+            "frame: points and normals of all pixels (observe), predict, align and fit, retry, energy and confidence",
+            *(f"first row, median: {_stages(row)}" for row in report.rows[:1]),
             "iteration: correspondences, and the Gauss-Newton steps on them; ICP: iterations x steps, at most",
             "Schroeder et al. 2014, on eight threads: 25 frames a second with 26 DoF, 30 with 6+6",
         ]
     )
+
+
+def _stages(row: IkRow) -> str:
+    rest = row.frame_ms_median - sum(row.stage_ms.values())
+    return ", ".join(f"{name} {ms:.2f}" for name, ms in [*row.stage_ms.items(), ("energy", rest)]) + " ms"
