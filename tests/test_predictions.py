@@ -64,7 +64,7 @@ def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(
         (["--benchmark", "msra"], "give one of them"),
         (["--benchmark", "msra", "--labels", "{short}"], "has 4 frames, but"),
         (["--benchmark", "nyu", "--labels", "{labels}"], "u v d of the 14 joints of nyu"),
-        (["--benchmark", "msra", "--labels", "{labels}", "{folder}"], "not both"),
+        (["--benchmark", "msra", "--labels", "{labels}", "{folder}"], "--predictions go without them"),
         (["--benchmark", "msra", "--sequence", "{folder}/gone"], "there is no recording"),
     ],
 )
