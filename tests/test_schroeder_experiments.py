@@ -74,6 +74,7 @@ def test_the_cells_are_the_papers() -> None:
     assert [(cell["synergies"], cell["soft"]) for cell in reduced] == [
         (name, soft) for name in ("other-grasps", "grasp") for soft in (False, True)
     ]
+    assert not any(cell["soft"] for cell in cells_of("schroeder-10", variant="paper"))
     for cell in reduced:
         synergies, count = basis(cell["synergies"]).synergies, cell["components"]
         assert synergies.variance_share(count - 1) < 0.99 <= synergies.variance_share(count)

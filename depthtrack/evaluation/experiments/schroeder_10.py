@@ -17,11 +17,12 @@ PAPER_DEG = {"all angles": 12.0, "synergies alone": 4.0}
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    """All angles; synergies of other grasps, alone and as what hidden fingers are drawn to; the motion's own."""
+    """All angles; synergies of other grasps, and of these, alone and (not in the paper) as what angles are drawn to."""
+    ways = (False,) if options.variant == "paper" else (False, True)
     spaces: list[Cell] = [{}]
     for name in dict.fromkeys([bases.chosen(options.synergies, OTHER_GRASPS), MOTION]):
         count = bases.basis(name).synergies.components_for(SHARE)
-        spaces += [{"synergies": name, "components": count, "soft": soft} for soft in (False, True)]
+        spaces += [{"synergies": name, "components": count, "soft": soft} for soft in ways]
     return schroeder.cells(options, ({"motion": MOTION} | space for space in spaces))
 
 
