@@ -242,7 +242,8 @@ def test_shares_of_the_variance_stand_beside_the_papers() -> None:
     assert found["variance in the first 3 of leap"] == 30.0
     assert found["variance in the first 6 of leap"] == 60.0
     assert found["variance in the first 2 of leap-grasps"] is None
-    assert found["mean error of grasp, 6 components of leap"] == 5.0
+    assert found["mean error of grasp, 6 of leap"] == 5.0
     mine = [row | {"synergies": "/data/mine.csv", "postures": None} for row in rows[:2]]
     assert list(said("schroeder-7", mine).values()) == [None, 30.0, 60.0, 5.0]
-    assert "mean error of its postures, 6 components of mine.csv" in said("schroeder-7", mine)
+    assert "mean error of its postures, 6 of mine" in said("schroeder-7", mine)
+    assert bases.label("/data/a-name-that-has-no-end.csv") == "a-name-that-h..."

@@ -16,6 +16,9 @@ from depthtrack.synthesis.motion_file import motion_names
 
 Array = NDArray[np.float64]
 
+_LABEL = 16
+"""Characters."""
+
 
 class Basis(NamedTuple):
     """Synergies, and the postures (N, 20), radians, that they were fitted to; None where only the synergies are at
@@ -48,6 +51,12 @@ def chosen(name: str | None, own: str) -> str:
     name = own if name is None else name
     basis(name)
     return str(Path(name).resolve()) if Path(name).exists() and name not in _ours() else name
+
+
+def label(name: str) -> str:
+    """The name as there is room for it beside a figure."""
+    stem = Path(name).stem
+    return stem if len(stem) <= _LABEL else f"{stem[: _LABEL - 3]}..."
 
 
 def motion_postures(motion: str) -> Array:

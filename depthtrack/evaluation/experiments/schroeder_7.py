@@ -80,7 +80,7 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
 def compare(rows: Sequence[Row]) -> list[Comparison]:
     shares = [
         Comparison(
-            f"variance in the first {count} of {_label(name)}",
+            f"variance in the first {count} of {bases.label(name)}",
             paper,
             value(rows, "variance_percent", synergies=name, components=count),
             "%",
@@ -90,7 +90,7 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
     ]
     errors = [
         Comparison(
-            f"mean error of {_postures(rows, name)}, 6 components of {_label(name)}",
+            f"mean error of {_postures(rows, name)}, 6 of {bases.label(name)}",
             "not told",
             value(rows, "error_deg", synergies=name, components=6),
             "deg",
@@ -104,7 +104,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     for number, name in enumerate(_names(rows)):
         mine = [row for row in rows if row["synergies"] == name]
         counts, colour = [row["components"] for row in mine], f"C{number}"
-        label = f"{_postures(rows, name)}, by components of {_label(name)}"
+        label = f"{_postures(rows, name)}, by components of {bases.label(name)}"
         axes.plot(counts, [row["particular_deg"] for row in mine], marker="o", color=colour, label=label)
         axes.plot(counts, [row["error_deg"] for row in mine], linestyle="--", color=colour)
     axes.plot([], [], linestyle="--", color="0.3", label="mean of all postures")
@@ -121,10 +121,6 @@ def _postures(rows: Sequence[Row], name: str) -> str:
     """What the synergies of this name are to approximate."""
     motion = next(row["postures"] for row in rows if row["synergies"] == name)
     return "its postures" if motion is None else str(motion)
-
-
-def _label(name: str) -> str:
-    return name.rpartition("/")[2]
 
 
 EXPERIMENT = Experiment(

@@ -91,7 +91,7 @@ def _names(rows: Sequence[Row]) -> list[str]:
 
 
 def _label(name: str) -> str:
-    return "of this motion" if name == schroeder.USUAL["motion"] else f"'{name.rpartition('/')[2]}'"
+    return "of this motion" if name == schroeder.USUAL["motion"] else f"'{bases.label(name)}'"
 
 
 def _hertz(rows: Sequence[Row], components: int | None) -> float | None:
