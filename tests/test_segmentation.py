@@ -84,6 +84,30 @@ def test_every_frame_may_be_the_first(sensor: str) -> None:
         assert overlap(Segmenter(None).segment(frame), mask) > 0.75
 
 
+def test_a_ring_of_fingers_is_seen_through() -> None:
+    """Thumb and index touch, and the shelf behind them has the colour of skin."""
+    segmenter = Segmenter(SkinModel.default())
+    for index in range(284, 296, 2):
+        frame, mask, _ = made(CLUTTERED, index)
+        found = segmenter.segment(frame)
+    assert found is not None
+    whole = np.zeros_like(mask)
+    whole[found.window.slices] = found.skin
+    behind = ~mask & (frame.depth > 1.0)
+    assert np.sum(whole & behind) < 0.01 * np.sum(mask)
+
+
+@pytest.mark.parametrize("model", ["skin", "primitives"])
+def test_hands_of_both_kinds_are_cut_at_the_same_wrist(model: str) -> None:
+    options = replace(CLUTTERED, model=model)  # type: ignore[arg-type]
+    segmenter = Segmenter(SkinModel.default())
+    overlaps = []
+    for index in range(200, 240, 4):
+        frame, mask, _ = made(options, index)
+        overlaps.append(overlap(segmenter.segment(frame), mask))
+    assert np.mean(overlaps) > 0.94
+
+
 def test_depth_alone_follows_the_hand() -> None:
     segmenter = Segmenter(None)
     for index in range(0, 20, 2):

@@ -1,7 +1,11 @@
 """Arm and wrist: breadth and direction of a tube seen at any slant, and the wrist's memory."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from depthtrack.camera import Camera
 from depthtrack.hand.primitives import CYLINDER, SPHERE, cone, ellipsoid
@@ -11,16 +15,22 @@ from depthtrack.observation.palm import Palm, find_palms, palm_near, tips
 from depthtrack.observation.view import share_of_blocks
 from depthtrack.observation.window import Window
 from depthtrack.observation.wrist import (
-    GUESS_SIGMA,
-    HAND_LENGTH,
-    SEEN_SIGMA,
-    SURPRISE,
+    BREADTH_WEIGHT,
+    BROAD,
+    BROADEST,
+    FEWEST_BEHIND,
+    FLARE,
+    NARROW,
+    NEIGHBOURS,
+    SPREAD,
     WRIST_TO_PALM,
-    WristFilter,
     WristPlane,
     arm_nodes,
     find_wrist,
+    hand_axis,
+    likeliest_wrist,
 )
+from depthtrack.observation.wrist_filter import GUESS_SIGMA, HAND_LENGTH, SEEN_SIGMA, SURPRISE, WristFilter
 from depthtrack.rendering.raycast import raycast
 
 CAMERA = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
@@ -56,7 +66,7 @@ def test_arm_and_wrist_of_a_club_at_any_slant(degrees: float) -> None:
     # Nodes at the outline are lost, the more so where the tube is farther away.
     np.testing.assert_allclose(seen[tube], 0.061, atol=0.013)
     assert np.ptp(seen[tube]) < 0.008
-    wrist = find_wrist(grid, palm, arm)
+    wrist = find_wrist(grid, palm, arm, WRIST)
     assert wrist is not None
     assert wrist == pytest.approx(0.04, abs=0.02)
 
@@ -106,13 +116,84 @@ def test_the_wrist_stays_where_it_is_while_the_palm_is_mistaken() -> None:
     assert wrist.guess(palm_at(-0.05)) == pytest.approx(0.11, abs=0.005)
 
 
-def test_a_wrist_that_jumps_is_something_else() -> None:
+def test_a_wrist_that_jumps_is_believed_by_and_by() -> None:
+    wrist = WristFilter()
+    for _ in range(20):
+        wrist.update(palm_at(0.0), ARM, 0.06)
+    at_once = wrist.update(palm_at(0.0), ARM, 0.06 + 2 * SURPRISE * SEEN_SIGMA)
+    assert 0.06 < at_once < 0.06 + 0.5 * SURPRISE * SEEN_SIGMA
+    for _ in range(60):
+        later = wrist.update(palm_at(0.0), ARM, 0.13)
+    assert later == pytest.approx(0.13, abs=0.005)
+
+
+def test_a_wrist_that_jumps_while_the_hand_shows_its_edge_is_something_else() -> None:
     wrist = WristFilter()
     for _ in range(5):
-        wrist.update(palm_at(0.0), ARM, 0.06)
+        wrist.update(palm_at(0.0, radius=0.02), ARM, 0.06)
     far = 0.06 + 2 * SURPRISE * SEEN_SIGMA
-    assert wrist.update(palm_at(0.0), ARM, far) == pytest.approx(0.06, abs=1e-3)
-    assert wrist.update(palm_at(0.0), ARM, 0.07) == pytest.approx(0.066, abs=0.003)
+    assert wrist.update(palm_at(0.0, radius=0.02), ARM, far) == pytest.approx(0.06, abs=1e-3)
+    assert 0.061 < wrist.update(palm_at(0.0, radius=0.02), ARM, 0.07) < 0.07
+
+
+def slow_wrist(seen: np.ndarray, visible: int, guess: float) -> float:
+    """What `likeliest_wrist` finds, in plain words."""
+    found = []
+    for j in range(1, visible - FEWEST_BEHIND):
+        behind, before = seen[j : min(j + NEIGHBOURS, visible)], seen[max(j - NEIGHBOURS, 0) : j]
+        threshold = NARROW * min(behind)
+        comes_down = seen[j - 1] > threshold >= seen[j]
+        if comes_down and max(behind) <= FLARE * min(behind) and max(before) >= BROAD * threshold:
+            place = np.interp(threshold, [seen[j], seen[j - 1]], [BIN_MIDDLES[j], BIN_MIDDLES[j - 1]])
+            breadth = min(max(before) / threshold, BROADEST)
+            found.append((((place - guess) / SPREAD) ** 2 - BREADTH_WEIGHT * breadth, place))
+    return float(min(found)[1]) if found else np.nan
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_likeliest_wrist_is_the_one_described(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    # A hand that comes down to a forearm, with noise that makes other places look like it.
+    slope = np.clip((rng.uniform(0.03, 0.15) - BIN_MIDDLES) / 0.03, 0, 1)
+    seen = 0.055 + rng.uniform(0, 0.04) * slope + rng.normal(0, 0.002, len(BIN_MIDDLES))
+    visible, guess = int(rng.integers(0, len(seen) + 1)), float(rng.uniform(0.03, 0.13))
+    np.testing.assert_allclose(likeliest_wrist(seen, visible, guess), slow_wrist(seen, visible, guess), rtol=1e-9)
+
+
+def test_what_broadens_again_is_no_forearm() -> None:
+    # Fingers, their narrow base, the palm, and the forearm.
+    seen = np.interp(BIN_MIDDLES, [0, 0.03, 0.055, 0.09, 0.2], [0.08, 0.045, 0.085, 0.055, 0.065])
+    assert likeliest_wrist(seen, len(seen), 0.04) == pytest.approx(0.085, abs=0.01)
+    assert np.isnan(likeliest_wrist(np.full(50, 0.06), 50, 0.05))
+
+
+@pytest.mark.parametrize("degrees", [-25, 0, 25])
+def test_a_bent_wrist_is_cut_across_the_hand(degrees: float) -> None:
+    bend = np.radians(degrees)
+    c, s = np.cos(bend), np.sin(bend)
+    hand = np.eye(4)
+    hand[:3, 3] = [0, 0, 0.5]
+    arm = np.array([[c, -s, 0, 0.0], [s, c, 0, 0.05], [0, 0, 1, 0.5], [0, 0, 0, 1.0]])
+    placed = np.stack(
+        [
+            hand @ ellipsoid((0.0, 0.0, 0.0), (0.045, 0.055, 0.030)),
+            hand @ ellipsoid((0.0, -0.07, 0.0), (0.012, 0.05, 0.012)),
+            arm @ cone((0.0, -0.01, 0.0), 0.3, 0.030, 0.032),
+        ]
+    )
+    depth = raycast(CAMERA, np.array([SPHERE, SPHERE, CYLINDER]), placed, np.arange(3)).depth.astype(np.float32)
+    grid = Grid.over(depth, CAMERA, Window.whole(CAMERA), (0.2, 0.95), 5)
+    palm = min(find_palms(grid, grid), key=lambda palm: float(np.linalg.norm(palm.centre - [0, 0, 0.5])))
+    forearm = find_arm(grid, palm, WRIST)
+    assert forearm is not None
+    across = hand_axis(grid, palm, forearm, WRIST)
+    assert across.exits is forearm.exits
+    # In the image; towards the camera it leans by as much as the palm is thicker than the wrist.
+    lean, forearm_lean = (abs(np.arctan2(each.direction[0], each.direction[1])) for each in (across, forearm))
+    assert lean < np.radians(6)
+    if degrees != 0:
+        assert lean < 0.6 * forearm_lean
+    assert hand_axis(grid, replace(palm, radius=0.02), forearm, WRIST) is forearm
 
 
 def test_noise_is_averaged() -> None:

@@ -75,19 +75,21 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
         left, top = tight.left - window.left, tight.top - window.top
         coloured = view.skin[top : top + tight.height, left : left + tight.width] > 0
         r = max(1, round(DILATION * frame.camera.width))
-        silhouette = _silhouette(kinds, coloured, r)
+        silhouette = _silhouette(kinds, coloured, frame.depth[tight.slices] == 0, r)
         readings = readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
     room = round(ROOM * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
     roi = tight.grown(max(room - MARGIN * stride, 0), frame.camera)
     return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
 
 
-def _silhouette(kinds: NDArray[np.uint8], coloured: Mask, r: int) -> Mask:
-    """The hand's silhouette (h, w) from the kinds of its pixels and where they are `coloured` like skin."""
+def _silhouette(kinds: NDArray[np.uint8], coloured: Mask, missing: Mask, r: int) -> Mask:
+    """The hand's silhouette (h, w) from the kinds of its pixels, where they are `coloured` like skin, and where
+    readings are `missing`."""
     readings = kinds == READING
     inside = readings & (cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0)
-    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 2))) > 0
-    filled = closed | ((kinds <= MISSING) & _enclosed(closed))
+    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 4))) > 0
+    # Through a ring of fingers one sees what is behind: what is read there is not filled.
+    filled = closed | (missing & _enclosed(closed))
     return inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
 
 
@@ -106,7 +108,7 @@ def _smoothed(mask: Mask, r: int) -> Mask:
     """
     side = 2 * (r // 2) + 1
     share = cv2.boxFilter(mask.astype(np.uint8) * 200, -1, (side, side), borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(share > 90)
+    return np.asarray(share > 85)
 
 
 def _blocks_of_hand(labels: Labels) -> Window:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from depthtrack.observation.arm import find_arm
 from depthtrack.observation.grid import Grid
 from depthtrack.observation.palm import SMALLEST_AREA, Palm, find_palms, finger_area
-from depthtrack.observation.wrist import anatomical_guess, narrowest_place
+from depthtrack.observation.wrist import narrowest_place
+from depthtrack.observation.wrist_filter import anatomical_guess
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from depthtrack.observation.search import find_start, nearest_palm
 from depthtrack.observation.skin_colour import AdaptiveSkin, SkinModel
 from depthtrack.observation.view import View, blind_skin, look
 from depthtrack.observation.window import Window
-from depthtrack.observation.wrist import WristFilter, WristPlane, arm_nodes, find_wrist, palm_centre
+from depthtrack.observation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
+from depthtrack.observation.wrist_filter import WristFilter
 from depthtrack.recording.sequence import Frame
 
 Array = NDArray[np.float64]
@@ -134,10 +135,11 @@ class Segmenter:
             self._arm_direction = None
             return None, palm.centre, None
         self._arm_direction = arm.direction
-        seen = find_wrist(view.grid, palm, arm)
-        distance = self._wrist.update(palm, arm, seen)
-        centre = palm.centre if seen is not None else palm_centre(view.grid, palm, arm, distance)
-        plane = WristPlane(palm.centre + (distance + self._wrist_margin) * arm.direction, arm.direction)
+        axis = hand_axis(view.grid, palm, arm, guess)
+        seen = find_wrist(view.grid, palm, axis, guess)
+        distance = self._wrist.update(palm, axis, seen)
+        centre = palm.centre if seen is not None else palm_centre(view.grid, palm, axis, distance)
+        plane = WristPlane(palm.centre + (distance + self._wrist_margin) * axis.direction, axis.direction)
         return arm, centre, plane
 
     def _forget_arm(self) -> None:

@@ -1,7 +1,9 @@
-"""Where the hand ends: at the wrist, where it has come down to the forearm's breadth. No wristband is needed."""
+"""Where the hand ends: at the wrist, behind which the forearm is narrowest. No wristband is needed."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,32 +16,37 @@ Array = NDArray[np.float64]
 WRIST_TO_PALM = 0.046
 """Metres from the wrist to the palm's centre: half the palm's length of `HandShape`."""
 
-PALM_HALF_LENGTH = 0.05
-"""Metres from the palm's centre within which the hand is broadest."""
-
 FOREARM = (0.03, 0.12)
-"""Metres from the palm's centre between which the forearm's narrowest place is looked for."""
+"""Metres from the palm's centre between which an arm's narrowest place tells a hand from an elbow."""
 
-NARROW = 1.13
-"""The wrist is where the breadth comes within this factor of the forearm's narrowest, just behind it. The narrowest
-place itself is ill-defined: some forearms hardly taper."""
+NARROW = 1.09
+"""The wrist is where the breadth comes within this factor of the narrowest place behind it. The narrowest place itself
+is ill-defined: some forearms hardly taper."""
 
-BROAD_PALM = 0.025
-"""Metres; an inscribed circle of this radius is the palm, seen from its front or back."""
+BROAD = 1.05
+"""Factor on that by which the hand before it must be broader, for its end to be seen; BROADEST is as good as any."""
 
-BROAD = 1.15
-"""Factor on that by which a hand must be broader, for its end to be seen."""
+BROADEST = 1.5
 
-HAND_LENGTH, GUESS_RANGE = 0.18, (0.04, 0.13)
-"""Metres along the surface from the farthest fingertip to the wrist, the fingers a little bent; and between which the
-wrist is guessed from the palm's centre, where the image tells no better."""
+FLARE = 1.4
+"""Factor by which a forearm broadens within NEIGHBOURS bins, at most; what broadens faster is the hand again."""
 
-GUESS_SIGMA, STEP_SIGMA, SEEN_SIGMA = 0.03, 0.008, 0.008
-"""Metres, standard deviations: of such a guess, of the wrist's motion along the arm from one frame to the next, and of
-what is seen of it."""
+NEIGHBOURS, FEWEST_BEHIND = 12, 4
+"""Bins of `breadth` before and behind a place that are compared with it, 48 mm either way, and how many must be seen
+behind."""
 
-SURPRISE = 3.5
-"""Standard deviations beyond which what is seen is taken for something else."""
+SPREAD, BREADTH_WEIGHT = 0.03, 4.0
+"""Of several places, the one nearest to the guess (in units of so many metres, squared) and with the broadest hand
+before it is the wrist."""
+
+FLAT_PALM = 0.033
+"""Metres; an inscribed circle of this radius is the palm seen from its front or back, whose middle lies on its axis."""
+
+SHORTEST_AXIS = 0.01
+"""Metres from the palm's centre to the wrist, at least, for the hand's direction to be taken from one to the other."""
+
+LARGEST_BEND = 0.94
+"""Cosine of the angle between hand and forearm that is believed, at most."""
 
 
 @dataclass(frozen=True)
@@ -51,23 +58,34 @@ class WristPlane:
     normal: Array
 
 
-def find_wrist(grid: Grid, palm: Palm, arm: Arm) -> float | None:
-    """Distance (m) of the wrist from the palm's centre along the arm: where the hand has come down to the forearm's
-    breadth. None where the hand is hardly broader than the wrist, as when it is seen from its side.
+def find_wrist(grid: Grid, palm: Palm, arm: Arm, guess: float) -> float | None:
+    """Distance (m) of the wrist from the palm's centre along the arm, about `guess` metres away: where the hand comes
+    down to the breadth of the forearm behind. None where it hardly does, as when a flat hand is seen from its side.
     """
-    if palm.radius < BROAD_PALM:
-        return None
-    seen = breadth(grid, palm, arm)
-    forearm = (FOREARM[0] < BIN_MIDDLES) & (min(FOREARM[1], _visible_end(grid, palm, arm)) > BIN_MIDDLES)
-    if not forearm.any():
-        return None
-    wrist = NARROW * seen[forearm].min()
-    widest = int(np.argmax(seen[BIN_MIDDLES < PALM_HALF_LENGTH]))
-    if seen[widest] < BROAD * wrist:
-        return None
-    beyond = int(np.argmax(seen[widest:] <= wrist)) + widest
-    above, below = seen[beyond - 1] - wrist, wrist - seen[beyond]
-    return float(BIN_MIDDLES[beyond - 1] + BIN * above / (above + below))
+    visible = int(np.searchsorted(BIN_MIDDLES, _visible_end(grid, palm, arm)))
+    place = likeliest_wrist(breadth(grid, palm, arm), visible, guess)
+    return None if math.isnan(place) else place
+
+
+@numba.njit(cache=True)
+def likeliest_wrist(seen: Array, visible: int, guess: float) -> float:
+    """Distance (m) at which the breadth `seen` (bins,) most looks like a wrist, of its first `visible` bins; NaN for
+    none. `guess` (m) is about where."""
+    best, lowest = np.nan, np.inf
+    for j in range(1, visible - FEWEST_BEHIND):
+        behind = seen[j : min(j + NEIGHBOURS, visible)]
+        wrist = NARROW * behind.min()
+        if not seen[j - 1] > wrist >= seen[j] or behind.max() > FLARE * behind.min():
+            continue
+        hand = seen[max(j - NEIGHBOURS, 0) : j].max() / wrist
+        if hand < BROAD:
+            continue
+        # The first bin's middle is half a bin away from the palm's centre.
+        place = BIN * (j + 0.5 - (wrist - seen[j]) / (seen[j - 1] - seen[j]))
+        cost = ((place - guess) / SPREAD) ** 2 - BREADTH_WEIGHT * min(hand, BROADEST)
+        if cost < lowest:
+            best, lowest = place, cost
+    return best
 
 
 def narrowest_place(grid: Grid, palm: Palm, arm: Arm) -> float:
@@ -88,11 +106,30 @@ def _visible_end(grid: Grid, palm: Palm, arm: Arm) -> float:
 def palm_centre(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Array:
     """The palm's centre (3,) on the visible surface, metres, by its distance from the wrist: the middle of the hand's
     cross-section there. It replaces the widest place where that need not be the palm."""
+    section = _section(grid, palm, arm, wrist_distance - WRIST_TO_PALM, 0.015)
+    return palm.centre if section is None else section
+
+
+def hand_axis(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Arm:
+    """The arm with the direction from the palm's centre to the wrist, about `wrist_distance` (m) away, in place of the
+    forearm's, where that is seen: a bent wrist is cut across the palm, as `HandShape` has it."""
+    if palm.radius < FLAT_PALM:
+        return arm
+    wrist = _section(grid, palm, arm, wrist_distance, 0.008)
+    if wrist is None:
+        return arm
+    middle = palm.centre if wrist_distance > SHORTEST_AXIS else palm_centre(grid, palm, arm, wrist_distance)
+    along = (wrist - middle) / np.linalg.norm(wrist - middle)
+    return replace(arm, direction=along) if float(along @ arm.direction) > LARGEST_BEND else arm
+
+
+def _section(grid: Grid, palm: Palm, arm: Arm, distance: float, half_width: float) -> Array | None:
+    """Middle (3,) of what is seen of the arm `distance` from the palm's centre, give or take `half_width`; metres."""
     points = grid.points[palm.paths.reached().ravel()]
-    along = (points - palm.centre) @ arm.direction - (wrist_distance - WRIST_TO_PALM)
+    along = (points - palm.centre) @ arm.direction
     aside = np.linalg.norm(np.cross(points - palm.centre, arm.direction), axis=1)
-    section = points[(np.abs(along) < 0.015) & (aside < ARM_HALF_BREADTH)]
-    return np.asarray(section.mean(axis=0)) if len(section) else palm.centre
+    section = points[(np.abs(along - distance) < half_width) & (aside < ARM_HALF_BREADTH)]
+    return np.asarray(section.mean(axis=0)) if len(section) else None
 
 
 def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
@@ -109,50 +146,3 @@ def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
     goes_on[labels.ravel()[arm.exits]] = True
     goes_on[-1] = False
     return goes_on[labels]
-
-
-class WristFilter:
-    """Where the wrist is along the arm, over time: a Kalman filter on one number.
-
-    The wrist is assumed to stay where it is along the forearm's axis (across it, the arm itself is seen to move), so
-    that it is known while the hand shows its edge.
-    """
-
-    def __init__(self) -> None:
-        self.forget()
-
-    def forget(self) -> None:
-        """Start again from anatomy."""
-        self._point: Array | None = None
-        self._variance = 0.0
-
-    def guess(self, palm: Palm) -> float:
-        """About how far (m) the wrist is from the palm's centre, before the arm is known."""
-        return anatomical_guess(palm) if self._point is None else float(np.linalg.norm(self._point - palm.centre))
-
-    def update(self, palm: Palm, arm: Arm, seen: float | None) -> float:
-        """Distance (m) of the wrist from the palm's centre along the arm, given what is `seen` of it in this frame.
-
-        Where nothing is seen of it, anatomy takes the place of sight.
-        """
-        measured, sigma = (anatomical_guess(palm), GUESS_SIGMA) if seen is None else (seen, SEEN_SIGMA)
-        if self._point is None:
-            distance, self._variance = measured, sigma**2
-        else:
-            distance = float((self._point - palm.centre) @ arm.direction)
-            self._variance += STEP_SIGMA**2
-            uncertainty = self._variance + sigma**2
-            if (measured - distance) ** 2 < SURPRISE**2 * uncertainty:
-                gain = self._variance / uncertainty
-                distance += gain * (measured - distance)
-                self._variance *= 1 - gain
-        self._point = palm.centre + distance * arm.direction
-        return distance
-
-
-def anatomical_guess(palm: Palm) -> float:
-    """Distance (m) of the wrist from the palm's centre, from the palm alone."""
-    if palm.radius > BROAD_PALM:
-        return WRIST_TO_PALM
-    # The widest place may be anywhere on a hand that shows its edge; its length is what is known.
-    return min(max(HAND_LENGTH - palm.tip_distance, GUESS_RANGE[0]), GUESS_RANGE[1])
