@@ -108,6 +108,20 @@ def first(typing_context: Any, a: types.Type) -> Any:
 
 
 @intrinsic
+def eight(typing_context: Any, a: types.Type, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any) -> Any:
+    """A vector of eight float64 scalars."""
+    vector = Vector(types.float64, 8)
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        value = ir.Constant(vector.llvm(), ir.Undefined)
+        for lane, scalar in enumerate(arguments):
+            value = builder.insert_element(value, scalar, ir.Constant(ir.IntType(32), lane))
+        return value
+
+    return (vector(*(8 * [a])), generate) if {a, b, c, d, e, f, g, h} == {types.float64} else None
+
+
+@intrinsic
 def narrow(typing_context: Any, a: types.Type) -> Any:
     """The same lanes in float32."""
     if element_of(a) != types.float64:

@@ -16,9 +16,11 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin import Skin
 from depthtrack.observation.observation import Observation
 from depthtrack.tracking.ik.chain import Bodies
+from depthtrack.tracking.ik.closest import FAR, LANES, closest_vertices
 from depthtrack.tracking.ik.matching import Cloud, Matches
 
 Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
 Index = NDArray[np.int64]
 
 
@@ -77,13 +79,14 @@ class Posed(NamedTuple):
 class Seen(NamedTuple):
     """The vertices that the camera sees, sorted by cell: cell c holds those from `first[c]` up to `first[c + 1]`.
 
-    `body` (S,), `x` and `n` (S, 3) as in `matching.Matches`.
+    `vertex` (S,) tells which they are; `table` (6, S + LANES) their coordinates, less `origin` (3,), and normals; it
+    ends with LANES that are far away.
     """
 
     first: Index
-    body: Index
-    x: Array
-    n: Array
+    vertex: Index
+    table: Array32
+    origin: Array
 
 
 class Cells(NamedTuple):
@@ -112,7 +115,8 @@ class MeshSurface:
     def match(self, pose: Array, bodies: Bodies, cloud: Cloud, matches: Matches) -> None:
         skin_vertices(self._model, bodies, self._posed)
         seen = sort_seen(self._model, self._posed, self._cells, _HIDDEN)
-        closest_vertices(cloud, seen, self._cells, self._reach, self._agreement, matches)
+        closest_vertices(cloud, seen, self._cells, self._reach, self._agreement, matches.body)
+        take_up(self._model, self._posed, seen, matches)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -196,61 +200,26 @@ def sort_seen(model: MeshModel, posed: Posed, cells: Cells, tolerance: float) ->
     for c in range(1, first.shape[0]):
         first[c] += first[c - 1]
     total = first[-1]
-    seen = Seen(first, np.empty(total, np.int64), np.empty((total, 3)), np.empty((total, 3)))
+    seen = Seen(first, np.empty(total, np.int64), np.full((6, total + LANES), FAR), posed.x[0].copy())
     place = first[:-1].copy()
     for v in range(count):
         if cell[v] < 0:
             continue
         k = place[cell[v]]
         place[cell[v]] += 1
-        seen.body[k] = model.bodies[v, 0]
+        seen.vertex[k] = v
         for j in range(3):
-            seen.x[k, j], seen.n[k, j] = posed.x[v, j], posed.n[v, j]
+            seen.table[j, k], seen.table[3 + j, k] = posed.x[v, j] - seen.origin[j], posed.n[v, j]
     return seen
 
 
 @numba.njit(cache=True, nogil=True)
-def closest_vertices(cloud: Cloud, seen: Seen, cells: Cells, reach: float, agreement: float, matches: Matches) -> None:
-    """The seen vertex closest to each point: see `matching.Surface`. It counts as fixed to the body that moves it
+def take_up(model: MeshModel, posed: Posed, seen: Seen, matches: Matches) -> None:
+    """Complete the matches, whose `body` tells a seen vertex as yet: it counts as fixed to the body that moves it
     most."""
-    points, normals = cloud.points, cloud.normals
-    # Rays through image points that are d apart pass a point at depth z no closer than d z / |(u, v, 1)|.
-    u = max(abs(cells.u), abs(cells.u + cells.columns * cells.size))
-    v = max(abs(cells.v), abs(cells.v + cells.rows * cells.size))
-    slant = 1.0 / math.sqrt(1.0 + u * u + v * v)
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
-        # The point's place among the cells, and what a cell's side is worth there.
-        p, q, side = (x / z - cells.u) / cells.size, (y / z - cells.v) / cells.size, cells.size * z * slant
-        column, row = int(p), int(q)
-        best, chosen = reach * reach, -1
-        ring = 1
-        while True:
-            left, right = max(column - ring, 0), min(column + ring, cells.columns - 1)
-            for r in range(max(row - ring, 0), min(row + ring, cells.rows - 1) + 1):
-                base = r * cells.columns
-                whole = ring == 1 or r == row - ring or r == row + ring
-                # Cells beside one another hold vertices that lie beside one another; of a ring's middle rows, only
-                # both ends are new.
-                for end in range(1 if whole else 2):
-                    low = left if whole or end == 0 else right
-                    high = right if whole or end == 1 else left
-                    for k in range(seen.first[base + low], seen.first[base + high + 1]):
-                        dx, dy, dz = seen.x[k, 0] - x, seen.x[k, 1] - y, seen.x[k, 2] - z
-                        d = dx * dx + dy * dy + dz * dz
-                        same = nx * seen.n[k, 0] + ny * seen.n[k, 1] + nz * seen.n[k, 2]
-                        # Selected rather than branched upon: no processor foresees which vertex comes closer.
-                        better = (d < best) & (same >= agreement)
-                        best = d if better else best
-                        chosen = k if better else chosen
-            # The next ring begins where the nearest side of this one's square ends.
-            margin = (ring + min(p - column, column + 1 - p, q - row, row + 1 - q)) * side
-            if margin * margin >= best:
-                break
-            ring += 1
-        matches.body[i] = -1
-        if chosen >= 0:
-            matches.body[i] = seen.body[chosen]
+    for i in range(matches.body.shape[0]):
+        if matches.body[i] >= 0:
+            v = seen.vertex[matches.body[i]]
+            matches.body[i] = model.bodies[v, 0]
             for j in range(3):
-                matches.x[i, j], matches.n[i, j] = seen.x[chosen, j], seen.n[chosen, j]
+                matches.x[i, j], matches.n[i, j] = posed.x[v, j], posed.n[v, j]

@@ -20,12 +20,16 @@ from depthtrack.tracking.ik.chain import Bodies
 Array = NDArray[np.float64]
 
 
-class Moments(NamedTuple):
-    """Sums over residuals e with gradients a (6,) by twist: `M` (16, 6, 6) of a a^T, `g` (16, 6) of a e, `e` (16,) of
-    e^2 (m^2); `T` (16, 3, 4) where the bodies were, `centre` (3,) the point the twists refer to."""
+ROW = 8
+"""Places of a row of the sums: six of a a^T, one of a e, and one to spare."""
 
-    M: Array
-    g: Array
+
+class Moments(NamedTuple):
+    """Sums over residuals e with gradients a (6,) by twist: `sums` (16, 6, ROW), in each row of a body six of a a^T
+    and one of a e; `e` (16,) of e^2 (m^2); `T` (16, 3, 4) where the bodies were, `centre` (3,) the point the twists
+    refer to."""
+
+    sums: Array
     e: Array
     T: Array
     centre: Array
@@ -34,13 +38,13 @@ class Moments(NamedTuple):
     def empty() -> "Moments":
         """No residuals yet."""
         n = BODY_COUNT
-        return Moments(np.zeros((n, 6, 6)), np.zeros((n, 6)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
+        return Moments(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
 
 
 @numba.njit(cache=True, nogil=True)
 def clear(moments: Moments, bodies: Bodies) -> None:
     """Forget all residuals; the bodies are where they are now."""
-    moments.M[:], moments.g[:], moments.e[:] = 0.0, 0.0, 0.0
+    moments.sums[:], moments.e[:] = 0.0, 0.0
     moments.T[:] = bodies.T
     moments.centre[:] = bodies.T[0, :, 3]
 
@@ -69,10 +73,9 @@ def energy(moments: Moments, bodies: Bodies) -> float:
         twist(moments, bodies, b, s)
         total += moments.e[b]
         for j in range(6):
-            Ms = moments.M[b, j, j] * s[j]
-            for k in range(j):
-                Ms += 2 * moments.M[b, j, k] * s[k]
-            total += s[j] * (2 * moments.g[b, j] + Ms)
+            row = moments.sums[b, j]
+            Ms = row[0] * s[0] + row[1] * s[1] + row[2] * s[2] + row[3] * s[3] + row[4] * s[4] + row[5] * s[5]
+            total += s[j] * (2 * row[6] + Ms)
     return 0.5 * total
 
 
@@ -90,14 +93,12 @@ def normal_equations(moments: Moments, bodies: Bodies, H: Array, gradient: Array
         twist(moments, bodies, b, s)
         total += moments.e[b]
         for j in range(6):
-            for k in range(j + 1):
-                M[b, j, k] = M[b, k, j] = moments.M[b, j, k]
-        for j in range(6):
             Ms = 0.0
             for k in range(6):
+                M[b, j, k] = moments.sums[b, j, k]
                 Ms += M[b, j, k] * s[k]
-            total += s[j] * (2 * moments.g[b, j] + Ms)
-            g[b, j] = moments.g[b, j] + Ms
+            total += s[j] * (2 * moments.sums[b, j, 6] + Ms)
+            g[b, j] = moments.sums[b, j, 6] + Ms
         _shift(M[b], g[b], s[0], s[1], s[2])
     H[:], gradient[:] = 0.0, 0.0
     c, palm = moments.centre, bodies.T[0]

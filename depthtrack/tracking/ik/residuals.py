@@ -3,11 +3,17 @@
 import math
 from typing import Literal
 
-import numba
 import numpy as np
+from numpy.typing import NDArray
 
+from depthtrack.rendering.raster.simd import F64X8, kernel_part, loader, store
+from depthtrack.rendering.raster.simd_functions import eight
 from depthtrack.tracking.ik.matching import Cloud, Matches
-from depthtrack.tracking.ik.moments import Moments
+from depthtrack.tracking.ik.moments import ROW, Moments
+
+Array = NDArray[np.float64]
+
+_load = loader(F64X8)
 
 Residual = Literal["point", "plane", "symmetric"]
 """`point`: x - y, as in Schroeder et al. 2014, Eq. (3). `plane`: along the hand's normal n (Chen and Medioni, "Object
@@ -21,78 +27,71 @@ def add_matches(moments: Moments, matches: Matches, cloud: Cloud, residual: Resi
     Each is weighted as Geman and McClure's estimator does: by 1 for near points, 1/4 at a distance of `softness` (m).
     A `softness` of 0 weighs all alike.
     """
-    if residual == "point":
-        add_points(moments, matches, cloud, softness)
-    else:
-        add_planes(moments, matches, cloud, softness, residual == "symmetric")
+    add = add_points if residual == "point" else add_symmetric if residual == "symmetric" else add_planes
+    add(moments.sums.reshape(-1), moments.e, moments.centre, matches, cloud, softness)
 
 
-@numba.njit(cache=True, nogil=True)
-def add_planes(moments: Moments, matches: Matches, cloud: Cloud, softness: float, symmetric: bool) -> None:
-    """Add the distances of matches along normals: see `Residual`."""
-    M, g, c = moments.M, moments.g, moments.centre
-    x, n, y, m = matches.x, matches.n, cloud.points, cloud.normals
-    a = np.empty(6)
+@kernel_part
+def add_planes(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
+    """Add the distances of matches along the hand's normals."""
     for i in range(matches.body.shape[0]):
-        b = matches.body[i]
-        if b < 0:
-            continue
-        nx, ny, nz = n[i, 0], n[i, 1], n[i, 2]
-        if symmetric:
-            nx, ny, nz = nx + m[i, 0], ny + m[i, 1], nz + m[i, 2]
-            scale = 1.0 / math.sqrt(max(nx * nx + ny * ny + nz * nz, 1e-12))
-            nx, ny, nz = nx * scale, ny * scale, nz * scale
-        ex, ey, ez = x[i, 0] - y[i, 0], x[i, 1] - y[i, 1], x[i, 2] - y[i, 2]
-        w, e = weight(ex, ey, ez, softness), nx * ex + ny * ey + nz * ez
-        px, py, pz = x[i, 0] - c[0], x[i, 1] - c[1], x[i, 2] - c[2]
-        a[0], a[1], a[2] = nx, ny, nz
-        a[3], a[4], a[5] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-        for j in range(6):
-            wa = w * a[j]
-            g[b, j] += wa * e
-            for k in range(j + 1):
-                M[b, j, k] += wa * a[k]
-        moments.e[b] += w * e * e
+        if matches.body[i] >= 0:
+            n = matches.n[i]
+            _add(sums, total, centre, matches, cloud, i, softness, n[0], n[1], n[2])
 
 
-@numba.njit(cache=True, nogil=True)
-def add_points(moments: Moments, matches: Matches, cloud: Cloud, softness: float) -> None:
+@kernel_part
+def add_symmetric(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
+    """Add the distances of matches along the mean of the hand's and the observed normals."""
+    for i in range(matches.body.shape[0]):
+        if matches.body[i] >= 0:
+            n, m = matches.n[i], cloud.normals[i]
+            x, y, z = n[0] + m[0], n[1] + m[1], n[2] + m[2]
+            scale = 1.0 / math.sqrt(max(x * x + y * y + z * z, 1e-12))
+            _add(sums, total, centre, matches, cloud, i, softness, x * scale, y * scale, z * scale)
+
+
+@kernel_part
+def add_points(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
     """Add the distances of matches, all three coordinates."""
-    M, g, c = moments.M, moments.g, moments.centre
-    x, y = matches.x, cloud.points
     for i in range(matches.body.shape[0]):
-        b = matches.body[i]
-        if b < 0:
-            continue
-        ex, ey, ez = x[i, 0] - y[i, 0], x[i, 1] - y[i, 1], x[i, 2] - y[i, 2]
-        px, py, pz = x[i, 0] - c[0], x[i, 1] - c[1], x[i, 2] - c[2]
-        w = weight(ex, ey, ez, softness)
-        # v shifts a point as it is, the turn by its product with p: the gradient of the coordinates is (1, -[p]x).
-        M[b, 0, 0] += w
-        M[b, 1, 1] += w
-        M[b, 2, 2] += w
-        M[b, 3, 1] -= w * pz
-        M[b, 3, 2] += w * py
-        M[b, 4, 0] += w * pz
-        M[b, 4, 2] -= w * px
-        M[b, 5, 0] -= w * py
-        M[b, 5, 1] += w * px
-        M[b, 3, 3] += w * (py * py + pz * pz)
-        M[b, 4, 4] += w * (px * px + pz * pz)
-        M[b, 5, 5] += w * (px * px + py * py)
-        M[b, 4, 3] -= w * px * py
-        M[b, 5, 3] -= w * px * pz
-        M[b, 5, 4] -= w * py * pz
-        g[b, 0] += w * ex
-        g[b, 1] += w * ey
-        g[b, 2] += w * ez
-        g[b, 3] += w * (py * ez - pz * ey)
-        g[b, 4] += w * (pz * ex - px * ez)
-        g[b, 5] += w * (px * ey - py * ex)
-        moments.e[b] += w * (ex * ex + ey * ey + ez * ez)
+        if matches.body[i] >= 0:
+            _add(sums, total, centre, matches, cloud, i, softness, 1.0, 0.0, 0.0)
+            _add(sums, total, centre, matches, cloud, i, softness, 0.0, 1.0, 0.0)
+            _add(sums, total, centre, matches, cloud, i, softness, 0.0, 0.0, 1.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@kernel_part
+def _add(
+    sums: Array,
+    total: Array,
+    centre: Array,
+    matches: Matches,
+    cloud: Cloud,
+    i: int,
+    softness: float,
+    nx: float,
+    ny: float,
+    nz: float,
+) -> None:
+    """Add the residual of match i along a direction n."""
+    b, x, y = matches.body[i], matches.x[i], cloud.points[i]
+    ex, ey, ez = x[0] - y[0], x[1] - y[1], x[2] - y[2]
+    px, py, pz = x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]
+    # v shifts a point as it is, the turn by its product with p.
+    tx, ty, tz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    w, e = weight(ex, ey, ez, softness), nx * ex + ny * ey + nz * ez
+    row, at = eight(nx, ny, nz, tx, ty, tz, e, 0.0), ROW * 6 * b
+    store(sums, at, _load(sums, at) + row * (w * nx))
+    store(sums, at + ROW, _load(sums, at + ROW) + row * (w * ny))
+    store(sums, at + 2 * ROW, _load(sums, at + 2 * ROW) + row * (w * nz))
+    store(sums, at + 3 * ROW, _load(sums, at + 3 * ROW) + row * (w * tx))
+    store(sums, at + 4 * ROW, _load(sums, at + 4 * ROW) + row * (w * ty))
+    store(sums, at + 5 * ROW, _load(sums, at + 5 * ROW) + row * (w * tz))
+    total[b] += w * e * e
+
+
+@kernel_part
 def weight(ex: float, ey: float, ez: float, softness: float) -> float:
     """Geman and McClure's weight of a distance."""
     if softness <= 0.0:
