@@ -38,9 +38,12 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
 
 def compare(rows: Sequence[Row]) -> list[Comparison]:
     skin, cylinders = (schroeder.value(rows, "error_deg", model=model, components=None) for model in MODELS)
+    skin_mm, cylinders_mm = (schroeder.value(rows, "error_mm", model=model, components=None) for model in MODELS)
     lines = [
         Comparison("joint angle error, all angles, mesh", "about 2 deg", skin, "deg"),
         Comparison("joint angle error, all angles, cylinders", "about 4 deg", cylinders, "deg"),
+        Comparison("endpoint error, all angles, mesh", "not told", skin_mm, "mm"),
+        Comparison("endpoint error, all angles, cylinders", "not told", cylinders_mm, "mm"),
     ]
     for name in _names(rows):
         skin, cylinders = (
