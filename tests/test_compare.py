@@ -26,6 +26,7 @@ from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.recording.run import Run
 from depthtrack.tracking.tracker import Estimate, Status
+from tests.test_sweep import dask_scheduler, dask_workers
 
 FRAMES = 8
 QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"
@@ -186,6 +187,16 @@ def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, t
     assert main(command[3:]) == 0
     for run in (compared / "runs").iterdir():
         assert (folder / "runs" / run.name / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+
+
+def test_a_dask_cluster_makes_the_same_runs(recording: Path, compared: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = ["compare", str(recording), "-o", str(out), "--trackers", QUICK, "--repeats", "2"]
+    with dask_scheduler(tmp_path) as (address, _), dask_workers(address, tmp_path):
+        assert main([*arguments, "--scheduler", address]) == 0
+    for run in (compared / "runs").iterdir():
+        assert (out / "runs" / run.name / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+    assert len(json.loads((out / "results.json").read_text())) == 4
 
 
 def test_other_options_need_another_folder(recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -49,7 +49,8 @@ def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
         ("machine", _together([_pairs(run.get("machine")) for run in runs if run.get("machine")])),
     ]
     if budgets:
-        found = _together([f"{budget.get('calibrated_ms')} ms" for budget in budgets])
+        times = [budget.get("calibrated_ms") for budget in budgets]
+        found = _together([f"{ms} ms" if ms is not None else "no hand found, so not" for ms in times])
         facts.insert(
             2, ("equal time", f"{_together([b.get('equal_ms') for b in budgets])} ms asked, {found} calibrated")
         )

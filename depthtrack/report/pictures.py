@@ -106,12 +106,14 @@ class SideBySide:
             truth = true_keypoints(self.sequence.ground_truth, float(times[index]))
             if truth is not None and np.isfinite(truth).all():
                 found[n, :] = truth
+        place = {index: n for n, index in enumerate(self.indices)}
+        untold = np.isnan(found[:, -1, 0, 0])
         for k, panel in enumerate(self._panels):
-            model = HandModel(panel.replay.hand)
-            for n, index in enumerate(self.indices):
-                row = panel.row_of.get(index)
-                if row is not None and np.isnan(found[n, -1, 0, 0]) and panel.replay.run.status[row] != "lost":
-                    found[n, k] = model.keypoints(panel.replay.run.poses[row])
+            run = panel.replay.run
+            keypoints = HandModel(panel.replay.hand).keypoints(run.poses)
+            keypoints[[status == "lost" for status in run.status]] = np.nan
+            places = np.array([place[int(index)] for index in run.index], dtype=np.intp)
+            found[places, k] = np.where(untold[places, None, None], keypoints, found[places, k])
         out = np.full((len(self.indices), 21, 3), np.nan)
         known = np.isfinite(found).all(axis=(2, 3))
         some = known.any(axis=1)

@@ -62,7 +62,8 @@ def calibrate(
 ) -> Budget:
     """Find the work that takes `ms` of CPU time a frame, by timing frames at several places of the first `count`.
 
-    Where even the least or the most work misses `ms`, the nearest is taken; its own time is told.
+    Where even the least or the most work misses `ms`, the nearest is taken; its own time is told. Where the hand is not
+    found, nothing is chosen.
     """
     places = _stretches(recording, count, observer, hand, tracker, options)
     if not places:

@@ -61,6 +61,8 @@ def compare(
 
     Raises InputError where a recording cannot be used or `folder` holds runs of other options, before any work.
     """
+    # Workers may stand elsewhere.
+    folder = folder.resolve()
     totals = {source: source.count(source.open()) for source in comparison.sources}
     budgets = _budgets(comparison, folder, workers, listener)
     plans = _plans(comparison, folder, budgets)

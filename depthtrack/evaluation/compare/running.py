@@ -1,6 +1,7 @@
 """One run of a comparison: a contender on a recording with a seed, into its own run folder; goes on where it stood."""
 
 import json
+import math
 import time
 from collections.abc import Sequence as Rows
 from contextlib import closing
@@ -134,7 +135,9 @@ def calibrate_cell(cell: Cell) -> Row:
     sequence = source.open()
     hand, observer = source.hand_of(sequence), source.observer(sequence)
     budget = calibrate(sequence, source.count(sequence), observer, hand, cell["tracker"], cell["options"], cell["ms"])
-    return {"chosen": budget.options, "calibrated_ms": round(budget.ms, 3)}
+    # JSON knows no infinity: no hand was followed anywhere.
+    ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
+    return {"chosen": budget.options, "calibrated_ms": ms}
 
 
 def _write_done(folder: Path, done: dict[str, Any]) -> None:
