@@ -255,11 +255,13 @@ def test_likely_postures_are_those_of_probabilistic_components(seed: int, count:
     np.testing.assert_allclose(prior.precision @ covariance, 1e-6 * np.eye(20), atol=1e-12)
     pose = random_pose(np.random.default_rng(seed))
     damping = Damping(0.0, 0.0, *prior.scaled(2.0), avoid_limits=False)
-    H, gradient = np.zeros((26, 26)), np.zeros(26)
-    energy = solver._add_prior(pose, damping, H, gradient)
-    away = pose[ANGLES] - synergies.mean
-    assert energy == pytest.approx(away @ prior.precision @ away)
-    assert energy == pytest.approx(solver._prior(pose, damping))
-    np.testing.assert_allclose(H[6:, 6:], 2 * prior.precision)
-    slope = _slope(lambda step: solver._prior(retract(pose, step), damping), 26)
-    np.testing.assert_allclose(gradient, slope, atol=1e-6 * max(1, float(np.abs(slope).max())))
+    for space in (FULL, Space.of(load_synergies("leap-grasps"), 4)):
+        size = 6 + space.basis.shape[1]
+        A, b = np.zeros((size, size)), np.zeros(size)
+        pull = solver._reduced_precision(damping, space)
+        energy = solver._add_prior(pose, damping, space, pull, A, b)
+        away = pose[ANGLES] - synergies.mean
+        assert energy == pytest.approx(away @ prior.precision @ away)
+        np.testing.assert_allclose(A[6:, 6:], 2 * space.basis.T @ prior.precision @ space.basis, atol=1e-15)
+        np.testing.assert_allclose(b[6:], 2 * space.basis.T @ prior.precision @ away, atol=1e-12)
+        assert not A[:6].any()

@@ -15,6 +15,9 @@ from depthtrack.tracking.ik.space import Space
 
 Array = NDArray[np.float64]
 
+_ENOUGH = 3e-5
+"""Metres or radians below which a step is the last one on these correspondences."""
+
 
 class Damping(NamedTuple):
     """What holds the solution back.
@@ -61,10 +64,12 @@ def solve(
     H, gradient = np.empty((26, 26)), np.empty(26)
     A, b, tangent = np.empty((size, size)), np.empty(size), np.empty(26)
     trial, trial_coordinates = np.empty(27), np.empty(count)
+    pull = _reduced_precision(damping, space)
     place(chain, pose, bodies)
     for _ in range(iterations):
-        current = normal_equations(moments, bodies, H, gradient) + _add_prior(pose, damping, H, gradient)
+        current = normal_equations(moments, bodies, H, gradient)
         _reduce(H, gradient, space, A, b)
+        current += _add_prior(pose, damping, space, pull, A, b)
         for i in range(3):
             A[i, i] += damping.pose
             A[3 + i, 3 + i] += damping.pose * 1e-2
@@ -104,7 +109,7 @@ def solve(
             break
         pose[:] = trial
         coordinates[:] = trial_coordinates
-        if largest < 1e-6:
+        if largest < _ENOUGH:
             break
     return energy(moments, bodies) + _prior(pose, damping)
 
@@ -130,24 +135,38 @@ def _reduce(H: Array, gradient: Array, space: Space, A: Array, b: Array) -> None
         b[:] = gradient
         return
     B, count = space.basis, space.basis.shape[1]
+    A[:] = 0.0
+    b[:] = 0.0
     A[:6, :6] = H[:6, :6]
     b[:6] = gradient[:6]
-    HB = np.zeros((26, count))
-    for i in range(26):
-        for j in range(20):
-            h = H[i, 6 + j]
-            for k in range(count):
-                HB[i, k] += h * B[j, k]
-    for k in range(count):
-        for i in range(6):
-            A[i, 6 + k] = A[6 + k, i] = HB[i, k]
-    A[6:, 6:] = 0.0
-    b[6:] = 0.0
+    HB = np.empty(count)
     for j in range(20):
-        for i in range(count):
-            b[6 + i] += B[j, i] * gradient[6 + j]
+        row, first = 6 + j, j - j % 4
+        for k in range(count):
+            b[6 + k] += B[j, k] * gradient[row]
+            # What an angle shares with those of other fingers is nothing.
+            HB[k] = H[row, 6 + first] * B[first, k] + H[row, 7 + first] * B[first + 1, k]
+            HB[k] += H[row, 8 + first] * B[first + 2, k] + H[row, 9 + first] * B[first + 3, k]
+        for i in range(6):
             for k in range(count):
-                A[6 + i, 6 + k] += B[j, i] * HB[6 + j, k]
+                A[i, 6 + k] += H[i, row] * B[j, k]
+        for i in range(count):
+            for k in range(i + 1):
+                A[6 + i, 6 + k] += B[j, i] * HB[k]
+    for i in range(6):
+        for k in range(count):
+            A[6 + k, i] = A[i, 6 + k]
+    for i in range(count):
+        for k in range(i):
+            A[6 + k, 6 + i] = A[6 + i, 6 + k]
+
+
+@numba.njit(cache=True, nogil=True)
+def _reduced_precision(damping: Damping, space: Space) -> Array:
+    """The prior's precision (l, 20) between the space's parameters and the angles."""
+    if space.full:
+        return damping.precision
+    return space.basis.T.copy() @ damping.precision
 
 
 @numba.njit(cache=True, nogil=True)
@@ -163,16 +182,18 @@ def _prior(pose: Array, damping: Damping) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_prior(pose: Array, damping: Damping, H: Array, gradient: Array) -> float:
-    total = 0.0
-    for i in range(20):
-        row = 0.0
+def _add_prior(pose: Array, damping: Damping, space: Space, pull: Array, A: Array, b: Array) -> float:
+    """Add the prior to the space's normal equations, `pull` being its `_reduced_precision`; returns `_prior`."""
+    count = pull.shape[0]
+    for i in range(count):
         for j in range(20):
-            H[6 + i, 6 + j] += damping.precision[i, j]
-            row += damping.precision[i, j] * (pose[7 + j] - damping.rest[j])
-        gradient[6 + i] += row
-        total += row * (pose[7 + i] - damping.rest[i])
-    return 0.5 * total
+            b[6 + i] += pull[i, j] * (pose[7 + j] - damping.rest[j])
+            if space.full:
+                A[6 + i, 6 + j] += pull[i, j]
+            else:
+                for k in range(count):
+                    A[6 + i, 6 + k] += pull[i, j] * space.basis[j, k]
+    return _prior(pose, damping)
 
 
 @numba.njit(cache=True, nogil=True)
