@@ -86,10 +86,11 @@ class Fitter:
         rounds: int | None = None,
         prior: Prior | None = None,
         coarse: bool = False,
+        align: bool = True,
     ) -> Array:
         """The pose (27,) reached from `pose` by moving what `space` lets move.
 
-        `coarse` looks at every fourth of the points alone.
+        `coarse` looks at every fourth of the points alone; without `align`, the hand is not moved as a whole before.
         """
         options = self.options
         cloud, matches = (self._coarse, self._coarse_matches) if coarse else (self._cloud, self._matches)
@@ -98,7 +99,7 @@ class Fitter:
         pose = pose.copy()
         coordinates = space.project(pose[ANGLES])
         pose[ANGLES] = space.angles(coordinates)
-        for _ in range(options.rigid):
+        for _ in range(options.rigid if align else 0):
             self._align(pose)
         slope = np.array([limit_slope(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
         state = Solution(pose, coordinates, slope)

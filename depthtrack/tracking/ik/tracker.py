@@ -136,9 +136,11 @@ class IkTracker:
         ahead = ahead[np.argsort(self._scorer.score(ahead), kind="stable")]
         clock.lap("predict")
         prior = self._likely or Prior.held(last[ANGLES], self._fitter.options.hold)
-        found = self._fitter.fit(ahead[0], self._space, prior=prior)
+        # In a few synergies, the steps themselves align the hand as well; nor does their energy tell when to try again.
+        careful = self._space.full or self.options.variant == "paper"
+        found = self._fitter.fit(ahead[0], self._space, prior=prior, align=careful)
         clock.lap("fit")
-        if self.options.variant == "default":
+        if self._space.full and self.options.variant == "default":
             found = self._reconsider(found, ahead[1:], prior)
             clock.lap("retry")
         return self._settle(found, Status.TRACKED, clock)
