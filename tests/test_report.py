@@ -287,6 +287,6 @@ def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, 
     lines = lines_of([*evaluations[:2], evaluate_run(skin, residuals=False)])
     told = fairness({"model": "skin"}, lines)
     assert told.startswith("Home ground")
-    assert "that Skin fits, and Far <b>, Near do not" in told
-    assert "that Far <b>, Near fit, and Skin does not" in fairness({"model": "primitives"}, lines)
+    assert "that Skin fits, and Far <b> and Near do not" in told
+    assert "that Far <b> and Near fit, and Skin does not" in fairness({"model": "primitives"}, lines)
     assert fairness({"sensor": "kinect1"}, lines) == ""

@@ -5,6 +5,7 @@ from typing import Any
 
 from depthtrack.evaluation.compare.results import Line
 from depthtrack.recording.sequence import Sequence as Recording
+from depthtrack.report.words import listed
 
 Fact = tuple[str, str]
 
@@ -69,7 +70,7 @@ def fairness(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
         return ""
     hand = "the skin" if drawn == "skin" else "the spheres and cylinders"
     fit, do = ("fits" if len(favoured) == 1 else "fit"), ("does" if len(others) == 1 else "do")
-    first, rest = ", ".join(favoured), ", ".join(others)
+    first, rest = listed(favoured), listed(others)
     return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
 
 

@@ -29,7 +29,7 @@ Image = NDArray[np.uint8]
 
 _TRUE: Rgb = (255, 255, 255)
 _MOST_BESIDE = 3
-"""More panels than this go into a second row."""
+"""More panels than this go into two rows."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class SideBySide:
     def picture(self, frame: Frame) -> Image:
         """All trackers' panels of a frame, each under its tracker's name and error."""
         tiles = [self._tile(k, frame) for k in range(len(self._panels))]
-        return tile_grid(tiles, columns=min(len(tiles), _MOST_BESIDE))
+        return tile_grid(tiles, columns=len(tiles) if len(tiles) <= _MOST_BESIDE else -(-len(tiles) // 2))
 
     def _tile(self, k: int, frame: Frame) -> Image:
         panel, row = self._panels[k], self._panels[k].row_of.get(frame.index)

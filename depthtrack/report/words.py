@@ -95,10 +95,10 @@ def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
     first, *others = [standing for standing in found if np.isfinite(standing.error)]
     against = [f"{standing.label}'s {_mm(standing.error)}" for standing in others]
     told = f"{first.label}'s {error_name(lines)} is {_mm(first.error)}{where(lines)}"
-    told += f", {_listed(against)}." if against else "."
+    told += f", {listed(against)}." if against else "."
     alike = [standing.label for standing in found if standing.error < ALIKE * first.error]
     if len(alike) > 1:
-        return f"{_listed(alike)} follow the hand equally closely", told
+        return f"{listed(alike)} follow the hand equally closely", told
     if len(found) == 2:
         return f"{first.label} follows the hand more closely than {found[1].label}", told
     return f"Of {_count(len(found))} trackers, {first.label} follows the hand most closely", told
@@ -112,15 +112,18 @@ def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
         counts = {label: list(winners.values()).count(label) for label in labels}
         ordered = sorted((label for label in labels if counts[label]), key=lambda label: -counts[label])
         parts = [f"{label} on {counts[label]}" for label in ordered]
-        return headline, f"Of {len(winners)} recordings, the closest is {_listed(parts)}."
+        return headline, f"Of {len(winners)} recordings, the closest is {listed(parts)}."
     parts = []
     for source, label in winners.items():
         own = [line for line in lines if line.source == source]
         best = next(line for line in own if line.label == label)
-        errors = [(line.label, _error(line, lines)) for line in own if line.label != label]
-        others = _listed([f"{other} {_mm(error)}" for other, error in errors if error is not None] or ["none other"])
-        parts.append(f"{label} on {best.recording} ({_mm(_error(best, lines) or 0)} {_name(best)}; {others})")
-    return headline, f"Closest are {_listed(parts)}."
+        told = f"{_mm(_error(best, lines) or 0)} {_name(best)}"
+        if len(labels) == 2:
+            other = next((line for line in own if line.label != label), None)
+            error = None if other is None else _error(other, lines)
+            told += "" if other is None or error is None else f"; {other.label} {_mm(error)}"
+        parts.append(f"{label} on {best.recording} ({told})")
+    return headline, f"Closest are {listed(parts)}."
 
 
 def _winners(lines: Sequence[Line]) -> dict[str, str]:
@@ -146,7 +149,7 @@ def _speeds(found: Sequence[Standing], equal_ms: float | None) -> str:
     timed = sorted(((s.ms, s.label) for s in found if s.ms is not None), key=lambda pair: pair[0])
     if len(timed) < 2:
         return ""
-    told = _listed([f"{label} {ms:.1f}{_SPACE}ms" for ms, label in timed])
+    told = listed([f"{label} {ms:.1f}{_SPACE}ms" for ms, label in timed])
     if equal_ms is not None:
         return f"Each was given {equal_ms:g}{_SPACE}ms a frame; taken were: {told}."
     (fast, quickest), (slow, slowest) = timed[0], timed[-1]
@@ -162,7 +165,7 @@ def _losses(found: Sequence[Standing]) -> str:
         return "The hand was never lost."
     lost = [f"{s.label} in {s.lost} of {s.frames} frames" for s in found if s.lost]
     never = [s.label for s in found if not s.lost]
-    return f"The hand was lost by {_listed(lost)}" + (f"; never by {_listed(never)}." if never else ".")
+    return f"The hand was lost by {listed(lost)}" + (f"; never by {listed(never)}." if never else ".")
 
 
 def _mm(value: float) -> str:
@@ -170,7 +173,8 @@ def _mm(value: float) -> str:
     return f"{number}{_SPACE}mm"
 
 
-def _listed(parts: Sequence[str]) -> str:
+def listed(parts: Sequence[str]) -> str:
+    """The parts as a sentence lists them."""
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
