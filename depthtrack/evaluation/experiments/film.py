@@ -20,8 +20,9 @@ Array = NDArray[np.float64]
 ROOM = 0.04
 """Metres around the hand's silhouette that the region of interest takes in."""
 
-FILMS_KEPT = 2
-"""A film of 360 frames at half a metre takes 150 MB: experiments go through their conditions one after another."""
+FILMS_KEPT = 1
+"""A film of 360 frames at half a metre takes 160 MB: experiments go through their conditions one after another, and a
+worker that grows by 300 MB is taken for leaking."""
 
 
 class Film:
@@ -86,5 +87,5 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
 
 @lru_cache(maxsize=FILMS_KEPT)
 def film(recording: Synthesis) -> Film:
-    """The film of a recording: this process makes it once, and keeps the last few."""
+    """The film of a recording: this process makes it once, and keeps the last one."""
     return Film(recording)
