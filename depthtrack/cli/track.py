@@ -83,6 +83,7 @@ class Command:
             RunWriter(self.out, configuration, ("segment", *tracker.stages), self.resume) as run,
             tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
         ):
+            bar.set_postfix_str("the first use compiles kernels")
             for row in track_sequence(sequence, observer, tracker, HandModel(hand), run, start_pose, count):
                 bar.update()
                 bar.set_postfix_str(row.status)

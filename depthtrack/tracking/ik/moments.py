@@ -41,10 +41,10 @@ class Moments(NamedTuple):
         return Moments(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
 
 
-@numba.njit(cache=True, nogil=True)
 def clear(moments: Moments, bodies: Bodies) -> None:
     """Forget all residuals; the bodies are where they are now."""
-    moments.sums[:], moments.e[:] = 0.0, 0.0
+    moments.sums.fill(0.0)
+    moments.e.fill(0.0)
     moments.T[:] = bodies.T
     moments.centre[:] = bodies.T[0, :, 3]
 
@@ -100,7 +100,9 @@ def normal_equations(moments: Moments, bodies: Bodies, H: Array, gradient: Array
             total += s[j] * (2 * moments.sums[b, j, 6] + Ms)
             g[b, j] = moments.sums[b, j, 6] + Ms
         _shift(M[b], g[b], s[0], s[1], s[2])
-    H[:], gradient[:] = 0.0, 0.0
+    for i in range(26):
+        for j in range(26):
+            H[i, j] = 0.0
     c, palm = moments.centre, bodies.T[0]
     columns, F = np.zeros((26, 6)), np.empty(6)
     for j in range(3):
@@ -126,8 +128,10 @@ def normal_equations(moments: Moments, bodies: Bodies, H: Array, gradient: Array
                     _hinge(bodies, inner, c, columns[6 + inner])
                     H[6 + a, 6 + inner] = _dot(columns[6 + inner], F)
             parent = b - 1 if phalanx > 0 else 0
-            M[parent] += M[b]
-            g[parent] += g[b]
+            for i in range(6):
+                g[parent, i] += g[b, i]
+                for j in range(6):
+                    M[parent, i, j] += M[b, i, j]
     for i in range(6):
         _apply(M[0], columns[i], F)
         gradient[i] = _dot(columns[i], g[0])

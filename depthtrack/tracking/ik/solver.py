@@ -81,8 +81,8 @@ def solve(
             # At its limit and pushed beyond, a parameter takes no part.
             push = -b[6 + i]
             if (coordinates[i] <= space.lower[i] and push < 0) or (coordinates[i] >= space.upper[i] and push > 0):
-                A[6 + i, :] = 0.0
-                A[:, 6 + i] = 0.0
+                for j in range(size):
+                    A[6 + i, j] = A[j, 6 + i] = 0.0
                 A[6 + i, 6 + i] = 1.0
                 b[6 + i] = 0.0
         if not cholesky_solve(A, b):
@@ -107,8 +107,10 @@ def solve(
         if not improved:
             place(chain, pose, bodies)
             break
-        pose[:] = trial
-        coordinates[:] = trial_coordinates
+        for i in range(27):
+            pose[i] = trial[i]
+        for i in range(count):
+            coordinates[i] = trial_coordinates[i]
         if largest < _ENOUGH:
             break
     return energy(moments, bodies) + _prior(pose, damping)
@@ -130,15 +132,14 @@ def _tangent_angles(space: Space, pose: Array, coordinates: Array, tangent: Arra
 @numba.njit(cache=True, nogil=True)
 def _reduce(H: Array, gradient: Array, space: Space, A: Array, b: Array) -> None:
     """Normal equations of the space's parameters: J_PC = J M, Eq. (8)."""
+    B, count, size = space.basis, space.basis.shape[1], b.shape[0]
+    for i in range(size):
+        kept = space.full or i < 6
+        b[i] = gradient[i] if kept else 0.0
+        for j in range(size):
+            A[i, j] = H[i, j] if kept and (space.full or j < 6) else 0.0
     if space.full:
-        A[:] = H
-        b[:] = gradient
         return
-    B, count = space.basis, space.basis.shape[1]
-    A[:] = 0.0
-    b[:] = 0.0
-    A[:6, :6] = H[:6, :6]
-    b[:6] = gradient[:6]
     HB = np.empty(count)
     for j in range(20):
         row, first = 6 + j, j - j % 4
@@ -166,7 +167,13 @@ def _reduced_precision(damping: Damping, space: Space) -> Array:
     """The prior's precision (l, 20) between the space's parameters and the angles."""
     if space.full:
         return damping.precision
-    return space.basis.T.copy() @ damping.precision
+    count = space.basis.shape[1]
+    pull = np.zeros((count, 20))
+    for i in range(count):
+        for k in range(20):
+            for j in range(20):
+                pull[i, j] += space.basis[k, i] * damping.precision[k, j]
+    return pull
 
 
 @numba.njit(cache=True, nogil=True)
