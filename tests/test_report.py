@@ -220,11 +220,15 @@ def test_rare_peaks_leave_the_scale_readable(evaluations: list[Evaluation]) -> N
 class Told(Line):
     """A line with the figures it is given."""
 
-    def __init__(self, recording: str, label: str, error: float | None, ms: float = 10.0, lost: int = 0) -> None:
+    def __init__(
+        self, recording: str, label: str, error: float | None, ms: float = 10.0, lost: int = 0, e3d: float = 2.0
+    ) -> None:
         super().__init__(recording, label, ())
         object.__setattr__(self, "_told", (error, ms, lost))
+        object.__setattr__(self, "_figures", {"tracker_ms": ms, "endpoint_error_mm": error, "e3d_mm": e3d})
 
     _told: tuple[float | None, float, int]
+    _figures: dict[str, float | None]
 
     source = property(lambda self: self.recording)
     frames = property(lambda self: 100)
@@ -232,7 +236,7 @@ class Told(Line):
     truth = property(lambda self: None if self._told[0] is None else "endpoint_error_mm")
 
     def figure(self, metric: str, statistic: str) -> float | None:
-        return self._told[1] if metric == "tracker_ms" else self._told[0] if metric == "endpoint_error_mm" else None
+        return self._figures.get(metric)
 
 
 def said(lines: list[Line], **more: Any) -> str:
@@ -275,9 +279,16 @@ def test_different_winners_are_told_apart() -> None:
 
 
 def test_recordings_without_a_truth_are_left_out_of_errors() -> None:
-    text = said([Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", None), Told("b", "B", None)])
+    lines: list[Line] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", None), Told("b", "B", None, e3d=1.0)]
+    text = said(lines)
+    assert "Where no truth is known, the sensor's points lie nearest to B on 1 of 1." in text
     assert "A's mean endpoint error is 3.0 mm on the one of two recordings with a known truth, B's 4.0 mm." in text
     assert [round(each.error, 6) for each in standings([Told("a", "A", 3.0), Told("b", "A", 5.0)])] == [4.0]
+
+
+def test_who_finds_no_hand_is_not_judged_by_the_easy_recordings_alone() -> None:
+    lines: list[Line] = [Told("a", "A", 3.0), Told("b", "A", 9.0), Told("a", "B", 2.0), Told("b", "B", None)]
+    assert [(each.label, each.error) for each in standings(lines)] == [("A", 6.0), ("B", float("inf"))]
 
 
 def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, runs: list[Path]) -> None:

@@ -57,16 +57,17 @@ def where(lines: Sequence[Line]) -> str:
 
 
 def standings(lines: Sequence[Line]) -> list[Standing]:
-    """All trackers, the closest first; trackers that could not be judged come last, with an infinite error."""
+    """All trackers, the closest first; with an infinite error those that found no hand where others are judged."""
+    judged = set(_winners(lines))
     found = []
     for label in dict.fromkeys(line.label for line in lines):
         own = [line for line in lines if line.label == label]
-        errors = [error for line in own if (error := _error(line, lines)) is not None]
+        errors = {line.source: error for line in own if (error := _error(line, lines)) is not None}
         times = [ms for line in own if (ms := line.figure(TRACKER_MS, "median")) is not None]
         found.append(
             Standing(
                 label,
-                float(np.mean(errors)) if errors else float("inf"),
+                float(np.mean(list(errors.values()))) if errors and judged <= set(errors) else float("inf"),
                 float(np.mean(times)) if times else None,
                 sum(line.lost for line in own),
                 sum(line.frames for line in own),
@@ -87,7 +88,8 @@ def verdict(lines: Sequence[Line], equal_ms: float | None = None) -> Verdict:
         return Verdict(f"{first.label} follows the hand to {_mm(first.error)}", (told, _losses(found)))
     winners = _winners(lines)
     headline, told = _split(lines, winners) if len(set(winners.values())) > 1 else _clear(lines, found)
-    return Verdict(headline, tuple(filter(None, (told, _speeds(found, equal_ms), _losses(found)))))
+    sentences = (told, _elsewhere(lines), _speeds(found, equal_ms), _losses(found))
+    return Verdict(headline, tuple(filter(None, sentences)))
 
 
 def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
@@ -124,6 +126,17 @@ def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
             told += "" if other is None or error is None else f"; {other.label} {_mm(error)}"
         parts.append(f"{label} on {best.recording} ({told})")
     return headline, f"Closest are {listed(parts)}."
+
+
+def _elsewhere(lines: Sequence[Line]) -> str:
+    """What E3D says of recordings that know no truth, beside others that do."""
+    blind = [line for line in lines if judged_by(lines) != "e3d_mm" and line.truth is None]
+    judged = _winners([line for line in blind if line.source not in {each.source for each in lines if each.truth}])
+    if not judged:
+        return ""
+    counts = {label: list(judged.values()).count(label) for label in dict.fromkeys(judged.values())}
+    told = listed([f"{label} on {count}" for label, count in sorted(counts.items(), key=lambda pair: -pair[1])])
+    return f"Where no truth is known, the sensor's points lie nearest to {told} of {len(judged)}."
 
 
 def _winners(lines: Sequence[Line]) -> dict[str, str]:
