@@ -2,17 +2,29 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from depthtrack.camera import Camera
 from depthtrack.hand.primitives import CYLINDER, SPHERE, cone, ellipsoid
-from depthtrack.observation.arm import BIN_MIDDLES, Arm, breadth, find_arm, walk_back
+from depthtrack.observation.arm import (
+    ARM_HALF_BREADTH,
+    BIN,
+    BIN_MIDDLES,
+    MARGIN,
+    Arm,
+    area_along,
+    breadth,
+    find_arm,
+    section,
+    walk_back,
+)
 from depthtrack.observation.grid import Grid, Paths
 from depthtrack.observation.palm import Palm, find_palms, palm_near, tips
-from depthtrack.observation.view import share_of_blocks
+from depthtrack.observation.view import dilated, disc, eroded, share_of_blocks
 from depthtrack.observation.window import Window
 from depthtrack.observation.wrist import (
     BREADTH_WEIGHT,
@@ -204,6 +216,42 @@ def test_noise_is_averaged() -> None:
     assert GUESS_SIGMA > SEEN_SIGMA
 
 
+def _slanted_palm(seed: int) -> tuple[Grid, Palm, Arm, np.ndarray]:
+    """A random surface of which the palm reaches a part; a direction; and the reached points relative to the palm."""
+    rng = np.random.default_rng(seed)
+    depth = np.where(rng.random((48, 64)) < 0.2, 0, 0.5 + 0.01 * rng.random((48, 64))).astype(np.float32)
+    grid = Grid.over(depth, Camera(64, 48, 100, 100, 31.5, 23.5), Window(0, 0, 64, 48), (0.3, 0.9), 2)
+    node = int(rng.choice(np.flatnonzero(grid.depth)))
+    palm = Palm(node, grid.points[node], 0.04, 0.1, grid.paths([node], 0.12), ())
+    direction = rng.normal(size=3) * [1, 1, 0.2]
+    arm = Arm(direction / np.linalg.norm(direction), np.zeros(0, np.int64))
+    return grid, palm, arm, grid.points[palm.paths.reached().ravel()] - palm.centre
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=25)
+def test_kernels_along_the_arm_equal_plain_geometry(seed: int) -> None:
+    grid, palm, arm, offset = _slanted_palm(seed)
+    along = offset @ arm.direction
+    aside = np.linalg.norm(offset - along[:, None] * arm.direction, axis=1)
+    near = np.abs(along - 0.03) < 0.01
+    middle = section(grid, palm, arm, 0.03, 0.01)
+    if near.any():
+        assert middle is not None
+        np.testing.assert_allclose(middle, palm.centre + offset[near & (aside < ARM_HALF_BREADTH)].mean(axis=0))
+    else:
+        assert middle is None
+
+    total = np.zeros(len(BIN_MIDDLES) + 4 * MARGIN)
+    areas = grid.areas.ravel()
+    area_along(grid.points, areas, palm.paths.distance.ravel(), palm.centre, arm.direction, total)
+    ends, middles = (-MARGIN * BIN, (len(BIN_MIDDLES) + MARGIN) * BIN), BIN * (np.arange(total.size) - 2 * MARGIN + 0.5)
+    counts = (along > ends[0]) & (along < ends[1]) & (aside < ARM_HALF_BREADTH)
+    # Each node's area falls off linearly with its distance from a bin's middle.
+    shares = np.maximum(1 - np.abs(along[counts, None] - middles) / BIN, 0)
+    np.testing.assert_allclose(total, areas[palm.paths.reached().ravel()][counts] @ shares, atol=1e-10)
+
+
 def test_walking_back_stops_at_the_distance_asked_for() -> None:
     grid = Grid.over(
         np.full((48, 64), 0.5, np.float32), Camera(64, 48, 60, 60, 31.5, 23.5), Window(0, 0, 64, 48), (0.3, 0.9), 4
@@ -216,6 +264,13 @@ def test_walking_back_stops_at_the_distance_asked_for() -> None:
         way = paths.trace(int(node))
         expected = next(step for step in way if paths.distance.flat[step] <= 0.1)
         assert stop == expected
+
+
+@pytest.mark.parametrize("radius", [1, 2, 3, 4, 5])
+def test_square_and_diamond_make_a_disc(radius: int) -> None:
+    mask = np.random.default_rng(radius).random((40, 50)) < 0.02
+    np.testing.assert_array_equal(dilated(mask, radius), cv2.dilate(mask.astype(np.uint8), disc(radius)) > 0)
+    np.testing.assert_array_equal(eroded(~mask, radius), cv2.erode((~mask).astype(np.uint8), disc(radius)) > 0)
 
 
 @pytest.mark.parametrize("stride", [3, 5])

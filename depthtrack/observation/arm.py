@@ -14,6 +14,7 @@ from depthtrack.observation.grid import Depth, Grid, Mask
 from depthtrack.observation.palm import Nodes, Palm
 
 Array = NDArray[np.float64]
+Values = NDArray[np.float32]
 
 ARM_AREA = 3e-4
 """Square metres of an arm beyond the hand's reach that are seen at least; little, for it may point straight away."""
@@ -40,6 +41,12 @@ ARM_HALF_BREADTH = 0.07
 BIN = 0.004
 BIN_MIDDLES: Array = BIN * (np.arange(50, dtype=np.float64) + 0.5)
 """Distances (m) from the palm's centre along the arm at which its breadth is measured."""
+
+MARGIN = 4
+"""Bins beyond either end that are counted too, for breadth is smoothed: nodes are as wide as bins."""
+
+_KERNEL = np.exp(-0.5 * (np.arange(-MARGIN, MARGIN + 1) / 1.5) ** 2)
+_KERNEL /= _KERNEL.sum()
 
 
 @dataclass(frozen=True)
@@ -76,23 +83,66 @@ def find_vanishing_arm(
 
 def breadth(grid: Grid, palm: Palm, arm: Arm) -> Array:
     """Breadth (50,) in metres of what is seen along the arm, at BIN_MIDDLES from the palm's centre."""
-    nodes = np.flatnonzero(palm.paths.reached())
-    offset = grid.points[nodes] - palm.centre
-    along = offset @ arm.direction
-    aside_squared = np.einsum("ij,ij->i", offset, offset) - along**2
-    margin, count = 4, len(BIN_MIDDLES)
-    near = (aside_squared < ARM_HALF_BREADTH**2) & (along > -margin * BIN) & (along < (count + margin) * BIN)
-    position, area = along[near] / BIN - 0.5 + 2 * margin, grid.areas.ravel()[nodes[near]]
-    # Each node's area is shared by the two bins that it lies between; then smoothed, as nodes are as wide as bins.
-    left = np.floor(position).astype(np.int64)
-    share, size = position - left, count + 4 * margin
-    total = np.bincount(left, area * (1 - share), size) + np.bincount(left + 1, area * share, size)
-    kernel = np.exp(-0.5 * (np.arange(-margin, margin + 1) / 1.5) ** 2)
-    smooth = np.convolve(total, kernel / kernel.sum(), mode="same")[2 * margin : 2 * margin + count]
+    total = np.zeros(len(BIN_MIDDLES) + 4 * MARGIN)
+    area_along(grid.points, grid.areas.ravel(), palm.paths.distance.ravel(), palm.centre, arm.direction, total)
+    smooth = np.convolve(total, _KERNEL, mode="same")[2 * MARGIN : 2 * MARGIN + len(BIN_MIDDLES)]
     # An arm that points away from the camera covers less of the image by the sine of its angle to the line of sight.
     sight = palm.centre / np.linalg.norm(palm.centre)
     sine = np.sqrt(max(1 - float(arm.direction @ sight) ** 2, 0.1))
     return np.asarray(smooth / BIN / sine)
+
+
+@numba.njit(cache=True)
+def area_along(points: Array, areas: Values, reached: Values, centre: Array, direction: Array, total: Array) -> None:
+    """Area (m^2) of the nodes (N,) that are `reached` (finite), by their distance from `centre` (3,) along the unit
+    `direction` (3,), added to `total` (bins + 4 MARGIN,); the first 2 MARGIN bins lie before the centre.
+
+    Each node's area is shared by the two bins that it lies between.
+    """
+    last = total.size - 3 * MARGIN
+    for n in range(reached.size):
+        if not np.isfinite(reached[n]):
+            continue
+        x, y, z = points[n, 0] - centre[0], points[n, 1] - centre[1], points[n, 2] - centre[2]
+        along = x * direction[0] + y * direction[1] + z * direction[2]
+        near = -MARGIN * BIN < along < last * BIN
+        if near and x * x + y * y + z * z - along * along < ARM_HALF_BREADTH**2:
+            place = along / BIN - 0.5 + 2 * MARGIN
+            left = int(np.floor(place))
+            share = place - left
+            total[left] += areas[n] * (1 - share)
+            total[left + 1] += areas[n] * share
+
+
+def section(grid: Grid, palm: Palm, arm: Arm, distance: float, half_width: float) -> Array | None:
+    """Middle (3,) of what is seen of the arm `distance` from the palm's centre, give or take `half_width`; metres."""
+    middle = np.empty(3)
+    reached = palm.paths.distance.ravel()
+    found = middle_of_section(grid.points, reached, palm.centre, arm.direction, distance, half_width, middle)
+    return middle if found else None
+
+
+@numba.njit(cache=True)
+def middle_of_section(
+    points: Array, reached: Values, centre: Array, direction: Array, distance: float, half_width: float, middle: Array
+) -> bool:
+    """Mean (3,), into `middle`, of the points (N, 3) that are `reached` (finite) within ARM_HALF_BREADTH of a line
+    from `centre` (3,) along the unit `direction` (3,), `distance` from the centre; whether there are any."""
+    count = 0
+    middle[:] = 0.0
+    for n in range(reached.size):
+        if not np.isfinite(reached[n]):
+            continue
+        x, y, z = points[n, 0] - centre[0], points[n, 1] - centre[1], points[n, 2] - centre[2]
+        along = x * direction[0] + y * direction[1] + z * direction[2]
+        aside_squared = x * x + y * y + z * z - along * along
+        if abs(along - distance) < half_width and aside_squared < ARM_HALF_BREADTH**2:
+            count += 1
+            for axis in range(3):
+                middle[axis] += points[n, axis]
+    for axis in range(3):
+        middle[axis] /= max(count, 1)
+    return count > 0
 
 
 def _leaving(grid: Grid, palm: Palm, border: Mask) -> list[Nodes]:

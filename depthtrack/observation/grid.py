@@ -5,6 +5,7 @@ by less than MAX_JUMP: what lies behind a hand, a face or a chest, is another su
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import cv2
@@ -72,7 +73,7 @@ class Grid:
         sample_blocks(depth, tuple(window), lens, reach[0], reach[1], stride, nodes, points)
         return cls(nodes, points, (camera.fx / stride, camera.fy / stride), stride)
 
-    @property
+    @cached_property
     def areas(self) -> NDArray[np.float32]:
         """(rows, columns) square metres that a node's block spans across the line of sight; 0 without a surface."""
         return self.depth * self.depth * np.float32(1 / (self.focal[0] * self.focal[1]))
@@ -91,9 +92,9 @@ class Grid:
     def surfaces(self) -> tuple[NDArray[np.int32], Array]:
         """Label (rows, columns) of each node's connected surface, -1 for none; areas (S,) of these in square metres."""
         labels = np.empty(self.depth.shape, dtype=np.int32)
-        count = label_surfaces(self.depth, labels)
-        areas: Array = np.bincount(labels.ravel() + 1, self.areas.ravel(), count + 1).astype(np.float64)[1:]
-        return labels, areas
+        squares = np.empty(self.depth.size)
+        count = label_surfaces(self.depth, labels, squares)
+        return labels, squares[:count] / (self.focal[0] * self.focal[1])
 
     def paths(self, sources: ArrayLike, limit: float) -> Paths:
         """Shortest paths along the surface from `sources` (flat indices), up to `limit` metres."""
@@ -139,16 +140,19 @@ def sample_blocks(
         v0, v1 = top + i * stride, min(top + (i + 1) * stride, bottom)
         for j in range(columns):
             u0, u1 = left + j * stride, min(left + (j + 1) * stride, right)
-            nearest, count, size = far32, 0, 0
+            nearest, farthest, total, count, size = far32, near32, np.float32(0), 0, 0
             for v in range(v0, v1, step):
                 for u in range(u0, u1, step):
                     z = depth[v, u]
                     size += 1
                     if near32 <= z <= far32:
                         count += 1
-                        nearest = min(nearest, z)
-            mean = np.float32(0)
+                        total += z
+                        nearest, farthest = min(nearest, z), max(farthest, z)
+            mean = 0.0
             if count > 0 and 4 * count >= size:
+                mean = float(total) / count
+            if mean > 0 and farthest > nearest + jump:
                 total, close = np.float32(0), np.float32(0)
                 for v in range(v0, v1, step):
                     for u in range(u0, u1, step):
@@ -156,7 +160,7 @@ def sample_blocks(
                         if nearest <= z <= nearest + jump:
                             total += z
                             close += 1
-                mean = total / close
+                mean = float(total) / float(close)
             nodes[i, j] = mean
             # The block's middle, whatever part of it lies outside the window.
             middle = (stride - 1) / 2
@@ -166,8 +170,11 @@ def sample_blocks(
 
 
 @numba.njit(cache=True)
-def label_surfaces(depth: Depth, labels: NDArray[np.int32]) -> int:
-    """Number the connected surfaces of the grid from 0, into `labels` (-1 where there is none); returns how many."""
+def label_surfaces(depth: Depth, labels: NDArray[np.int32], squares: Array) -> int:
+    """Number the connected surfaces of the grid from 0, into `labels` (-1 where there is none); returns how many.
+
+    The sum of each one's squared depths (m^2) goes into `squares`, as long as there are nodes.
+    """
     rows, columns = depth.shape
     jump = np.float32(MAX_JUMP)
     z, label = depth.ravel(), labels.ravel()
@@ -180,9 +187,11 @@ def label_surfaces(depth: Depth, labels: NDArray[np.int32]) -> int:
         label[start] = count
         stack[0] = start
         size = 1
+        squares[count] = 0
         while size > 0:
             size -= 1
             here = stack[size]
+            squares[count] += z[here] * z[here]
             i, j = here // columns, here % columns
             for k in range(max(i - 1, 0), min(i + 2, rows)):
                 for m in range(max(j - 1, 0), min(j + 2, columns)):

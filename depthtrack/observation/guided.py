@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.observation.skin_colour import AdaptiveSkin
-from depthtrack.observation.view import disc
+from depthtrack.observation.view import dilated, disc
 from depthtrack.observation.window import Window
 from depthtrack.observation.wrist import WristPlane
 from depthtrack.recording.sequence import Frame
@@ -71,7 +71,7 @@ def find_expected(frame: Frame, place: HandPlace, skin: AdaptiveSkin | None) -> 
     if skin is not None and frame.colour is not None:
         found = skin.find(frame.colour, window, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
         radius = max(1, round(DILATION * camera.width))
-        readings &= cv2.dilate(found.astype(np.uint8), disc(radius)) > 0
+        readings &= dilated(found, radius)
         # Skin without a reading counts in gaps between readings: beyond them, shadows fall on what may look like skin.
         gaps = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(radius)) > 0
         silhouette = readings | (found & gaps & (kinds == _MISSING))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from depthtrack.observation.grid import MAX_JUMP, Depth, Mask
 from depthtrack.observation.palm import HAND_REACH, TIP_TO_WRIST, Palm
-from depthtrack.observation.view import View, disc
+from depthtrack.observation.view import View, dilated, disc, eroded
 from depthtrack.observation.window import Window
 from depthtrack.observation.wrist import WristPlane
 
@@ -76,7 +76,7 @@ def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Wi
         coloured = view.skin[top : top + tight.height, left : left + tight.width] > 0
         r = max(1, round(DILATION * frame.camera.width))
         silhouette = _silhouette(kinds, coloured, frame.depth[tight.slices] == 0, r)
-        readings = readings & (cv2.dilate(silhouette.astype(np.uint8), disc(r)) > 0)
+        readings = readings & dilated(silhouette, r)
     room = round(ROOM * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
     roi = tight.grown(max(room - MARGIN * stride, 0), frame.camera)
     return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
@@ -86,8 +86,8 @@ def _silhouette(kinds: NDArray[np.uint8], coloured: Mask, missing: Mask, r: int)
     """The hand's silhouette (h, w) from the kinds of its pixels, where they are `coloured` like skin, and where
     readings are `missing`."""
     readings = kinds == READING
-    inside = readings & (cv2.erode((kinds >= OTHER).astype(np.uint8), disc(r)) > 0)
-    closed = cv2.morphologyEx(readings.astype(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 4))) > 0
+    inside = readings & eroded(kinds >= OTHER, r)
+    closed = cv2.morphologyEx(readings.view(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 4))).view(np.bool_)
     # Through a ring of fingers one sees what is behind: what is read there is not filled.
     filled = closed | (missing & _enclosed(closed))
     return inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
@@ -107,7 +107,7 @@ def _smoothed(mask: Mask, r: int) -> Mask:
     A little less than half suffices, for readings are lost at outlines and never won.
     """
     side = 2 * (r // 2) + 1
-    share = cv2.boxFilter(mask.astype(np.uint8) * 200, -1, (side, side), borderType=cv2.BORDER_REPLICATE)
+    share = cv2.boxFilter(mask.view(np.uint8) * np.uint8(200), -1, (side, side), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(share > 85)
 
 
@@ -148,42 +148,43 @@ def sort_pixels(
     fx, fy, cx, cy = lens
     a, b, c, d = plane
     jump = np.float32(MAX_JUMP)
+    near, kind = np.empty(9, dtype=np.float32), np.empty(9, dtype=np.uint8)
     out[:] = NOTHING
     for i in range(i0, i1):
         for j in range(j0, j1):
-            k0, k1, m0, m1 = max(i - 1, 0), min(i + 2, rows), max(j - 1, 0), min(j + 2, columns)
-            around = 0
-            for k in range(k0, k1):
-                for m in range(m0, m1):
-                    around |= labels[k, m]
-            if around == ELSEWHERE:
+            # The nodes around that are somewhere, and what a pixel without a reading belongs to.
+            count, around, blank, blank_depth, least = 0, ELSEWHERE, ELSEWHERE, np.float32(0), 9
+            for k in range(max(i - 1, 0), min(i + 2, rows)):
+                for m in range(max(j - 1, 0), min(j + 2, columns)):
+                    label = labels[k, m]
+                    if label == ELSEWHERE:
+                        continue
+                    near[count], kind[count] = nodes[k, m], label
+                    count, around = count + 1, around | label
+                    away = (k - i) ** 2 + (m - j) ** 2
+                    if label != BESIDE and away < least:
+                        least, blank, blank_depth = away, label, nodes[k, m]
+            if count == 0:
                 continue
+            deep = around == HAND == labels[i, j]
             u0, v0 = left + (j - j0) * stride, top + (i - i0) * stride
             for v in range(v0, min(v0 + stride, bottom)):
                 for u in range(u0, min(u0 + stride, right)):
                     z = depth[v, u]
-                    if around == HAND == labels[i, j] and abs(nodes[i, j] - z) < jump:
+                    if deep and abs(nodes[i, j] - z) < jump:
                         out[v - top, u - left] = READING  # deep inside the hand
                         continue
-                    nearest, close = np.float32(np.inf), np.float32(0)
-                    label, met = ELSEWHERE, ELSEWHERE
-                    for k in range(k0, k1):
-                        for m in range(m0, m1):
-                            if labels[k, m] == ELSEWHERE:
-                                continue
-                            if z > 0:
-                                difference = abs(nodes[k, m] - z)
-                                if difference >= jump:
-                                    continue
-                            else:
-                                difference = np.float32((k - i) ** 2 + (m - j) ** 2)
-                            met |= labels[k, m]
-                            if difference < nearest and labels[k, m] != BESIDE:
-                                nearest, label, close = difference, labels[k, m], nodes[k, m]
-                    hand = bool(label == HAND)
+                    mine, close, met = blank, blank_depth, around
+                    if z > 0:
+                        mine, close, met, nearest = ELSEWHERE, z, ELSEWHERE, jump
+                        for n in range(count):
+                            difference = abs(near[n] - z)
+                            if difference < jump:
+                                met |= kind[n]
+                                if difference < nearest and kind[n] != BESIDE:
+                                    nearest, mine = difference, kind[n]
+                    hand = bool(mine == HAND)
                     if met & (HAND | ARM) == HAND | ARM:
-                        if z > 0:
-                            close = z
                         hand = bool((a * (u - cx) / fx + b * (v - cy) / fy + c) * close <= d)
                     if z > 0:
                         if met != ELSEWHERE:

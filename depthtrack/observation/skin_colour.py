@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Self
 
+import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -181,7 +182,7 @@ class AdaptiveSkin:
         """P = gamma P_model + (1 - gamma) P_recent (64, 64); colours not seen recently keep the model's."""
         if not self._recent:
             return self._offline
-        other, skin = sum(self._recent, np.zeros((2, BINS, BINS)))
+        other, skin = np.add.reduce(self._recent)
         seen = other + skin
         recent = np.where(seen > 0, skin / np.maximum(seen, 1), self._offline)
         return OFFLINE_WEIGHT * self._offline + (1 - OFFLINE_WEIGHT) * recent
@@ -208,7 +209,14 @@ class AdaptiveSkin:
 def class_of_colour(posterior: Array) -> NDArray[np.uint8]:
     """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of every colour, for P(skin | colour) (64, 64)."""
     classes = np.append((posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX), np.uint8(NOT_SKIN))
-    return classes[_bin_of_colour()].astype(np.uint8)
+    return classes.take(_place_of_colour())
+
+
+@cache
+def _place_of_colour() -> NDArray[np.intp]:
+    """The same as `_bin_of_colour`, with the place after the last bin for useless luminance."""
+    bins = _bin_of_colour().astype(np.intp)
+    return np.where(bins < 0, BINS * BINS, bins)
 
 
 def _count(
@@ -272,35 +280,30 @@ def classify(
 
 def grow_skin(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Hysteresis: 1 where `classes` (h, w) is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
-    grown = (classes == SURELY_SKIN).astype(np.uint8)
-    grow_into(classes, np.flatnonzero(classes == MAYBE_SKIN), grown)
+    grown = (classes == SURELY_SKIN).view(np.uint8)
+    beside = cv2.dilate(grown, np.ones((3, 3), np.uint8)).view(np.bool_)
+    grow_into(classes, np.flatnonzero((classes == MAYBE_SKIN) & beside), grown)
     return grown
 
 
 @numba.njit(cache=True)
-def grow_into(classes: NDArray[np.uint8], doubtful: NDArray[np.int64], grown: NDArray[np.uint8]) -> None:
-    """Add to `grown` (h, w), in place, the `doubtful` pixels (flat indices of MAYBE_SKIN) that are joined to it."""
-    columns = classes.shape[1]
+def grow_into(classes: NDArray[np.uint8], seeds: NDArray[np.int64], grown: NDArray[np.uint8]) -> None:
+    """Add to `grown` (h, w), in place, the `seeds` (flat indices of MAYBE_SKIN) and all MAYBE_SKIN joined to them."""
+    rows, columns = classes.shape
     label, skin = classes.ravel(), grown.ravel()
-    around = (-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1)
-    stack = np.empty(doubtful.size, dtype=np.int64)
-    for start in doubtful:
-        if skin[start] != 0:
+    stack = np.empty(label.size, dtype=np.int64)
+    for seed in seeds:
+        if skin[seed] != 0:
             continue
-        size = 0
-        for offset in around:
-            there = start + offset
-            if 0 <= there < label.size and abs(there % columns - start % columns) <= 1 and skin[there] != 0:
-                skin[start] = 1
-                stack[0] = start
-                size = 1
+        skin[seed] = 1
+        stack[0] = seed
+        size = 1
         while size > 0:
             size -= 1
-            here = stack[size]
-            for offset in around:
-                there = here + offset
-                inside = 0 <= there < label.size and abs(there % columns - here % columns) <= 1
-                if inside and label[there] == MAYBE_SKIN and skin[there] == 0:
-                    skin[there] = 1
-                    stack[size] = there
-                    size += 1
+            v, u = stack[size] // columns, stack[size] % columns
+            for k in range(max(v - 1, 0), min(v + 2, rows)):
+                for there in range(k * columns + max(u - 1, 0), k * columns + min(u + 2, columns)):
+                    if label[there] == MAYBE_SKIN and skin[there] == 0:
+                        skin[there] = 1
+                        stack[size] = there
+                        size += 1

@@ -56,6 +56,30 @@ def disc(radius: int) -> NDArray[np.uint8]:
     return (x * x + y * y <= (radius + 0.5) ** 2 - 0.25).astype(np.uint8)
 
 
+def dilated(mask: Mask, radius: int) -> Mask:
+    """What is within `radius` pixels, at least 1, of a mask (h, w)."""
+    square, diamond = _parts_of_disc(radius)
+    return cv2.dilate(cv2.dilate(mask.view(np.uint8), square), diamond).view(np.bool_)
+
+
+def eroded(mask: Mask, radius: int) -> Mask:
+    """What is farther than `radius` pixels, at least 1, from everything outside a mask (h, w); the image's edge is no
+    outside."""
+    square, diamond = _parts_of_disc(radius)
+    return cv2.erode(cv2.erode(mask.view(np.uint8), square), diamond).view(np.bool_)
+
+
+@cache
+def _parts_of_disc(radius: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """A square and a diamond that make `disc(radius)` when used one after the other, at half the cost.
+
+    They do so exactly up to 5 pixels; beyond, they make an octagon.
+    """
+    half = max(1, round(radius * (np.sqrt(2) - 1)))
+    y, x = np.ogrid[half - radius : radius - half + 1, half - radius : radius - half + 1]
+    return np.ones((2 * half + 1, 2 * half + 1), np.uint8), (abs(x) + abs(y) <= radius - half).astype(np.uint8)
+
+
 def _closed(nodes: Mask) -> Mask:
     """With gaps up to 4 nodes wide closed: a shadow, a highlight, a ring."""
     return np.asarray(cv2.morphologyEx(nodes.astype(np.uint8), cv2.MORPH_CLOSE, disc(2)) > 0)

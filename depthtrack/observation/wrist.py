@@ -7,7 +7,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.observation.arm import ARM_HALF_BREADTH, BIN, BIN_MIDDLES, Arm, breadth
+from depthtrack.observation.arm import BIN, BIN_MIDDLES, Arm, breadth, section
 from depthtrack.observation.grid import Grid, Mask
 from depthtrack.observation.palm import Palm
 
@@ -106,8 +106,8 @@ def _visible_end(grid: Grid, palm: Palm, arm: Arm) -> float:
 def palm_centre(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Array:
     """The palm's centre (3,) on the visible surface, metres, by its distance from the wrist: the middle of the hand's
     cross-section there. It replaces the widest place where that need not be the palm."""
-    section = _section(grid, palm, arm, wrist_distance - WRIST_TO_PALM, 0.015)
-    return palm.centre if section is None else section
+    middle = section(grid, palm, arm, wrist_distance - WRIST_TO_PALM, 0.015)
+    return palm.centre if middle is None else middle
 
 
 def hand_axis(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Arm:
@@ -115,21 +115,12 @@ def hand_axis(grid: Grid, palm: Palm, arm: Arm, wrist_distance: float) -> Arm:
     forearm's, where that is seen: a bent wrist is cut across the palm, as `HandShape` has it."""
     if palm.radius < FLAT_PALM:
         return arm
-    wrist = _section(grid, palm, arm, wrist_distance, 0.008)
+    wrist = section(grid, palm, arm, wrist_distance, 0.008)
     if wrist is None:
         return arm
     middle = palm.centre if wrist_distance > SHORTEST_AXIS else palm_centre(grid, palm, arm, wrist_distance)
     along = (wrist - middle) / np.linalg.norm(wrist - middle)
     return replace(arm, direction=along) if float(along @ arm.direction) > LARGEST_BEND else arm
-
-
-def _section(grid: Grid, palm: Palm, arm: Arm, distance: float, half_width: float) -> Array | None:
-    """Middle (3,) of what is seen of the arm `distance` from the palm's centre, give or take `half_width`; metres."""
-    points = grid.points[palm.paths.reached().ravel()]
-    along = (points - palm.centre) @ arm.direction
-    aside = np.linalg.norm(np.cross(points - palm.centre, arm.direction), axis=1)
-    section = points[(np.abs(along - distance) < half_width) & (aside < ARM_HALF_BREADTH)]
-    return np.asarray(section.mean(axis=0)) if len(section) else None
 
 
 def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
