@@ -114,7 +114,7 @@ def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progres
     metric = judged_by(lines)
     painter = SideBySide(shown, metric, sequence=sequence)
     heading = f"film of {lines[0].recording}"
-    film = film_of(painter, most_bytes, lambda frames: progress(frames, heading, len(painter.indices)))
+    film = film_of(painter, most_bytes, lambda frames, total: progress(frames, heading, total))
     times = painter.sequence.timestamps[painter.indices]
     return Section(
         lines[0].recording,

@@ -32,16 +32,17 @@ class Film:
     height: int
 
 
-Progress = Callable[[Iterable[Frame]], Iterable[Frame]]
+Progress = Callable[[Iterable[Frame], int], Iterable[Frame]]
+"""Watches frames go by; told how many there are."""
 
 
-def film_of(painter: SideBySide, most_bytes: int, progress: Progress = iter) -> Film:
+def film_of(painter: SideBySide, most_bytes: int, progress: Progress = lambda frames, total: frames) -> Film:
     """The film of a recording with its trackers; evenly fewer frames, where all would take more than `most_bytes`."""
     indices = painter.indices
     times = painter.sequence.timestamps[indices]
     chosen = [indices[k] for k in evenly_chosen(len(indices), _count(painter, times, most_bytes))]
     pictures, seconds, shape = [], [], (0, 0)
-    for frame in progress(painter.sequence.frames(chosen)):
+    for frame in progress(painter.sequence.frames(chosen), len(chosen)):
         picture = painter.picture(frame)
         pictures.append(as_webp(picture))
         seconds.append(round(frame.timestamp - float(times[0]), 3))
