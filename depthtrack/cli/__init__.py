@@ -28,6 +28,7 @@ COMMANDS = {
     "track": CommandEntry("depthtrack.cli.track", "track the hand through a recording, into a run folder"),
     "compare": CommandEntry("depthtrack.cli.compare", "trackers side by side: table, results, report"),
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
+    "calibrate": CommandEntry("depthtrack.cli.calibrate", "measure the hand of a recording: side, scale, every finger"),
     "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
     "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
     "video": CommandEntry("depthtrack.cli.video", "a film of a run: the tracked hand over the recording"),

@@ -1,0 +1,1 @@
+"""From a recording of a hand to the sizes of that hand."""

@@ -1,0 +1,229 @@
+"""The sizes of a hand from a recording of it: whose side and about how large, then every finger.
+
+Poses are searched in a few telling frames with hands of several sizes, the better one leads to its scale, and from
+there poses and all sizes are fitted together. The poses are then looked for again with the hand that was found, for
+some of the first ones were wrong, and fitted once more.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.calibration.evidence import View
+from depthtrack.calibration.joint import JointFit, fit_jointly
+from depthtrack.calibration.sizes import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.observation.observation import Observation
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+from depthtrack.tracking.pso.search import SearchOptions, find_pose
+
+Array = NDArray[np.float64]
+
+VIEWS = 16
+"""Frames that sizes are measured on."""
+_FIRST = 4
+"""Of these, the most open hands, on which side and scale are tried out."""
+_TRIED_SCALES = (0.76, 0.9, 1.06, 1.24)
+_RESOLUTION = 96
+"""Longest side, pixels, at which poses are searched."""
+_GOOD_VIEWS = 0.7
+"""Share of the views that are fitted: those with the highest energy may well be wrong poses."""
+_HAND_LIKE = 0.55
+"""Agreement of silhouettes (1 less the skin term of Eq. 2) below which no hand was found."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Poses (V, 27) in the views of a hand, their energies (V,) and the agreement of silhouettes (V,), 0 to 1."""
+
+    poses: Array
+    energies: Array
+    agreements: Array
+
+    def best(self, share: float) -> NDArray[np.int64]:
+        """The views with the lowest energies."""
+        return np.argsort(self.energies, kind="stable")[: max(2, round(share * len(self.energies)))]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One length or width: `mm`, its standard deviation `sigma_mm`, and `confidence` from 0, as little as before the
+    recording was seen, to 1, all that can be known within the model."""
+
+    mm: float
+    sigma_mm: float
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """`hand`, what is known of its sizes in `measured`, how much better its side explains the views than the other
+    (`side_margin`, a share of the energy; None where the side was given), and how far the observed points are from the
+    skin, mm: the average hand's at its best (`before_mm`), and this one's (`after_mm`).
+
+    `observations` are the views, `poses` (V, 27) those of `hand` in them, `poses_before` those of the average hand.
+    """
+
+    hand: HandShape
+    measured: dict[str, Measured]
+    side_margin: float | None
+    before_mm: float
+    after_mm: float
+    observations: tuple[Observation, ...]
+    poses: Array
+    poses_before: Array
+
+    def to_json(self) -> str:
+        """`hand.json` with what is known of each size beside it."""
+        rows = ",\n".join(
+            f'    "{name}": {{"mm": {m.mm:.2f}, "sigma_mm": {m.sigma_mm:.2f}, "confidence": {m.confidence:.2f}}}'
+            for name, m in self.measured.items()
+        )
+        text = self.hand.to_json().rstrip()
+        return f'{text[:-1].rstrip()},\n  "measured": {{\n{rows}\n  }}\n}}\n'
+
+
+def calibrate(
+    observations: Sequence[Observation],
+    side: Side | None = None,
+    seed: int = 0,
+    threads: int = 1,
+    source: str = "calibrated",
+    progress: Progress | None = None,
+) -> Calibration:
+    """Measure the hand seen in `observations` (see `views.choose_views`), of which the first show it most open.
+
+    Tells `progress` what is being done, and the share of the whole that is. The same observations and seed give the
+    same hand for any number of threads. Raises InputError where what is seen does not look like a hand.
+    """
+    tell = progress or (lambda what, share: None)
+    searcher = _Searcher(list(observations), seed, threads)
+    sides: tuple[Side, ...] = ("right", "left") if side is None else (side,)
+    begun = {}
+    for n, tried in enumerate(sides):
+        tell(f"a {tried} hand of what size?", 0.4 * n / len(sides))
+        begun[tried] = _begin(searcher, tried)
+    chosen = min(sides, key=lambda s: begun[s][1].energies.mean())
+    values, found = begun[chosen]
+    if np.median(found.agreements) < _HAND_LIKE:
+        raise InputError(
+            f"what was found in {len(observations)} frames does not look like a hand (silhouettes agree to "
+            f"{np.median(found.agreements):.0%}): calibrate on a recording of one bare hand, best with open fingers"
+        )
+    before = _refined(searcher, found.poses, np.zeros(COUNT), chosen)
+    tell("fingers and palm", 0.5)
+    views, first = searcher.views, found.best(_GOOD_VIEWS)
+    fit = fit_jointly([views[i] for i in first], found.poses[first], values, chosen, rounds=8)
+    tell("the same with better poses", 0.7)
+    found = searcher.improve(hand_of(fit.values, chosen), found.poses)
+    good = found.best(_GOOD_VIEWS)
+    fit = fit_jointly([views[i] for i in good], found.poses[good], fit.values, chosen, rounds=6)
+    tell("how sure is it?", 0.95)
+    values = with_usual_proportions(fit.values)
+    after = _refined(searcher, found.poses, values, chosen)
+    energies = {s: float(begun[s][1].energies.mean()) for s in sides}
+    margin = None if side is not None else max(energies.values()) / min(energies.values()) - 1
+    tell("done", 1.0)
+    return Calibration(
+        hand_of(values, chosen, source),
+        _measured(values, fit.covariance),
+        margin,
+        1000 * float(np.median(before.distances[good])),
+        1000 * float(np.median(after.distances[good])),
+        tuple(searcher.observations[i] for i in good),
+        after.poses[good],
+        before.poses[good],
+    )
+
+
+class _Searcher:
+    """Finds poses in the views, from nothing."""
+
+    def __init__(self, observations: list[Observation], seed: int, threads: int) -> None:
+        self.observations, self._seed, self._threads = observations, seed, threads
+        self.views = [View(o) for o in observations]
+
+    def find(self, shape: HandShape, count: int | None = None, attempts: int = 1) -> Found:
+        """In the first `count` views, or in all."""
+        return self._search(shape, self.observations[:count], attempts, None)
+
+    def improve(self, shape: HandShape, poses: Array, attempts: int = 2) -> Found:
+        """In all views; `poses` (V, 27) that were found before count where they are better."""
+        return self._search(shape, self.observations, attempts, poses)
+
+    def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
+        options = SearchOptions(attempts=attempts, good_energy=0.0)
+        poses, energies, agreements = [], [], []
+        with RasterScorer(shape, threads=self._threads) as scorer:
+            for n, o in enumerate(observations):
+                scorer.observe(Target(o.camera, o.skin, o.depth).reduced(_RESOLUTION))
+                generator = np.random.Generator(np.random.Philox(key=[self._seed, o.frame_index]))
+                pose, _ = find_pose(scorer, o.centre, generator, options)
+                tried = np.stack([pose] if known is None else [pose, known[n]])
+                terms = scorer.terms(tried)
+                best = int(np.argmin(terms.energy))
+                poses.append(tried[best])
+                energies.append(float(terms.energy[best]))
+                agreements.append(float(1 - terms.skin[best]))
+        return Found(np.stack(poses), np.array(energies), np.array(agreements))
+
+
+def _begin(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
+    """Sizes (35,) of which only the scale is known, and the poses of such a hand in all views."""
+    tried = {s: searcher.find(HandShape(side=side, scale=s), _FIRST) for s in _TRIED_SCALES}
+    scale = min(tried, key=lambda s: tried[s].energies.mean())
+    values = np.zeros(COUNT)
+    values[SCALE] = np.log(scale)
+    poses = tried[scale].poses
+    fit = fit_jointly(searcher.views[: len(poses)], poses, values, side, rounds=4, free=SCALE)
+    return fit.values, searcher.find(hand_of(fit.values, side), attempts=2)
+
+
+def _refined(searcher: _Searcher, poses: Array, values: Array, side: Side) -> JointFit:
+    """The poses that bring a hand of given sizes closest to each view."""
+    return fit_jointly(searcher.views, poses, values, side, rounds=6, free=slice(0, 0))
+
+
+def with_usual_proportions(values: Array) -> Array:
+    """The same hand with as much of its sizes as possible in its scale: the median factor of fingers and palm."""
+    parts = np.append(values[LENGTHS].reshape(5, 3).mean(axis=1), values[PALM][:2])
+    common = float(np.median(parts))
+    out = values.copy()
+    out[0] += common
+    out[1:24] -= common  # lengths, widths and palm
+    out[24:] /= np.exp(common)
+    # The palm's factors do not move the thumb's base out of the palm, its offset has to.
+    height = HandShape().bases[0, 2]
+    out[-1] += height / np.exp(common) - height
+    return out
+
+
+def _measured(values: Array, covariance: Array) -> dict[str, Measured]:
+    """What people ask for, with its standard deviation, and the share of the prior variance that the views removed."""
+    prior = prior_covariance()
+    table = {}
+    for name, (metres, gradient) in measures(values).items():
+        variance, before = float(gradient @ covariance @ gradient), float(gradient @ prior @ gradient)
+        mm = 1000 * metres
+        table[name] = Measured(mm, mm * np.sqrt(variance), 1 - variance / before)
+    return table
+
+
+def summary(calibration: Calibration) -> dict[str, Any]:
+    """What `depthtrack calibrate` tells of a calibration: plain numbers."""
+    return {
+        "side": calibration.hand.side,
+        "side_margin": calibration.side_margin,
+        "scale": calibration.hand.scale,
+        "views": len(calibration.observations),
+        "distance_before_mm": calibration.before_mm,
+        "distance_after_mm": calibration.after_mm,
+        "measured": {name: vars(m) for name, m in calibration.measured.items()},
+    }

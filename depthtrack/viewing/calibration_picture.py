@@ -1,0 +1,75 @@
+"""What a calibration changed: the average hand and the measured one over what was observed."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.calibration.calibrate import Calibration
+from depthtrack.camera import Camera
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin import Skin
+from depthtrack.observation.observation import Observation
+from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.viewing.contact_sheet import framed
+from depthtrack.viewing.depth_colours import depth_to_rgb
+from depthtrack.viewing.overlay import dimmed
+from depthtrack.viewing.panels import beside, captioned, stacked
+from depthtrack.viewing.shading import draw_surface
+from depthtrack.viewing.theme import BACKGROUND, TRUE_MASK
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+_HEIGHT = 300
+_ROWS = 4
+_OPACITY = 0.75
+
+
+def calibration_picture(calibration: Calibration) -> Image:
+    """A page (h, w, 3): for a few views, the depth, the average hand over it and the measured one, the observed
+    silhouette's outline around each."""
+    average = HandShape(side=calibration.hand.side)
+    chosen = np.unique(np.linspace(0, len(calibration.observations) - 1, _ROWS).round().astype(int))
+    rows = []
+    for i in chosen:
+        o = calibration.observations[i]
+        camera = _square(o.camera).resized(_HEIGHT / max(o.camera.shape))
+        ground, outline = _ground(o, camera)
+        tiles = [captioned(ground, f"frame {o.frame_index}", "depth")]
+        for name, hand, pose in (
+            ("average hand", average, calibration.poses_before[i]),
+            ("measured hand", calibration.hand, calibration.poses[i]),
+        ):
+            drawn = draw_surface(dimmed(ground, 0.8), _seen(hand, pose, camera), _OPACITY)
+            drawn[outline] = TRUE_MASK
+            tiles.append(captioned(drawn, name))
+        rows.append(beside(tiles))
+    return framed(stacked(rows))
+
+
+def _square(camera: Camera) -> Camera:
+    """With as much room on all sides that rows and columns are as many: pictures of one size."""
+    side = max(camera.shape)
+    return camera.crop((camera.width - side) // 2, (camera.height - side) // 2, side, side)
+
+
+def _ground(o: Observation, camera: Camera) -> tuple[Image, NDArray[np.bool_]]:
+    """The observed depth in colours, and the outline of the silhouette (h, w)."""
+    side, (h, w) = max(o.depth.shape), o.depth.shape
+    top, left = -((h - side) // 2), -((w - side) // 2)
+    depth, skin = np.zeros((side, side), np.float32), np.zeros((side, side), np.uint8)
+    depth[top : top + h, left : left + w], skin[top : top + h, left : left + w] = o.depth, o.skin
+    size = (camera.width, camera.height)
+    large = cv2.resize(skin, size, interpolation=cv2.INTER_NEAREST)
+    readings = depth[depth > 0]
+    near, far = (float(readings.min()), float(readings.max()) + 0.05) if readings.size else (0.3, 1.0)
+    image = depth_to_rgb(np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)), near, far)
+    image[large == 0] = BACKGROUND
+    return image, (large > 0) & (cv2.erode(large, np.ones((3, 3), np.uint8)) == 0)
+
+
+def _seen(hand: HandShape, pose: Array, camera: Camera) -> Surface:
+    skin = Skin.of(hand)
+    vertices = skin.at(pose)
+    return rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
