@@ -1,14 +1,20 @@
 """The IK tracker: accuracy on the skin and on the cylinder model, start by itself, and the same bits when resumed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ANGLES
+from depthtrack.hand.synergies import Synergies
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.ik.hierarchy import FLAT_LADDER, Ladder, SingleFrameFitter
 from depthtrack.tracking.ik.surfaces import Model
 from depthtrack.tracking.ik.tracker import IkOptions, IkTracker
+from depthtrack.tracking.memory import LostBelow
 from depthtrack.tracking.tracker import Estimate, Status
 from depthtrack.tracking.trackers import create_tracker
 from tests.synthetic_observations import observe
@@ -33,11 +39,64 @@ def test_follows_everyday_motion_rendered_from_the_skin(model: Model, highest_mm
     assert {estimate.status for estimate in estimates[1:]} == {Status.TRACKED}
 
 
-def test_starts_by_itself() -> None:
-    estimate = IkTracker(MADE.options.hand).track(observe(MADE, 10))
+@pytest.mark.parametrize("frame", [10, 150, 270])
+def test_starts_by_itself(frame: int) -> None:
+    estimate = IkTracker(MADE.options.hand).track(observe(MADE, frame))
     assert estimate.status is Status.STARTED
     assert estimate.pose is not None
-    assert endpoint_error(MODEL, estimate.pose[None], MODEL, MADE.poses[10:11]).values[0] < 40
+    assert endpoint_error(MODEL, estimate.pose[None], MODEL, MADE.poses[[frame]]).values[0] < 10
+
+
+def test_finds_the_hand_again_after_a_cut() -> None:
+    """From its palm to its back."""
+    tracker = IkTracker(MADE.options.hand)
+    tracker.start(observe(MADE, 30), MADE.poses[30])
+    after = [tracker.track(observe(MADE, frame)) for frame in (92, 93, 94)]
+    assert after[-1].pose is not None
+    assert endpoint_error(MODEL, after[-1].pose[None], MODEL, MADE.poses[[94]]).values[0] < 10
+    assert Status.STARTED in {estimate.status for estimate in after}
+
+
+def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
+    made = Synthesiser(Synthesis(model="skin", sensor="kinect1"))
+    tracker = IkTracker(made.options.hand)
+    tracker.start(observe(made, 74), made.poses[74])
+    assert {tracker.track(observe(made, frame)).status for frame in range(75, 86)} == {Status.TRACKED}
+
+
+def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
+    """A grasp seen from behind: with synergies of other grasps, drawn to or alone, angles err by half or less."""
+    made = Synthesiser(Synthesis(motion="grasp", model="skin"))
+    synergies = _synergies_of("other-grasps")
+    synergies = synergies.truncated(synergies.components_for(0.99))
+    frames = range(0, 160, 3)
+
+    def mean_error(options: IkOptions) -> float:
+        tracker = IkTracker(made.options.hand, replace(options, lost=LostBelow(0.0, np.inf)))
+        poses = [tracker.start(observe(made, 0), made.poses[0]).pose]
+        poses += [tracker.track(observe(made, frame)).pose for frame in frames[1:]]
+        return float(angle_error(np.array(poses), made.poses[frames]).values.mean())
+
+    free = mean_error(IkOptions())
+    assert mean_error(IkOptions(synergies=synergies)) < 0.7 * free
+    assert mean_error(IkOptions(synergies=synergies, soft=True)) < 0.6 * free
+
+
+def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
+    made = Synthesiser(Synthesis(motion="signs", model="skin"))
+    synergies, frames = _synergies_of("signs"), [16, 108, 330]
+
+    def errors(ladder: Ladder) -> np.ndarray:
+        fitter = SingleFrameFitter(made.options.hand, synergies, ladder)
+        poses = [fitter.estimate(observe(made, frame), made.poses[frame]) for frame in frames]
+        return angle_error(np.array(poses), made.poses[frames]).values
+
+    assert errors(Ladder()).max() < 1
+    assert errors(FLAT_LADDER).mean() > 3
+
+
+def _synergies_of(motion: str) -> Synergies:
+    return Synergies.fit(Synthesiser(Synthesis(motion=motion)).poses[:, ANGLES])
 
 
 def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:

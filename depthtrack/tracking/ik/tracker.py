@@ -31,6 +31,10 @@ Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 
 
+_LOST = LostBelow(energy=16.0)
+"""A hand seen edge on by a noisy sensor reaches 15 in its true pose."""
+
+
 @dataclass(frozen=True)
 class IkOptions:
     """How the IK tracker works; the same options and observations give the same bits.
@@ -57,7 +61,7 @@ class IkOptions:
     components: int | None = None
     soft: bool = False
     seed: int = 0
-    lost: LostBelow = field(default_factory=LostBelow)
+    lost: LostBelow = _LOST
     fit: FitOptions | None = None
     search: SearchOptions = field(default_factory=SearchOptions)
     objective: Objective = field(default_factory=Objective)
