@@ -71,11 +71,29 @@ class Ik(_Benchmark):
 
 
 @dataclass(frozen=True)
+class Segment(_Benchmark):
+    """From an RGB-D frame to the hand cut out of it, following it from the frame before, on one core.
+
+    For synthetic recordings of every camera, or recordings of your own, with colour and by depth alone.
+    """
+
+    recordings: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FOLDER ...")] = ()
+    """Sequence folders with a hand in their first frames, in place of the synthetic ones."""
+
+    def run(self) -> None:
+        from depthtrack.evaluation.bench import segmenting
+
+        self._measure(segmenting, segmenting.plan(self.recordings, self.seconds))
+
+
+@dataclass(frozen=True)
 class Command:
     """Measure speed on this machine."""
 
     what: tyro.conf.OmitSubcommandPrefixes[
-        Annotated[Score, tyro.conf.subcommand("score")] | Annotated[Ik, tyro.conf.subcommand("ik")]
+        Annotated[Score, tyro.conf.subcommand("score")]
+        | Annotated[Ik, tyro.conf.subcommand("ik")]
+        | Annotated[Segment, tyro.conf.subcommand("segment")]
     ]
 
     def run(self) -> None:
