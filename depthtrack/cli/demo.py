@@ -1,12 +1,13 @@
 """`depthtrack demo`: from nothing, or a recording of your own, to a report on both trackers, in one command."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from depthtrack.cli.source_options import SourceOptions
+from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.running import Source
@@ -31,6 +32,8 @@ class Command:
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Processes; as many as there are cores unless given."""
+    calibrate: bool = True
+    """Measure the hand of your recording first, unless it brings its sizes or --hand tells them: half a minute more."""
     open: bool = False
     """Open the report in the browser."""
 
@@ -43,7 +46,7 @@ class Command:
 
         begun = perf_counter()
         workers = chosen_workers(self.jobs, None)
-        sources = self._synthesised() if self.path is None else (self.recordings.source(self.path),)
+        sources = self._synthesised() if self.path is None else (self._own(self.path),)
         print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
         comparison = Comparison(sources, tuple(read_contenders(["pso,ik"])))
         compare_and_report(comparison, self.out, workers)
@@ -52,6 +55,17 @@ class Command:
             import webbrowser
 
             webbrowser.open((self.out / "report.html").resolve().as_uri())
+
+    def _own(self, path: Path) -> "Source":
+        """The user's recording, with its hand measured."""
+        source, file = self.recordings.source(path), self.out / f"hand-of-{path.resolve().name}.json"
+        truth = source.open().ground_truth
+        told = source.hand is not None or (truth is not None and truth.hand is not None)
+        if told or not self.calibrate:
+            return source
+        if not file.exists() and not _measure_hand(source, file):
+            return source
+        return replace(source, hand=str(file.resolve()))
 
     def _synthesised(self) -> "tuple[Source, ...]":
         """The two recordings, those that are there already as they are."""
@@ -78,3 +92,34 @@ class Command:
                 progress=lambda each: tqdm(each, "synthesising", frames, unit="frame", leave=False, disable=None),
             )
         return self.recordings.source(folder)
+
+
+def _measure_hand(source: "Source", file: Path) -> bool:
+    """Write the sizes of the recording's hand to `file`; False where it does not show a hand well enough."""
+    from tqdm import tqdm
+
+    from depthtrack.calibration.calibrate import VIEWS, calibrate
+    from depthtrack.calibration.views import choose_views
+    from depthtrack.evaluation.bench.machine import usable_cores
+
+    sequence = source.open()
+    print(f"measuring the hand: {file}", flush=True)
+    with tqdm(total=100, unit="%", leave=False, disable=None) as bar:
+
+        def tell(what: str, share: float) -> None:
+            bar.set_description(what)
+            bar.update(round(100 * share) - bar.n)
+
+        try:
+            views = choose_views(sequence, source.observer(sequence), VIEWS)
+            found = calibrate(views, threads=usable_cores(), source=f"measured on {sequence.name}", progress=tell)
+        except InputError as error:
+            print(f"its sizes cannot be told, so the average adult's are used: {error}")
+            return False
+    file.parent.mkdir(parents=True, exist_ok=True)
+    aside = file.with_name(f".{file.name}.writing")
+    aside.write_text(found.to_json(), encoding="utf-8")
+    aside.replace(file)
+    hand = found.hand
+    print(f"a {hand.side} hand, {hand.scale:.2f} times the average adult's")
+    return True
