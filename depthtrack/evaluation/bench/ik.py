@@ -209,7 +209,7 @@ def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: fl
     fitting = replace(options.fitting, rigid=0)
     synergies = options.chosen_synergies
     space = FULL if synergies is None else Space.of(synergies)
-    fitter = Fitter(film.hand, make_surface(setting.model, film.hand, fitting.agreement), fitting)
+    fitter = Fitter(film.hand, make_surface(setting.model, film.hand), fitting)
     fitter.observe(film[index], setting.subsample)
     fitter.fit(pose, space)
     return time_calls(partial(fitter.fit, pose, space), seconds)

@@ -59,8 +59,7 @@ class View(NamedTuple):
 class CapsuleSurface:
     """See the module, and `matching.Surface`."""
 
-    def __init__(self, shape: HandShape, agreement: float) -> None:
-        self._agreement = agreement
+    def __init__(self, shape: HandShape) -> None:
         self._capsules = fitted_capsules(shape)
         self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
         self._scorer = RasterScorer(shape)
@@ -73,11 +72,11 @@ class CapsuleSurface:
         self._reach = reach
         self._distances = Distances.room(len(self._capsules.body), len(cloud.points))
 
-    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, matches: Matches) -> None:
+    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
         view = View(self._scorer.render(pose), self._lens)
         place_capsules(self._capsules, bodies, self._placed)
         measure(cloud.points, self._capsules, self._placed, self._distances)
-        limits = (self._reach, self._agreement)
+        limits = (self._reach, agreement)
         choose(cloud, self._capsules, self._placed, self._distances, view, limits, matches)
 
 

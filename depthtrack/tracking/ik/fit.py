@@ -31,9 +31,10 @@ class FitOptions:
 
     `rounds` of correspondences with at most `inner` Gauss-Newton steps each, after `rigid` rounds that move the hand
     as a whole. `residual` and `softness` (m, in the first and in the last round, 0 for none) say how correspondences
-    count, `reach` (m) and `agreement` (cosine between normals) which do. `damping` is lambda of Eq. (4) and `hold` how
-    firmly the angles are tied to those of the frame before, both in m^2/rad^2 beside the sum over 3000 points;
-    `likely` (m^2) how firmly to what synergies call likely: see `prior.Prior`.
+    count, `reach` (m) and `agreement` (least cosine between normals, in the first and in the last round) which do.
+    `damping` is lambda of Eq. (4) and `hold` how firmly the angles are tied to those of the frame before, both in
+    m^2/rad^2 beside the sum over 3000 points; `likely` (m^2) how firmly to what synergies call likely: see
+    `prior.Prior`.
     """
 
     rounds: int = 5
@@ -42,22 +43,29 @@ class FitOptions:
     residual: Residual = "symmetric"
     softness: tuple[float, float] = (0.03, 0.007)
     reach: float = 0.04
-    agreement: float = 0.3
+    agreement: tuple[float, float] = (0.25, 0.6)
     damping: float = 1e-4
     hold: float = 5e-5
     likely: float = 3e-7
     avoid_limits: bool = False
 
-    def softness_at(self, round_: int, rounds: int) -> float:
-        """Graduated: outliers lose their say as the fit improves."""
-        first, last = self.softness
-        if first <= 0 or last <= 0:
-            return 0.0
-        return float(first * (last / first) ** (round_ / max(rounds - 1, 1)))
+    def strictness(self, progress: float) -> tuple[float, float]:
+        """Softness and agreement when `progress` (0 to 1) of the rounds is done: outliers lose their say as the fit
+        improves."""
+        (soft, firm), (low, high) = self.softness, self.agreement
+        softness = soft * (firm / soft) ** progress if soft > 0 and firm > 0 else 0.0
+        return float(softness), low + progress * (high - low)
 
 
 PAPER_FIT = FitOptions(
-    rigid=1, residual="point", softness=(0.0, 0.0), agreement=0.0, damping=1e-6, hold=0.0, likely=0.0, avoid_limits=True
+    rigid=1,
+    residual="point",
+    softness=(0.0, 0.0),
+    agreement=(0.0, 0.0),
+    damping=1e-6,
+    hold=0.0,
+    likely=0.0,
+    avoid_limits=True,
 )
 """Schroeder et al. 2014: point to point, all points alike, damping by the step alone, joint limit avoidance."""
 
@@ -106,20 +114,21 @@ class Fitter:
         damping = Damping(options.damping * share, 1e-9, pull.precision, pull.rest, options.avoid_limits)
         rounds = options.rounds if rounds is None else rounds
         for k in range(rounds):
-            self._match(pose, cloud, matches, options.softness_at(k, rounds))
+            self._match(pose, cloud, matches, k / max(rounds - 1, 1))
             solve(self._chain, self._moments, space, damping, options.inner, self._bodies, state)
         return pose
 
-    def _match(self, pose: Array, cloud: Cloud, matches: Matches, softness: float) -> None:
+    def _match(self, pose: Array, cloud: Cloud, matches: Matches, progress: float) -> None:
+        softness, agreement = self.options.strictness(progress)
         place(self._chain, pose, self._bodies)
-        self._surface.match(pose, self._bodies, cloud, matches)
+        self._surface.match(pose, self._bodies, cloud, agreement, matches)
         clear(self._moments, self._bodies)
         add_matches(self._moments, matches, cloud, self.options.residual, softness)
 
     def _align(self, pose: Array) -> None:
         """Move the whole hand onto its correspondences: in closed form for points (Horn 1987), else by solving."""
         matches = self._coarse_matches
-        self._match(pose, self._coarse, matches, self.options.softness[0])
+        self._match(pose, self._coarse, matches, 0.0)
         if self.options.residual != "point":
             still = Solution(pose, np.zeros(1), np.zeros(1))
             held = Space(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)

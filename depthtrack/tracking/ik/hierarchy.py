@@ -46,10 +46,10 @@ class Ladder:
     `apart` (rad, root mean square) or more. One sample is the mean posture."""
 
     stages: tuple[Stage, ...] = (
-        Stage(16, 4, 3, True),
-        Stage(8, 8, 4, True),
-        Stage(3, None, 6, True),
-        Stage(1, None, 8),
+        Stage(24, 8, 4, True),
+        Stage(8, 12, 4, True),
+        Stage(4, None, 6, True),
+        Stage(2, None, 8),
     )
     samples: int = 400
     apart: float = 0.15
@@ -79,7 +79,7 @@ class SingleFrameFitter:
         seed: int = 0,
     ) -> None:
         options = fit or FitOptions()
-        self._fitter = Fitter(shape, make_surface(model, shape, options.agreement), options)
+        self._fitter = Fitter(shape, make_surface(model, shape), options)
         self._scorer = RasterScorer(shape)
         self._synergies, self._ladder = synergies, ladder or Ladder()
         self._subsample, self._seed = subsample, seed

@@ -46,9 +46,9 @@ class Surface(Protocol):
         """Prepare for matches with points of this cloud; none will be further than `reach` (m)."""
         ...
 
-    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, matches: Matches) -> None:
+    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
         """The closest seen points of the hand in `pose` (27,), whose `bodies` are already placed, into `matches`.
 
-        Only surface whose normal agrees with the observed one counts.
+        Only surface whose normal agrees with the observed one counts: `agreement` is the least cosine between them.
         """
         ...

@@ -102,8 +102,7 @@ class Cells(NamedTuple):
 class MeshSurface:
     """See the module, and `matching.Surface`."""
 
-    def __init__(self, shape: HandShape, agreement: float) -> None:
-        self._agreement = agreement
+    def __init__(self, shape: HandShape) -> None:
         self._model = MeshModel.of(Skin.of(shape), _SPACING * shape.palm_length * shape.scale)
         count = len(self._model.rest)
         self._posed = Posed(np.empty((count, 3)), np.empty((count, 3)))
@@ -112,10 +111,10 @@ class MeshSurface:
         self._reach = reach
         self._cells = cells_over(cloud.points, _CELL, reach)
 
-    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, matches: Matches) -> None:
+    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
         skin_vertices(self._model, bodies, self._posed)
         seen = sort_seen(self._model, self._posed, self._cells, _HIDDEN)
-        closest_vertices(cloud, seen, self._cells, self._reach, self._agreement, matches.body)
+        closest_vertices(cloud, seen, self._cells, self._reach, agreement, matches.body)
         take_up(self._model, self._posed, seen, matches)
 
 

@@ -11,10 +11,10 @@ from depthtrack.tracking.ik.mesh import MeshSurface
 Model = Literal["skin", "cylinders"]
 
 
-def make_surface(model: Model, shape: HandShape, agreement: float) -> Surface:
+def make_surface(model: Model, shape: HandShape) -> Surface:
     """The surface of a hand that observations are matched to. Raises InputError for another name."""
     if model == "skin":
-        return MeshSurface(shape, agreement)
+        return MeshSurface(shape)
     if model == "cylinders":
-        return CapsuleSurface(shape, agreement)
+        return CapsuleSurface(shape)
     raise InputError(f"no hand model '{model}' for fitting: choose skin or cylinders")

@@ -100,7 +100,7 @@ class IkTracker:
             if not 1 <= getattr(options, name) <= 1000:
                 raise InputError(f"{name} must lie between 1 and 1000, found {getattr(options, name)}")
         fitting = options.fitting
-        self._fitter = Fitter(shape, make_surface(options.model, shape, fitting.agreement), fitting)
+        self._fitter = Fitter(shape, make_surface(options.model, shape), fitting)
         self._scorer = RasterScorer(shape, options.objective)
         given = options.chosen_synergies
         for name in ("components", "soft"):
