@@ -26,7 +26,7 @@ SMALLEST_BORDER = 0.04
 NEAREST_BORDER = 0.06
 """Metres from the palm's centre to where an arm leaves what is seen, at least; nearer, nothing of it would show."""
 
-NEARER = 0.04
+NEARER = 0.02
 """Metres by which an arm that vanishes too near to the sensor is nearer there than the palm."""
 
 FOREARM_START = 0.05
