@@ -5,6 +5,8 @@ camera.json           intrinsics and depth scale             sequence.json   how
 hand_poses.csv        27 pose values a timestamp             joints.csv      21 keypoints a timestamp
 hand.json             sizes of the hand
 hand_mask/, skin_mask/, exact_depth/                         PNGs named as in depth/
+
+A synthetic hand_mask/ shows the hand up to the plane of its wrist, whether the sensor has a reading there or not.
 """
 
 import json
