@@ -20,7 +20,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from depthtrack.tracking.pso.search import SearchOptions, find_pose
+from depthtrack.tracking.pso.search import SearchOptions, find_candidates, find_pose
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,9 @@ VIEWS = 16
 _FIRST = 4
 """Of these, the most open hands, on which side and scale are tried out."""
 _TRIED_SCALES = (0.76, 0.9, 1.06, 1.24)
+_WIDE = SearchOptions(rounds=SearchOptions().rounds[:2], attempts=1)
+_LIKELY, _CROSSED = 6, 6
+"""Poses of each of those frames that get sizes of their own, and sizes that are tried on the other frames."""
 _RESOLUTION = 96
 """Longest side, pixels, at which poses are searched."""
 _GOOD_VIEWS = 0.7
@@ -126,6 +129,7 @@ def calibrate(
     good = found.best(_GOOD_VIEWS)
     fit = fit_jointly([views[i] for i in good], found.poses[good], fit.values, chosen, rounds=6)
     tell("how sure is it?", 0.95)
+    fit = fit_jointly([views[i] for i in good], fit.poses, fit.values, chosen, rounds=4, exact=True)
     values = with_usual_proportions(fit.values)
     after = _refined(searcher, found.poses, values, chosen)
     energies = {s: float(begun[s][1].energies.mean()) for s in sides}
@@ -158,14 +162,28 @@ class _Searcher:
         """In all views; `poses` (V, 27) that were found before count where they are better."""
         return self._search(shape, self.observations, attempts, poses)
 
+    def candidates(self, shape: HandShape, count: int) -> list[tuple[Array, Array]]:
+        """For each of the first `count` views: likely poses (K, 27) and their energies (K,)."""
+        out = []
+        with RasterScorer(shape, threads=self._threads) as scorer:
+            for o in self.observations[:count]:
+                scorer.observe(_target(o))
+                out.append(find_candidates(scorer, o.centre, self._generator(o), _WIDE))
+        return out
+
+    def energy(self, shape: HandShape, view: int, pose: Array) -> float:
+        """Of a hand in a pose (27,), in one view."""
+        with RasterScorer(shape) as scorer:
+            scorer.observe(_target(self.observations[view]))
+            return float(scorer.score(pose[None])[0])
+
     def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
         options = SearchOptions(attempts=attempts, good_energy=0.0)
         poses, energies, agreements = [], [], []
         with RasterScorer(shape, threads=self._threads) as scorer:
             for n, o in enumerate(observations):
-                scorer.observe(Target(o.camera, o.skin, o.depth).reduced(_RESOLUTION))
-                generator = np.random.Generator(np.random.Philox(key=[self._seed, o.frame_index]))
-                pose, _ = find_pose(scorer, o.centre, generator, options)
+                scorer.observe(_target(o))
+                pose, _ = find_pose(scorer, o.centre, self._generator(o), options)
                 tried = np.stack([pose] if known is None else [pose, known[n]])
                 terms = scorer.terms(tried)
                 best = int(np.argmin(terms.energy))
@@ -174,21 +192,42 @@ class _Searcher:
                 agreements.append(float(1 - terms.skin[best]))
         return Found(np.stack(poses), np.array(energies), np.array(agreements))
 
+    def _generator(self, o: Observation) -> np.random.Generator:
+        return np.random.Generator(np.random.Philox(key=[self._seed, o.frame_index]))
+
+
+def _target(o: Observation) -> Target:
+    return Target(o.camera, o.skin, o.depth).reduced(_RESOLUTION)
+
 
 def _begin(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
-    """Sizes (35,) of which only the scale is known, and the poses of such a hand in all views."""
-    tried = {s: searcher.find(HandShape(side=side, scale=s), _FIRST) for s in _TRIED_SCALES}
-    scale = min(tried, key=lambda s: tried[s].energies.mean())
-    values = np.zeros(COUNT)
-    values[SCALE] = np.log(scale)
-    poses = tried[scale].poses
-    fit = fit_jointly(searcher.views[: len(poses)], poses, values, side, rounds=4, free=SCALE)
+    """Sizes (35,) that a few open hands tell, and the poses of such a hand in all views.
+
+    A hand of wrong sizes explains a view best in a wrong pose, one finger taken for the next. So each likely pose gets
+    the sizes that suit it, and sizes are judged by how well they explain the other views.
+    """
+    first = searcher.views[:_FIRST]
+    likely: list[list[tuple[float, Array, float]]] = [[] for _ in first]
+    for scale in _TRIED_SCALES:
+        for n, (poses, energies) in enumerate(searcher.candidates(HandShape(side=side, scale=scale), len(first))):
+            likely[n] += [(float(e), pose, scale) for pose, e in zip(poses, energies, strict=True)]
+    hands: list[tuple[float, Array]] = []
+    for n, view in enumerate(first):
+        for _, pose, scale in sorted(likely[n], key=lambda entry: entry[0])[:_LIKELY]:
+            values = np.zeros(COUNT)
+            values[SCALE] = np.log(scale)
+            fit = fit_jointly([view], pose[None], values, side, rounds=6)
+            hands.append((searcher.energy(hand_of(fit.values, side), n, fit.poses[0]), fit.values))
+    tried = [values for _, values in sorted(hands, key=lambda entry: entry[0])[:_CROSSED]]
+    found = [searcher.find(hand_of(values, side), len(first)) for values in tried]
+    best = min(range(len(tried)), key=lambda k: found[k].energies.mean())
+    fit = fit_jointly(first, found[best].poses, tried[best], side, rounds=6)
     return fit.values, searcher.find(hand_of(fit.values, side), attempts=2)
 
 
 def _refined(searcher: _Searcher, poses: Array, values: Array, side: Side) -> JointFit:
     """The poses that bring a hand of given sizes closest to each view."""
-    return fit_jointly(searcher.views, poses, values, side, rounds=6, free=slice(0, 0))
+    return fit_jointly(searcher.views, poses, values, side, rounds=8, free=slice(0, 0))
 
 
 def with_usual_proportions(values: Array) -> Array:

@@ -14,7 +14,7 @@ from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from depthtrack.calibration.sizes import COUNT, motion_of
-from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin import Skin
@@ -54,15 +54,22 @@ class View:
 
 
 class SkinModel:
-    """The skin of a hand of some sizes, as cameras see it."""
+    """The skin of a hand of some sizes, as cameras see it.
 
-    def __init__(self, shape: HandShape) -> None:
-        self.model, self._skin = HandModel(shape), Skin.of(shape)
+    While sizes are sought, it is the average hand's skin stretched along and across its bones, which takes no time;
+    `exact` makes the skin of those very sizes, and raises InputError where it does not hold together.
+    """
+
+    def __init__(self, shape: HandShape, exact: bool = False) -> None:
+        average = HandShape(side=shape.side)
+        self.model, self._skin = HandModel(shape), Skin.of(shape if exact else average)
+        self._stretch = np.tile(np.eye(4), (BODY_COUNT, 1, 1)) if exact else _stretches(shape, average)
         self.wrist = shape.wrist[1] + _WRIST_ROOM
 
     def seen(self, view: View, pose: Array) -> Surface:
         """The skin in a pose (27,) through the view's camera."""
-        vertices, skin = self._skin.at(pose), self._skin
+        skin = self._skin
+        vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)
         return rasterise(view.observation.camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
 
     def is_hand(self, pose: Array, points: Array) -> NDArray[np.bool_]:
@@ -117,6 +124,20 @@ def gather(view: View, skin: SkinModel, pose: Array, softness: float) -> Evidenc
         len(errors),
         float(np.median(found)) if len(found) else np.inf,
     )
+
+
+def _stretches(shape: HandShape, average: HandShape) -> Array:
+    """(16, 4, 4) that bring the average hand's flesh to these sizes, in the frame of the body it is fixed to."""
+    S = np.tile(np.eye(4), (BODY_COUNT, 1, 1))
+    sizes = ("palm_breadth", "palm_length", "palm_thickness")
+    S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(average, size) for size in sizes]
+    longer, wider = shape.lengths / average.lengths, (shape.radii / average.radii).mean(axis=1)
+    for finger in range(5):
+        for phalanx in range(3):
+            factors = wider[finger], longer[finger, phalanx], wider[finger]
+            S[body_of(finger, phalanx), [0, 1, 2], [0, 1, 2]] = factors
+    S[:, :3] *= shape.scale
+    return S
 
 
 def _surface_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, x: Array, normals: Array) -> _Residuals:

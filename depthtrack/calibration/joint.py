@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from depthtrack.calibration.evidence import Evidence, SkinModel, View, gather
 from depthtrack.calibration.sizes import COUNT, hand_of, prior_covariance
-from depthtrack.errors import InputError
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
 from depthtrack.hand.shape import Side
@@ -50,21 +49,25 @@ def fit_jointly(
     side: Side,
     rounds: int,
     free: slice = slice(0, COUNT),
-    softness: tuple[float, float] = _SOFTNESS,
+    exact: bool = False,
 ) -> JointFit:
-    """Sizes and poses that explain all views best, from `poses` (V, 27) and `values` (35,); only `free` sizes move."""
+    """Sizes and poses that explain all views best, from `poses` (V, 27) and `values` (35,); only `free` sizes move.
+
+    `exact` makes the skin anew in every round (see `SkinModel`), and begins where most is known already.
+    """
+    softness = (_SOFTNESS[1], _SOFTNESS[1]) if exact else _SOFTNESS
     poses, values = within_limits(poses), values.copy()
     prior = np.linalg.inv(prior_covariance())
     held = np.ones(COUNT, dtype=np.bool_)
     held[free] = False
     for k in range(rounds):
-        skin = SkinModel(hand_of(values, side))
+        skin = SkinModel(hand_of(values, side), exact)
         s = softness[0] * (softness[1] / softness[0]) ** (k / max(rounds - 1, 1))
         evidence = [gather(view, skin, pose, s) for view, pose in zip(views, poses, strict=True)]
         information, gradient, steps = _eliminate(views, evidence, poses)
         change = _solve(information + prior, -(gradient + prior @ values), held)
         change *= min(1.0, _LARGEST / max(np.abs(change).max(), 1e-12))
-        values = _possible(values, change, side)
+        values = values + change
         tangents = np.stack([own + by_sizes @ change for own, by_sizes in steps])
         poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])
@@ -105,15 +108,3 @@ def _solve(A: Array, b: Array, held: NDArray[np.bool_]) -> Array:
     free = ~held
     x[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
     return x
-
-
-def _possible(values: Array, change: Array, side: Side) -> Array:
-    """The sizes after the change, or after as much of it as leaves a hand whose skin holds together."""
-    for halving in range(4):
-        changed = values + change / 2**halving
-        try:
-            SkinModel(hand_of(changed, side))
-        except InputError:
-            continue
-        return changed
-    return values

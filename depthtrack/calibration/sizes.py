@@ -96,7 +96,7 @@ def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Ar
             body, column = body_of(finger, phalanx), LENGTHS.start + 3 * finger + phalanx
             here, beyond = bodies == body, mine & (bodies > body)
             along = T[body, :3, 1]
-            J[here, :, column] = np.maximum(local[here, 1:2], 0) * along
+            J[here, :, column] = local[here, 1:2] * along
             J[beyond, :, column] = model.lengths[finger, phalanx] * along
         across = local[mine] * [1.0, 0.0, 1.0]
         J[mine, :, WIDTHS.start + finger] = np.einsum("nij,nj->ni", T[bodies[mine], :3, :3], across)

@@ -54,18 +54,20 @@ def find_pose(
     """Pose (27,) and energy that best explain what `scorer` observes, with the palm near `centre` (3,) metres."""
     best: tuple[Array, float] | None = None
     for _ in range(options.attempts):
-        found = _search_once(scorer, centre, generator, options)
-        if best is None or found[1] < best[1]:
-            best = found
+        poses, energies = find_candidates(scorer, centre, generator, options)
+        if best is None or energies[0] < best[1]:
+            best = poses[0], float(energies[0])
         if best[1] <= options.good_energy:
             break
     assert best is not None
     return best
 
 
-def _search_once(
+def find_candidates(
     scorer: Scorer, centre: Array, generator: np.random.Generator, options: SearchOptions
-) -> tuple[Array, float]:
+) -> tuple[Array, Array]:
+    """What one search ends with: poses (K, 27) and energies (K,), the best first; one for each start of its last
+    round."""
     poses = _hypotheses(centre, generator, options.hypotheses)
     energies = scorer.score(poses)
     poses, energies = poses[np.argsort(energies)], np.sort(energies)
@@ -74,7 +76,7 @@ def _search_once(
         refined = [refine(scorer, pose, stage.spread, stage.swarm, generator) for pose in starts[: stage.starts]]
         refined.sort(key=lambda result: result[1])
         starts = np.stack([pose for pose, _ in refined])
-    return refined[0]
+    return starts, np.array([energy for _, energy in refined])
 
 
 def refine(
