@@ -291,6 +291,26 @@ def test_who_finds_no_hand_is_not_judged_by_the_easy_recordings_alone() -> None:
     assert [(each.label, each.error) for each in standings(lines)] == [("A", 6.0), ("B", float("inf"))]
 
 
+def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
+    """Without a comparison's labels: by what is unusual of them, and where nothing is, by their folders."""
+    poses = true_poses(recording)
+    more: dict[str, Any] = {"variant": "default", "particles": 64, "seed": 0}
+    runs = [
+        write_run(tmp_path / "usual", recording, poses, **more),
+        write_run(tmp_path / "paper", recording, poses, **more | {"variant": "paper"}),
+        write_run(tmp_path / "again", recording, poses, **more | {"variant": "paper", "seed": 1}),
+        write_run(tmp_path / "ik_a", recording, poses, tracker="ik", seed=0),
+        write_run(tmp_path / "ik_b", recording, poses, tracker="ik", seed=0),
+    ]
+    lines = lines_of([evaluate_run(run, residuals=False) for run in runs])
+    assert [(line.label, len(line.evaluations)) for line in lines] == [
+        ("PSO", 1),
+        ("PSO variant=paper", 2),
+        ("IK, ik_a", 1),
+        ("IK, ik_b", 1),
+    ]
+
+
 def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, runs: list[Path]) -> None:
     skin = write_run(
         runs[0].parent / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin"

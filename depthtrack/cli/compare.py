@@ -46,7 +46,8 @@ class Command:
     """Print results.json instead of the table."""
 
     def run(self) -> None:
-        from depthtrack.cli.comparing import chosen_workers, compare_and_report
+        from depthtrack.cli.comparing import compare_and_report
+        from depthtrack.evaluation.sweep.workers import chosen_workers
 
         comparison = self._comparison()
         compare_and_report(comparison, self.out, chosen_workers(self.jobs, self.scheduler), as_json=self.json)

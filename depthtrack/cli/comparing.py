@@ -7,26 +7,12 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from depthtrack.errors import InputError
-from depthtrack.evaluation.bench.machine import usable_cores
 from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
 from depthtrack.evaluation.evaluate import Evaluation
-from depthtrack.evaluation.sweep.cluster import DaskWorkers
-from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.build import write_report
-
-
-def chosen_workers(jobs: int | None, scheduler: str | None) -> Workers:
-    """A Dask cluster where its scheduler is named, else processes of this machine. Raises InputError."""
-    if scheduler is not None:
-        return DaskWorkers(scheduler)
-    jobs = usable_cores() if jobs is None else jobs
-    if not 1 <= jobs <= 1024:
-        raise InputError(f"--jobs must lie between 1 and 1024, found {jobs}")
-    return LocalWorkers(jobs)
 
 
 def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> None:

@@ -40,12 +40,13 @@ class Command:
     def run(self) -> None:
         from time import perf_counter
 
-        from depthtrack.cli.comparing import chosen_workers, compare_and_report
+        from depthtrack.cli.comparing import compare_and_report
         from depthtrack.evaluation.compare.comparison import Comparison
         from depthtrack.evaluation.compare.contenders import read_contenders
+        from depthtrack.evaluation.sweep.workers import chosen_workers
 
         begun = perf_counter()
-        workers = chosen_workers(self.jobs, None)
+        workers = chosen_workers(self.jobs)
         sources = self._synthesised() if self.path is None else (self._own(self.path),)
         print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
         comparison = Comparison(sources, tuple(read_contenders(["pso,ik"])))

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from depthtrack.evaluation.experiments.reproduce import Reproduction
-    from depthtrack.evaluation.sweep.run import Workers
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,7 @@ class Command:
         from depthtrack.evaluation.experiments.experiment import ExperimentOptions
         from depthtrack.evaluation.experiments.registry import chosen_experiments
         from depthtrack.evaluation.experiments.reproduce import reproduce
+        from depthtrack.evaluation.sweep.workers import chosen_workers
 
         names = [name for name in self.figures if name != "list"]
         experiments = chosen_experiments(names or ["all"])
@@ -70,7 +70,7 @@ class Command:
             return
         if self.out is None or not self.figures:
             raise InputError("name the figures and a folder to write to, as in  depthtrack reproduce all -o DIR")
-        workers, done = self._workers(), []
+        workers, done = chosen_workers(self.jobs, self.scheduler), []
         for experiment in experiments:
             folder = self.out / experiment.name
             done.append(reproduce(experiment, options, folder, workers, _bar(experiment.name)))
@@ -78,18 +78,6 @@ class Command:
                 print(_as_text(done[-1], folder))
         if self.json:
             print(dumps([each.to_json() for each in done], indent=2))
-
-    def _workers(self) -> "Workers":
-        from depthtrack.evaluation.bench.machine import usable_cores
-        from depthtrack.evaluation.sweep.cluster import DaskWorkers
-        from depthtrack.evaluation.sweep.local import LocalWorkers
-
-        if self.scheduler is not None:
-            return DaskWorkers(self.scheduler)
-        jobs = usable_cores() if self.jobs is None else self.jobs
-        if not 1 <= jobs <= 1024:
-            raise InputError(f"--jobs must lie between 1 and 1024, found {jobs}")
-        return LocalWorkers(jobs)
 
 
 def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterable[dict[str, object]]]":

@@ -15,6 +15,7 @@ from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.evaluation.metrics import Metric
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Workers
+from depthtrack.tracking.trackers import TRACKERS, complete_options
 
 TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
 """Errors against a truth: of the phalanx endpoints of true poses, or of annotated joints."""
@@ -104,21 +105,37 @@ def _tracker_time(evaluation: Evaluation) -> Metric:
 
 
 def label_of(evaluation: Evaluation) -> str:
-    """What a run's tracker is called: as its comparison labelled it, or by its own name."""
+    """What a run's tracker is called: as its comparison labelled it, or by its name and what is unusual of it."""
     configuration = evaluation.run.configuration
-    tracker = str(configuration.get("tracker") or "").upper()
-    return str(configuration.get("label") or tracker or evaluation.run.folder.name)
+    label, tracker = configuration.get("label"), configuration.get("tracker")
+    if isinstance(label, str) and label:
+        return label
+    if tracker not in TRACKERS:
+        return str(tracker or evaluation.run.folder.name)
+    usual = complete_options(tracker, {})
+    unusual = {name: configuration.get(name, value) for name, value in usual.items() if name not in ("seed", "threads")}
+    told = [f"{name}={value}" for name, value in unusual.items() if value != usual[name]]
+    return " ".join([tracker.upper(), *told])
 
 
 def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
-    """A line for every recording and tracker, in the order in which they first come."""
+    """A line for every recording and tracker, in the order in which they first come.
+
+    Runs of one label that have different seeds are repetitions; others are lines of their own, under their folders'
+    names too.
+    """
     groups: dict[tuple[str, str], list[Evaluation]] = {}
     for evaluation in evaluations:
         key = (str(evaluation.run.configuration.get("sequence")), label_of(evaluation))
         groups.setdefault(key, []).append(evaluation)
     recordings = list(dict.fromkeys(path for path, _ in groups))
-    ordered = sorted(groups.items(), key=lambda group: recordings.index(group[0][0]))
-    return [Line(runs[0].recording, label, tuple(runs)) for (_, label), runs in ordered]
+    lines = []
+    for (_, label), runs in sorted(groups.items(), key=lambda group: recordings.index(group[0][0])):
+        if len({run.run.configuration.get("seed") for run in runs}) == len(runs):
+            lines.append(Line(runs[0].recording, label, tuple(runs)))
+        else:
+            lines += [Line(run.recording, f"{label}, {run.run.folder.name}", (run,)) for run in runs]
+    return lines
 
 
 def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
