@@ -64,6 +64,18 @@ def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
     assert {tracker.track(observe(made, frame)).status for frame in range(75, 86)} == {Status.TRACKED}
 
 
+@pytest.mark.parametrize("model", ["skin", "cylinders"])
+@pytest.mark.parametrize("readings", [0, 1, 5])
+def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(model: Model, readings: int) -> None:
+    seen, tracker = observe(MADE, 0), IkTracker(MADE.options.hand, IkOptions(model=model))
+    depth = np.zeros_like(seen.depth)
+    some = np.flatnonzero(seen.depth)[:readings]
+    depth.flat[some] = seen.depth.flat[some]
+    tracker.start(seen, MADE.poses[0])
+    assert tracker.track(replace(seen, depth=depth)).status is Status.LOST
+    assert tracker.track(observe(MADE, 1)).status is Status.STARTED
+
+
 def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
     """A grasp seen from behind: with synergies of other grasps, drawn to or alone, angles err by half or less."""
     made = Synthesiser(Synthesis(motion="grasp", model="skin"))
@@ -112,5 +124,7 @@ def test_trackers_are_made_by_name() -> None:
     assert create_tracker("pso", MADE.options.hand, particles=8).name == "pso"
     with pytest.raises(InputError, match="choose one of pso, ik"):
         create_tracker("magic", MADE.options.hand)
+    with pytest.raises(InputError, match="point, plane, symmetric"):
+        create_tracker("ik", MADE.options.hand, residual="magic")
     with pytest.raises(InputError, match="particles"):
         create_tracker("ik", MADE.options.hand, particles=8)

@@ -156,6 +156,8 @@ def skin_vertices(model: MeshModel, bodies: Bodies, posed: Posed) -> None:
 def cells_over(points: Array, size: float, margin: float) -> Cells:
     """Cells over the image of points (N, 3) and `margin` (m) around it; `size` is a cell's side in metres at the
     points' mean depth."""
+    if points.shape[0] == 0:
+        return Cells(0.0, 0.0, 1.0, 1, 1)
     low_u = low_v = 1e9
     high_u = high_v = -1e9
     depth = 0.0

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +29,6 @@ from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
-
 
 _LOST = LostBelow(energy=16.0)
 """A hand seen edge on by a noisy sensor reaches 15 in its true pose."""
@@ -99,6 +98,8 @@ class IkTracker:
         for name in ("rounds", "inner", "subsample"):
             if not 1 <= getattr(options, name) <= 1000:
                 raise InputError(f"{name} must lie between 1 and 1000, found {getattr(options, name)}")
+        if options.residual not in (None, *get_args(Residual)):
+            raise InputError(f"no residual '{options.residual}': choose {', '.join(get_args(Residual))}")
         fitting = options.fitting
         self._fitter = Fitter(shape, make_surface(options.model, shape), fitting)
         self._scorer = RasterScorer(shape, options.objective)
