@@ -167,7 +167,8 @@ class AdaptiveSkin:
 
     def forget(self) -> None:
         """Back to the model alone."""
-        self._recent: deque[Array] = deque(maxlen=WINDOW)
+        self._recent: deque[Array] = deque()
+        self._total = np.zeros((2, BINS, BINS))
         self._classes = class_of_colour(self._offline)
 
     def learn(self, image: NDArray[np.uint8], window: Window, skin: NDArray[np.uint8], hand: NDArray[np.bool_]) -> None:
@@ -176,16 +177,19 @@ class AdaptiveSkin:
         Skin elsewhere, as a face's or the arm's, and what the hand has that is no skin, are left out.
         """
         self._recent.append(_count(image, window, skin, hand, step=3))
+        self._total += self._recent[-1]
+        if len(self._recent) > WINDOW:
+            self._total -= self._recent.popleft()
         self._classes = class_of_colour(self.posterior())
 
     def posterior(self) -> Array:
         """P = gamma P_model + (1 - gamma) P_recent (64, 64); colours not seen recently keep the model's."""
-        if not self._recent:
-            return self._offline
-        other, skin = np.add.reduce(self._recent)
+        other, skin = self._total
         seen = other + skin
-        recent = np.where(seen > 0, skin / np.maximum(seen, 1), self._offline)
-        return OFFLINE_WEIGHT * self._offline + (1 - OFFLINE_WEIGHT) * recent
+        known = seen > 0
+        blended = self._offline.copy()
+        blended[known] = OFFLINE_WEIGHT * blended[known] + (1 - OFFLINE_WEIGHT) * skin[known] / seen[known]
+        return blended
 
     def find(
         self, image: NDArray[np.uint8], window: Window, blocks: NDArray[np.uint8], stride: int
@@ -282,16 +286,18 @@ def grow_skin(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Hysteresis: 1 where `classes` (h, w) is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
     grown = (classes == SURELY_SKIN).view(np.uint8)
     beside = cv2.dilate(grown, np.ones((3, 3), np.uint8)).view(np.bool_)
-    grow_into(classes, np.flatnonzero((classes == MAYBE_SKIN) & beside), grown)
+    maybe = classes == MAYBE_SKIN
+    grow_into(classes, np.flatnonzero(maybe & beside), int(np.count_nonzero(maybe)), grown)
     return grown
 
 
 @numba.njit(cache=True)
-def grow_into(classes: NDArray[np.uint8], seeds: NDArray[np.int64], grown: NDArray[np.uint8]) -> None:
-    """Add to `grown` (h, w), in place, the `seeds` (flat indices of MAYBE_SKIN) and all MAYBE_SKIN joined to them."""
+def grow_into(classes: NDArray[np.uint8], seeds: NDArray[np.int64], most: int, grown: NDArray[np.uint8]) -> None:
+    """Add to `grown` (h, w), in place, the `seeds` (flat indices of MAYBE_SKIN) and all MAYBE_SKIN joined to them, of
+    which there are at `most` so many."""
     rows, columns = classes.shape
     label, skin = classes.ravel(), grown.ravel()
-    stack = np.empty(label.size, dtype=np.int64)
+    stack = np.empty(most, dtype=np.int64)
     for seed in seeds:
         if skin[seed] != 0:
             continue

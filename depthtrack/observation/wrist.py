@@ -128,10 +128,8 @@ def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
 
     Fingers that reach past the plane beside the arm are not connected to it there, and stay.
     """
-    beyond = np.flatnonzero(palm.paths.reached())
-    beyond = beyond[(grid.points[beyond] - plane.point) @ plane.normal > 0]
-    mask = np.zeros(grid.depth.shape, dtype=np.bool_)
-    mask.flat[beyond] = True
+    beyond = (grid.points @ plane.normal > float(plane.point @ plane.normal)).reshape(grid.depth.shape)
+    mask = palm.paths.reached() & beyond
     labels, areas = grid.within(mask).surfaces()
     goes_on = np.zeros(len(areas) + 1, dtype=np.bool_)  # the last one stands for -1, no surface
     goes_on[labels.ravel()[arm.exits]] = True
