@@ -34,8 +34,9 @@ EXIT_REACH = 0.24
 SMALLEST_AREA = 20e-4
 """Square metres a hand shows at least: a fist from the side is 40 cm^2, a child's half of that."""
 
-PALM_RADII = (0.012, 0.058)
-"""Metres: half the thickness of a child's palm seen from the side, and what is wider than any palm (a head: 75 mm)."""
+PALM_RADII = (0.012, 0.063)
+"""Metres: half the thickness of a child's palm seen from the side, and what is wider than any fist that closes around
+nothing, seen by depth alone (a head: 75 mm)."""
 
 LIMB_AREA = 10e-4
 """Square metres of surface between HAND_REACH and EXIT_REACH that make a limb; noise and held things show less."""
