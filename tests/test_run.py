@@ -93,7 +93,10 @@ def test_resuming_nothing_begins_a_run(tmp_path: Path) -> None:
         ("run.json", "{", "holds no run"),
         ("run.json", "[]", "JSON object"),
         ("poses.csv", "index\n1\n", "columns"),
-        ("poses.csv", None, "cannot read"),
+        ("run.json", "[" * 100_000, "holds no run"),
+        ("run.json", " " * (1 << 21), "at most 1,048,576 bytes"),
+        ("poses.csv", None, "is missing"),
+        ("poses.csv", "x" * 200_000 + "\n", "is no table"),
         ("timings.csv", "", "must begin with"),
         ("timings.csv", "index,swarm\n0,1\n1,x\n", "line 3: expected milliseconds"),
         ("timings.csv", "index,swarm\n0,1,2\n1,2\n", "line 2: expected 2 columns"),
@@ -109,9 +112,20 @@ def test_damaged_runs_are_refused_in_one_sentence(tmp_path: Path, name: str, tex
         Run.load(tmp_path / "run")
 
 
-def test_a_row_that_is_no_frame_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("found", "damaged", "message"),
+    [
+        ("tracked,0", "tracked,x", "line 2: expected 32 values"),
+        ("tracked,0", 'tracked,"0', "line 2: expected 32 values"),
+        ("tracked,0", "tracked", "line 2: expected 32 columns, found 31"),
+        ("\n0,", f"\n{10**30},", "line 2: .* frames are numbered from 0 to"),
+    ],
+)
+def test_a_row_that_is_no_frame_is_named(tmp_path: Path, found: str, damaged: str, message: str) -> None:
     write(tmp_path / "run", 2)
     path = tmp_path / "run" / "poses.csv"
-    path.write_text(path.read_text().replace("tracked,0", "tracked,x", 1))
-    with pytest.raises(InputError, match="line 2"):
+    text = path.read_text()
+    assert found in text
+    path.write_text(text.replace(found, damaged, 1))
+    with pytest.raises(InputError, match=message):
         Run.load(tmp_path / "run")

@@ -16,7 +16,6 @@ from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
-from depthtrack.recording.lists import MAX_FRAMES
 from depthtrack.recording.run import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.tracking.loop import hand_place
@@ -131,9 +130,7 @@ def check_rows(run: Run) -> None:
     known = {status.value for status in Status}
     for row, pose in enumerate(run.poses):
         reason = None
-        if not 0 <= run.index[row] < MAX_FRAMES:
-            reason = f"frames are numbered from 0 to {MAX_FRAMES - 1}"
-        elif run.status[row] not in known:
+        if run.status[row] not in known:
             reason = f"the status must be one of {', '.join(known)}, found '{run.status[row][:40]}'"
         elif not np.isnan(pose).all():
             reason = _why_no_pose(pose)
@@ -158,7 +155,7 @@ def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:
             "--sequence must name the recording that the run was made from"
         )
     apart = np.abs(sequence.timestamps[run.index] - run.timestamps)
-    if len(apart) and apart.max() > _SAME_TIME:
+    if len(apart) and not apart.max() <= _SAME_TIME:  # not: NaN is no time
         index = run.index[apart.argmax()]
         raise InputError(
             f"frame {index} of {path} was taken at {sequence.timestamps[index]:.6f} s, but at "

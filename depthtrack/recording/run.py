@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_NAMES, POSE_SIZE
+from depthtrack.recording.lists import MAX_FRAMES, read_lines
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
-MAX_ROWS = 10_000_000
-"""More frames than this in one run folder are refused."""
+_LARGEST_TABLE = 1 << 29
+"""Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
+_LARGEST_CONFIGURATION = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -124,8 +126,10 @@ class Run:
 def read_configuration(folder: Path) -> dict[str, Any]:
     """What `run.json` says. Raises InputError."""
     try:
-        configuration = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        configuration = json.loads("".join(read_lines(folder / "run.json", _LARGEST_CONFIGURATION)))
+    except InputError as error:
+        raise InputError(f"{folder} holds no run ({error}); make one with `depthtrack track`") from error
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{folder} holds no run (run.json: {error}); make one with `depthtrack track`") from error
     if not isinstance(configuration, dict):
         raise InputError(f"{folder / 'run.json'} must hold a JSON object")
@@ -140,6 +144,8 @@ def read_rows(folder: Path) -> list[RunRow]:
         try:
             index, timestamp, status, energy, confidence, *pose = cells
             numbers = np.array([float(x) for x in pose]) if pose[0] else None
+            if not 0 <= int(index) < MAX_FRAMES:
+                raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
             rows.append(RunRow(int(index), float(timestamp), status, float(energy), float(confidence), numbers))
         except (ValueError, IndexError) as error:
             raise InputError(f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error}") from error
@@ -165,20 +171,23 @@ def _read_timings(path: Path, count: int) -> dict[str, NDArray[np.float64]]:
 
 def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
     """Complete lines of a table, without the header if `columns` says what it must be."""
+    lines = [line for line in read_lines(path, _LARGEST_TABLE) if line.endswith("\n")]
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read {path}: {error}") from error
-    lines = text.splitlines(keepends=True)[: MAX_ROWS + 1]
-    if lines and not lines[-1].endswith("\n"):
-        lines.pop()
-    header, *rows = list(csv.reader(lines)) or [[]]
+        # No cell of ours needs quotes: one that strays in must not swallow the lines after it.
+        header, *rows = list(csv.reader(lines, quoting=csv.QUOTE_NONE)) or [[]]
+    except csv.Error as error:
+        raise InputError(f"{path} is no table: {error}") from error
     if columns is None:
         return [header, *rows]
     if tuple(header) != tuple(columns):
         raise InputError(f"{path} must begin with the columns {', '.join(columns[:5])}...")
     # A row that was cut inside its line break still has all its cells.
-    return [cells for cells in rows if len(cells) == len(columns)] if len(rows) else []
+    if rows and len(rows[-1]) != len(columns):
+        rows.pop()
+    for number, cells in enumerate(rows, start=2):
+        if len(cells) != len(columns):
+            raise InputError(f"{path}, line {number}: expected {len(columns)} columns, found {len(cells)}")
+    return rows
 
 
 def _cells(row: RunRow) -> list[str]:
