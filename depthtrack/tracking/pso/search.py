@@ -1,5 +1,6 @@
 """A pose from one observation alone: many swarms around the observed hand, the best kept (Oikonomidis 2011, Sec. 3)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,17 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import make_pose, quaternion_log, quaternion_product
 from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.tracking.looking_again import close_by
 from depthtrack.tracking.pso.spaces import TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, minimise
 
 Array = NDArray[np.float64]
+Polish = Callable[[Array], Array]
+"""Moves a pose (27,) to the nearest one that agrees better with the observation, by whatever measure."""
+
+
+_LEAST_ALONG_ARM = 0.17
+"""Cosine of the 80 degrees that a wrist bends at most (Greene and Heckman 1994), either way."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +41,9 @@ def _swarm(particles: int, generations: int) -> SwarmOptions:
 class SearchOptions:
     """How widely to look: `hypotheses` scored at random, then rounds of ever fewer and finer swarms.
 
-    Starts of the first round differ in orientation by at least `apart` radians, so that the mirrored pose and other
-    likely errors are tried and lose. A search whose energy stays above `good_energy` is repeated, `attempts` in all.
+    After each round the best `polished` poses are polished, where the search is given a way to. Starts of the first
+    round differ in orientation by at least `apart` radians, so that the mirrored pose and other likely errors are tried
+    and lose. A search whose energy stays above `good_energy` is repeated, `attempts` in all.
     """
 
     hypotheses: int = 4000
@@ -46,15 +55,24 @@ class SearchOptions:
     )
     good_energy: float = 8.0
     attempts: int = 3
+    polished: int = 16
 
 
 def find_pose(
-    scorer: Scorer, centre: Array, generator: np.random.Generator, options: SearchOptions
+    scorer: Scorer,
+    centre: Array,
+    generator: np.random.Generator,
+    options: SearchOptions,
+    polish: Polish | None = None,
+    arm: Array | None = None,
 ) -> tuple[Array, float]:
-    """Pose (27,) and energy that best explain what `scorer` observes, with the palm near `centre` (3,) metres."""
+    """Pose (27,) and energy that best explain what `scorer` observes, with the palm near `centre` (3,) metres.
+
+    `arm` (3,), unit, leads from the palm along the forearm, where that is seen.
+    """
     best: tuple[Array, float] | None = None
     for _ in range(options.attempts):
-        poses, energies = find_candidates(scorer, centre, generator, options)
+        poses, energies = find_candidates(scorer, centre, generator, options, polish, arm=arm)
         if best is None or energies[0] < best[1]:
             best = poses[0], float(energies[0])
         if best[1] <= options.good_energy:
@@ -64,19 +82,35 @@ def find_pose(
 
 
 def find_candidates(
-    scorer: Scorer, centre: Array, generator: np.random.Generator, options: SearchOptions
+    scorer: Scorer,
+    centre: Array,
+    generator: np.random.Generator,
+    options: SearchOptions,
+    polish: Polish | None = None,
+    near: Array | None = None,
+    arm: Array | None = None,
 ) -> tuple[Array, Array]:
-    """What one search ends with: poses (K, 27) and energies (K,), the best first; one for each start of its last
-    round."""
-    poses = _hypotheses(centre, generator, options.hypotheses)
+    """What one search ends with: poses (K, 27) and energies (K,), the best first.
+
+    It looks about `near` (27,) where that is given, else everywhere: see `find_pose`.
+    """
+    if near is None:
+        poses = hypotheses(centre, generator, options.hypotheses, arm)
+    else:
+        poses = close_by(near, generator, options.hypotheses)
     energies = scorer.score(poses)
     poses, energies = poses[np.argsort(energies)], np.sort(energies)
     starts = poses[_apart(poses, options.apart, options.rounds[0].starts)]
     for stage in options.rounds:
         refined = [refine(scorer, pose, stage.spread, stage.swarm, generator) for pose in starts[: stage.starts]]
-        refined.sort(key=lambda result: result[1])
-        starts = np.stack([pose for pose, _ in refined])
-    return starts, np.array([energy for _, energy in refined])
+        poses, energies = np.stack([pose for pose, _ in refined]), np.array([energy for _, energy in refined])
+        if polish is not None:
+            best = np.argsort(energies, kind="stable")[: options.polished]
+            polished = np.stack([polish(pose) for pose in poses[best]])
+            poses, energies = np.concatenate([poses, polished]), np.concatenate([energies, scorer.score(polished)])
+        order = np.argsort(energies, kind="stable")
+        starts, energies = poses[order], energies[order]
+    return starts, energies
 
 
 def refine(
@@ -97,11 +131,18 @@ def refine(
     return space.poses(found.position[None])[0], found.energy
 
 
-def _hypotheses(centre: Array, generator: np.random.Generator, count: int) -> Array:
-    """Typical postures, varied, in every orientation, the palm near the observed centre."""
+def hypotheses(centre: Array, generator: np.random.Generator, count: int, arm: Array | None = None) -> Array:
+    """Typical postures, varied, in every orientation, the palm near the observed centre.
+
+    Of the orientations, those come first that a wrist at the end of `arm` (3,) allows.
+    """
     postures = np.stack(list(POSTURES.values()))
     angles = postures[generator.integers(0, len(postures), count)] + 0.15 * generator.standard_normal((count, 20))
-    quaternions = Rotation.random(count, rng=generator).as_quat()[:, [3, 0, 1, 2]]
+    rotations = Rotation.random(count if arm is None else 4 * count, rng=generator)
+    if arm is not None:
+        towards_wrist = rotations.apply([0.0, -1.0, 0.0])
+        rotations = rotations[np.argsort(towards_wrist @ arm < _LEAST_ALONG_ARM, kind="stable")[:count]]
+    quaternions = rotations.as_quat()[:, [3, 0, 1, 2]]
     positions = centre + generator.standard_normal((count, 3)) * [0.025, 0.025, 0.012]
     return within_limits(make_pose(positions, quaternions, angles))
 

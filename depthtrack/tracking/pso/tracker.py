@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,15 +15,21 @@ from depthtrack.observation.observation import Observation
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.target import Target
+from depthtrack.tracking.ik.fit import FitOptions, Fitter
+from depthtrack.tracking.ik.space import FULL
+from depthtrack.tracking.ik.surfaces import make_surface
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.centroid import visible_centroid
-from depthtrack.tracking.pso.search import SearchOptions, find_pose, refine
+from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates, find_pose, refine
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
+
+_POLISH_EVERY, _POLISH_ROUNDS = 6, 8
+"""Every so many-th point is used where a search polishes its poses, and so many rounds."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,10 @@ class PsoOptions:
     around the last pose, its linear prediction, and the last pose moved onto the observed hand, the wider the faster
     the hand; it damps more and randomises half of the fingers near the best. Each was measured to help.
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
+    A pose whose energy is above `search.good_energy` is doubted every `look_again_every` frames (0: never), and at once
+    where the track would be lost: hands close by, every finger in some typical posture, are searched through, from
+    orientations `look_again_apart` radians apart, and the best is taken if its energy is lower by `look_again_gain`.
+    The searches of "default" fit surfaces between their rounds, as the IK tracker does.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
     """
 
@@ -46,6 +56,9 @@ class PsoOptions:
     threads: int = 1
     resolution: int | None = None
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
+    look_again_every: int = 5
+    look_again_apart: float = 0.1
+    look_again_gain: float = 0.5
     lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -70,6 +83,8 @@ class PsoTracker:
             raise InputError(f"no PSO variant '{options.variant}': choose default or paper")
         threads = {"threads": options.threads} if options.renderer == "raster" else {}
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
+        self._shape = shape
+        self._fitter: Fitter | None = None
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -79,7 +94,7 @@ class PsoTracker:
         observed = time.perf_counter()
         generator = self._generator(observation)
         if pose is None:
-            found, energy = find_pose(self._scorer, observation.centre, generator, self.options.search)
+            found, energy = self._search(observation, generator)
         else:
             given = np.asarray(pose, dtype=np.float64)
             if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
@@ -106,7 +121,10 @@ class PsoTracker:
             generator,
             options.swarm,
         )
-        return self._settle(space.poses(found.position[None])[0], found.energy, Status.TRACKED, begun, observed)
+        pose, energy = space.poses(found.position[None])[0], found.energy
+        if self._looks_again(observation, pose, energy):
+            pose, energy = self._look_again(observation, generator, pose, energy)
+        return self._settle(pose, energy, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
         """Take up a track after these estimates, as if they had been made just now."""
@@ -151,6 +169,42 @@ class PsoTracker:
             visible_centroid(depth, intrinsics) for depth in (self._scorer.target.depth, self._scorer.render(last))
         )
         return seen - expected if np.isfinite(seen + expected).all() else np.zeros(3)
+
+    def _looks_again(self, observation: Observation, pose: Array, energy: float) -> bool:
+        """Whether another pose close by may explain more: asked now and then, and where the track would be lost."""
+        options = self.options
+        if options.variant != "default" or energy <= options.search.good_energy:
+            return False
+        due = options.look_again_every > 0 and observation.frame_index % options.look_again_every == 0
+        return due or self._memory.is_lost(energy, float(1 - self._scorer.terms(pose[None]).skin[0]))
+
+    def _look_again(
+        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float
+    ) -> tuple[Array, float]:
+        """The better of a pose and what is found close by."""
+        options, polish = replace(self.options.search, apart=self.options.look_again_apart), self._polish(observation)
+        poses, energies = find_candidates(self._scorer, observation.centre, generator, options, polish, near=pose)
+        better = energies[0] < energy - self.options.look_again_gain
+        return (poses[0], float(energies[0])) if better else (pose, energy)
+
+    def _search(self, observation: Observation, generator: np.random.Generator) -> tuple[Array, float]:
+        """A pose and its energy from the observation alone."""
+        options, centre = self.options.search, observation.centre
+        if self.options.variant == "paper":
+            return find_pose(self._scorer, centre, generator, options)
+        polish, arm = self._polish(observation), observation.arm_direction
+        return find_pose(self._scorer, centre, generator, options, polish, arm)
+
+    def _polish(self, observation: Observation) -> Polish | None:
+        """The skin drawn to the observed surface; None for sizes that no skin fits."""
+        if self._fitter is None:
+            try:
+                self._fitter = Fitter(self._shape, make_surface("skin", self._shape), FitOptions())
+            except InputError:
+                return None
+        fitter = self._fitter
+        fitter.observe(observation, _POLISH_EVERY)
+        return lambda pose: fitter.fit(pose, FULL, _POLISH_ROUNDS)
 
     def _generator(self, observation: Observation) -> np.random.Generator:
         """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""

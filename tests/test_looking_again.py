@@ -1,0 +1,63 @@
+"""Second thoughts: a track that took one finger for the next finds back, and searches respect what a wrist can do."""
+
+import numpy as np
+
+from depthtrack.evaluation.metrics import endpoint_error
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import ANGLES, POSITION, rotation_matrix
+from depthtrack.hand.postures import POSTURES
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.looking_again import close_by
+from depthtrack.tracking.pso.search import hypotheses
+from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
+from depthtrack.tracking.tracker import Estimate, Status
+from tests.synthetic_observations import observe
+
+MADE = Synthesiser(Synthesis(model="skin"))
+MODEL = HandModel(MADE.options.hand)
+
+
+def _shifted(pose: np.ndarray) -> np.ndarray:
+    """The palm one finger further, the middle finger folded: each other finger where the next one was."""
+    wrong = pose.copy()
+    towards_thumb = rotation_matrix(pose[3:7])[:, 0] * MADE.options.hand.mirror
+    wrong[POSITION] += 0.02 * towards_thumb
+    wrong[ANGLES] = POSTURES["open"]
+    wrong[ANGLES][8:12] = POSTURES["fist"][8:12]
+    return wrong
+
+
+def _error_after(options: PsoOptions, frames: range) -> float:
+    tracker = PsoTracker(MADE.options.hand, options)
+    wrong = _shifted(MADE.poses[frames.start - 1])
+    tracker.recall([Estimate(wrong, 20.0, 0.75, Status.TRACKED)] * 3)
+    last = [tracker.track(observe(MADE, i)) for i in frames][-1]
+    assert last.pose is not None
+    truth = MADE.poses[frames.stop - 1 : frames.stop]
+    return float(endpoint_error(MODEL, last.pose[None], MODEL, truth).values[0])
+
+
+def test_a_wrong_pose_is_left_for_a_better_one_close_by() -> None:
+    frames = range(8, 12)
+    assert _error_after(PsoOptions(resolution=96, look_again_every=2), frames) < 6
+
+
+def test_poses_close_by_are_possible_and_close() -> None:
+    poses = close_by(MADE.poses[20], np.random.default_rng(1), 500)
+    angles = poses[:, ANGLES]
+    assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
+    assert np.linalg.norm(poses[:, POSITION] - MADE.poses[20, POSITION], axis=1).max() < 0.12
+    # Some keep the fingers, as far as they are varied, and others change them all.
+    change = np.abs(angles - MADE.poses[20, ANGLES]).max(axis=1)
+    assert change.min() < 0.4
+    assert np.median(change) > 0.6
+
+
+def test_orientations_that_no_wrist_allows_are_left_out() -> None:
+    arm = np.array([0.0, 0.6, 0.8])
+    poses = hypotheses(np.array([0, 0, 0.5]), np.random.default_rng(2), 400, arm)
+    towards_wrist = -rotation_matrix(poses[:, 3:7])[:, :, 1]
+    assert (towards_wrist @ arm > 0.15).all()
+    free = hypotheses(np.array([0, 0, 0.5]), np.random.default_rng(2), 400)
+    assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
