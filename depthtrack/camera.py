@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.text_files import read_text
 
 MAX_SIDE = 8192
 """Largest image side accepted, in pixels: bounds the memory an absurd header can ask for."""
@@ -93,8 +94,8 @@ class Camera:
     def from_json(cls, path: Path) -> Self:
         """Read `camera.json`. Raises InputError when it is missing, not JSON, or describes no usable camera."""
         try:
-            fields = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as error:
+            fields = json.loads(read_text(path))
+        except (InputError, ValueError, RecursionError) as error:
             raise InputError(f"cannot read the camera file {path}: {error}") from error
         return cls.from_dict(fields, str(path))
 

@@ -21,6 +21,7 @@ from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig_shape import bone_frames, measured_shape
 from depthtrack.hand.shape import Side
 from depthtrack.hand.skin import Array, Skin
+from depthtrack.text_files import read_text
 
 Indices = NDArray[np.int64]
 
@@ -49,8 +50,8 @@ def load_skin(
 
 def _read_mapping(path: Path) -> Mapping[str, str]:
     try:
-        mapping = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        mapping = json.loads(read_text(path))
+    except (InputError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read the joint mapping {path}: {error}") from error
     if not isinstance(mapping, dict) or not all(isinstance(joint, str) for joint in mapping.values()):
         raise InputError(f'{path} must be one JSON object like {{"index_0": "name in the rig", ...}}')

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import FINGERS
+from depthtrack.text_files import read_text
 
 Side = Literal["right", "left"]
 
@@ -130,11 +131,12 @@ class HandShape:
     @classmethod
     def from_json(cls, path: Path) -> Self:
         """Read `hand.json`. Raises InputError naming what is missing or out of range."""
+        text = read_text(path)
         try:
-            return cls.from_fields(json.loads(path.read_text(encoding="utf-8")))
+            return cls.from_fields(json.loads(text))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-        except (OSError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"cannot read the hand file {path}: {error}") from error
         except KeyError as error:
             raise InputError(

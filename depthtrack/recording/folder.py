@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from depthtrack.camera import Camera
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.recording.images import read_colour, read_depth, read_header, read_mask
-from depthtrack.recording.lists import associate, check_size, is_inside, read_lines, read_list
+from depthtrack.recording.lists import associate, is_inside, read_list
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.recording.truth import read_ground_truth
+from depthtrack.text_files import check_size, read_text
 
 EXACT_DEPTH_SCALE = 0.00005
 """Metres per unit of `exact_depth/`: steps of 0.05 mm up to 3.27 m. `sequence.json` may state another."""
@@ -160,7 +161,7 @@ def _read_description(folder: Path) -> Mapping[str, Any]:
     if not path.exists():
         return {}
     try:
-        fields = json.loads("".join(read_lines(path, _MAX_JSON_BYTES)), parse_constant=_refuse_constant)
+        fields = json.loads(read_text(path, _MAX_JSON_BYTES), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} must be a JSON object that says how the recording was made: {error}") from error
     if not isinstance(fields, dict):

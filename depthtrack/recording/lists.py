@@ -6,11 +6,12 @@ Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012,
 import heapq
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from depthtrack.errors import InputError
+from depthtrack.text_files import read_lines
 
 MAX_FRAMES = 1_000_000
 """Most images in one list: nine hours at 30 Hz."""
@@ -55,28 +56,6 @@ def read_list(folder: Path, list_name: str) -> list[ListedFile]:
     if not files:
         raise InputError(f"{path} lists no image: expected lines of the form 'timestamp filename'")
     return files
-
-
-def read_lines(path: Path, largest: int) -> Iterator[str]:
-    """Lines of a UTF-8 file of at most `largest` bytes, one at a time. Raises InputError."""
-    check_size(path, largest)
-    try:
-        # The mark that some spreadsheets put before UTF-8 is no part of the text.
-        with path.open(encoding="utf-8-sig") as file:
-            yield from file
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} must be a text file, found bytes that are not UTF-8") from error
-
-
-def check_size(path: Path, largest: int) -> None:
-    """Raise InputError unless `path` is a regular file of at most `largest` bytes."""
-    if not path.is_file():
-        raise InputError(f"{path} is missing or no regular file")
-    size = path.stat().st_size
-    if size > largest:
-        raise InputError(f"{path} must be at most {largest:,} bytes long, found {size:,}")
 
 
 def associate(

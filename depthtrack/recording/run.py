@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_NAMES, POSE_SIZE
-from depthtrack.recording.lists import MAX_FRAMES, read_lines
+from depthtrack.recording.lists import MAX_FRAMES
+from depthtrack.text_files import read_lines, read_text
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
 _LARGEST_TABLE = 1 << 29
 """Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
-_LARGEST_CONFIGURATION = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Run:
 def read_configuration(folder: Path) -> dict[str, Any]:
     """What `run.json` says. Raises InputError."""
     try:
-        configuration = json.loads("".join(read_lines(folder / "run.json", _LARGEST_CONFIGURATION)))
+        configuration = json.loads(read_text(folder / "run.json"))
     except InputError as error:
         raise InputError(f"{folder} holds no run ({error}); make one with `depthtrack track`") from error
     except (ValueError, RecursionError) as error:

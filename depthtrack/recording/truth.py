@@ -11,8 +11,8 @@ from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.lists import check_size, read_lines
 from depthtrack.recording.sequence import GroundTruth
+from depthtrack.text_files import check_size, read_lines
 
 POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
 QUATERNION_TOLERANCE = 1e-3

@@ -15,7 +15,8 @@ from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.recording.joints.benchmarks import Benchmark
 from depthtrack.recording.joints.writing import written_aside
-from depthtrack.recording.lists import MAX_FRAMES, read_lines
+from depthtrack.recording.lists import MAX_FRAMES
+from depthtrack.text_files import read_lines
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.shape import Side
-from depthtrack.recording.lists import check_size
 from depthtrack.recording.postures.joints import postures_of_joints
 from depthtrack.recording.postures.posture_set import MAX_BYTES, Array, PostureSet, check_count
+from depthtrack.text_files import check_size
 
 MAX_TRACKS = 10_000
 _MOST = 1 << 28

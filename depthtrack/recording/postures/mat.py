@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.recording.lists import read_lines
 from depthtrack.recording.postures.posture_set import MAX_BYTES, PostureSet, check_angles, check_count
+from depthtrack.text_files import read_lines
 
 COLUMNS, GLOBAL_COLUMNS = 26, 6
 _BINARY = (b"MATLAB", b"\x89HDF")

@@ -16,9 +16,9 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ANGLE_NAMES
-from depthtrack.recording.lists import read_lines
 from depthtrack.recording.postures.joints import postures_of_joints
 from depthtrack.recording.postures.posture_set import MAX_BYTES, Array, PostureSet, check_angles, check_count
+from depthtrack.text_files import read_lines
 
 FILES_IN_FOLDERS = ("hand_poses.csv", "poses.csv", "joints.csv")
 """What is read of a recording or run folder: the first of these that it has."""
