@@ -22,7 +22,8 @@ class SearchOptions:
     """How a pose is found from nothing: `hypotheses` drawn at random go through `stages` of ever fewer.
 
     Those that the first stage takes up differ in orientation by at least `apart` radians, so that likely errors are
-    tried and lose. An energy of `good_energy` ends the search, else it is repeated up to `attempts` times in all.
+    tried and lose. An energy of `good_energy` ends the search; else it is repeated, up to `attempts` times in all,
+    until that gains less than the share `gain`: a hand of other sizes than the model's has no good pose.
     """
 
     hypotheses: int = 3000
@@ -30,6 +31,7 @@ class SearchOptions:
     stages: tuple[Stage, ...] = (Stage(48, 8, 3), Stage(16, None, 4), Stage(6, None, 8), Stage(2, None, 12))
     good_energy: float = 12.0
     attempts: int = 4
+    gain: float = 0.1
 
 
 def find_pose(
@@ -46,9 +48,10 @@ def find_pose(
         poses = by_energy(scorer, _hypotheses(centre, synergies, generator, options.hypotheses))[0]
         poses = poses[_apart(poses, options.apart, options.stages[0].keep)]
         poses, energies = descend(fitter, scorer, poses, synergies, options.stages)
+        before = lowest
         if energies[0] < lowest:
             best, lowest = poses[0], float(energies[0])
-        if lowest <= options.good_energy:
+        if lowest <= options.good_energy or lowest > (1 - options.gain) * before:
             break
     return best, lowest
 
