@@ -79,6 +79,8 @@ def test_a_run_goes_on_only_with_its_own_options(tmp_path: Path) -> None:
     write(tmp_path / "run", 2)
     with pytest.raises(InputError, match="seed = 3, not 4"):
         RunWriter(tmp_path / "run", {**CONFIGURATION, "seed": 4}, STAGES, resume=True)
+    with pytest.raises(InputError, match="tracker = 'pso', not 'ik'"):
+        RunWriter(tmp_path / "run", {**CONFIGURATION, "inner": 5, "tracker": "ik"}, STAGES, resume=True)
     RunWriter(tmp_path / "run", {**CONFIGURATION, "threads": 1}, STAGES, resume=True).close()
 
 

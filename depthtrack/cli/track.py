@@ -33,7 +33,7 @@ class Command:
     """Sizes of the hand; unless given, the recording's own, or the average adult's right hand."""
     start: Literal["auto", "truth"] = "auto"
     """Begin by searching, or from the recording's true pose of its first frame."""
-    frames: int | None = None
+    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Only the first so many frames."""
     resume: bool = False
     """Go on with the run that the folder holds."""

@@ -17,9 +17,9 @@ class Command:
     hand_mask/, whose forearms should then be covered. Use the result with --skin-model.
     """
 
-    images: Annotated[Path, tyro.conf.Positional]
+    images: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="IMAGES")]
     """Folder of images, or a recording."""
-    masks: Annotated[Path | None, tyro.conf.Positional] = None
+    masks: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="MASKS")] = None
     """Folder of masks; not needed for a recording."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")] = None
     """Where to write the model."""

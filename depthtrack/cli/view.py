@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from depthtrack.viewing.rerun_viewer import RerunViewer
 
 MOST_MOMENTS = 200
-INSTALL_HINT = "pip install 'depthtrack[view]'"
 
 
 @dataclass(frozen=True)
@@ -169,21 +169,6 @@ class Command:
         from depthtrack.viewing.estimated_masks import mask_estimator
 
         return mask_estimator()
-
-
-def why_no_window() -> str | None:
-    """What keeps the interactive viewer from opening, and what to do; None when nothing does."""
-    import os
-    import sys
-    from importlib.util import find_spec
-
-    if find_spec("rerun") is None:
-        return f"for the interactive viewer:  {INSTALL_HINT}"
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return (
-            "there is no screen for the interactive viewer: --web serves it to a browser, --rrd FILE.rrd saves for it"
-        )
-    return None
 
 
 def _viewer(sequence: "Sequence", near: float, far: float) -> "RerunViewer":

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,8 +43,6 @@ def view_run(options: "Command") -> None:
 
 def _show(replay: "Replay", options: "Command") -> None:
     """The interactive viewer, or the next best thing."""
-    from depthtrack.cli.view import why_no_window
-
     reason = why_no_window()
     if reason is not None:
         _write_sheet(replay, options, Path(f"{replay.run.folder.resolve().name}-contact-sheet.png"))

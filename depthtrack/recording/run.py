@@ -214,7 +214,8 @@ def _replace(path: Path, text: str) -> None:
 
 def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
     """A run goes on only as it began; threads, versions and machine may differ. Raises InputError."""
-    for key in sorted(set(found) | set(wanted)):
+    # The tracker first, for its options follow from it.
+    for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             raise InputError(
                 f"{folder} was begun with {key} = {found.get(key)!r}, not {wanted.get(key)!r}: "
