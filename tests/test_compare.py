@@ -190,13 +190,13 @@ def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, t
 
 
 def test_a_dask_cluster_makes_the_same_runs(recording: Path, compared: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    arguments = ["compare", str(recording), "-o", str(out), "--trackers", QUICK, "--repeats", "2"]
+    out, surface = tmp_path / "out", QUICK[QUICK.index("ik:") :]
+    arguments = ["compare", str(recording), "-o", str(out), "--trackers", surface, "--repeats", "2"]
     with dask_scheduler(tmp_path) as (address, _), dask_workers(address, tmp_path):
         assert main([*arguments, "--scheduler", address]) == 0
-    for run in (compared / "runs").iterdir():
-        assert (out / "runs" / run.name / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
-    assert len(json.loads((out / "results.json").read_text())) == 4
+    for run in (out / "runs").iterdir():
+        assert (run / "poses.csv").read_bytes() == (compared / "runs" / run.name / "poses.csv").read_bytes()
+    assert len(json.loads((out / "results.json").read_text())) == 2
 
 
 def test_other_options_need_another_folder(recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -259,7 +259,7 @@ def test_equal_figures_have_no_winner() -> None:
 def test_many_trackers_and_equal_time() -> None:
     lines: list[Line] = [Told("a", "A", 3.0, lost=2), Told("a", "B", 0.5, ms=9), Told("a", "C", 7.0, lost=1)]
     assert said(lines, equal_ms=10) == (
-        "Of three trackers, B follows the hand most closely. B's mean endpoint error is 0.50 mm, A's 3.0 mm and "
+        "B follows the hand most closely of three trackers. B's mean endpoint error is 0.50 mm, A's 3.0 mm and "
         "C's 7.0 mm. Each was given 10 ms a frame; taken were: B 9.0 ms, A 10.0 ms and C 10.0 ms. "
         "The hand was lost by A in 2 of 100 frames and C in 1 of 100 frames; never by B."
     )
@@ -281,6 +281,7 @@ def test_different_winners_are_told_apart() -> None:
 def test_recordings_without_a_truth_are_left_out_of_errors() -> None:
     lines: list[Line] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", None), Told("b", "B", None, e3d=1.0)]
     text = said(lines)
+    assert text.startswith("Where the truth is known, A follows the hand more closely than B.")
     assert "Where no truth is known, the sensor's points lie nearest to B on 1 of 1." in text
     assert "A's mean endpoint error is 3.0 mm on the one of two recordings with a known truth, B's 4.0 mm." in text
     assert [round(each.error, 6) for each in standings([Told("a", "A", 3.0), Told("b", "A", 5.0)])] == [4.0]

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.camera import Camera
 from depthtrack.evaluation.compare.results import figures_of
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.replay import Replay
@@ -16,7 +17,7 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.surface import Surface
 from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import Shown
-from depthtrack.viewing.close_ups import close_ups
+from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.moments import Moment, true_keypoints
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
@@ -28,6 +29,8 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 _TRUE: Rgb = (255, 255, 255)
+_SIDE_ROOM = 1.15
+"""Half the width of a window over how far the hand reaches to a side."""
 _MOST_BESIDE = 3
 """More panels than this go into two rows."""
 
@@ -55,7 +58,7 @@ class SideBySide:
         self.indices = sorted(set().union(*(panel.row_of for panel in self._panels)))
         keypoints = self._keypoints()
         known = np.asarray(np.isfinite(keypoints).all(axis=(1, 2)), dtype=np.bool_)
-        windows = close_ups(self.sequence.camera, keypoints, known)
+        windows = _narrowed(close_ups(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
         self._windows = dict(zip(self.indices, windows, strict=True))
         depths = keypoints[known, :, 2]
         near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
@@ -128,6 +131,17 @@ def _panel(shown: Shown, metric: str, sequence: Path | None) -> _Panel:
     values = np.full(evaluation.frames, np.nan) if found is None else found.values
     unit = "" if found is None else found.unit
     return _Panel(shown, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
+
+
+def _narrowed(windows: list[Window], camera: Camera, keypoints: Array, known: NDArray[np.bool_]) -> list[Window]:
+    """The windows (N) without what the hand leaves empty at both sides, though never higher than wide."""
+    width, height = windows[0][2:]
+    if not known.any() or width <= height:
+        return windows
+    middles = np.array([left + width / 2 for left, *_ in windows])
+    reach = np.abs(camera.project(keypoints[known])[..., 0] - middles[known, None]).max(axis=1)
+    narrow = min(width, max(height, round(2 * _SIDE_ROOM * float(np.percentile(reach, 98)))))
+    return [(left + (width - narrow) // 2, top, narrow, height) for left, top, *_ in windows]
 
 
 def _outlined(image: Image, surface: Surface, colour: Rgb) -> Image:

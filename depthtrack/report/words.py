@@ -49,9 +49,8 @@ def error_name(lines: Sequence[Line]) -> str:
 
 def where(lines: Sequence[Line]) -> str:
     """On which recordings trackers are judged, where that is not all there is to say."""
-    every = {line.source for line in lines}
-    judged = {line.source for line in lines if _error(line, lines) is not None}
-    if len(judged) < len(every):
+    every, judged = {line.source for line in lines}, _winners(lines)
+    if not _all_judged(lines):
         return f" on the {_count(len(judged))} of {_count(len(every))} recordings with a known truth"
     return " over all recordings" if len(every) > 1 else ""
 
@@ -100,10 +99,14 @@ def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
     told += f", {listed(against)}." if against else "."
     alike = [standing.label for standing in found if standing.error < ALIKE * first.error]
     if len(alike) > 1:
-        return f"{listed(alike)} follow the hand equally closely", told
-    if len(found) == 2:
-        return f"{first.label} follows the hand more closely than {found[1].label}", told
-    return f"Of {_count(len(found))} trackers, {first.label} follows the hand most closely", told
+        headline = f"{listed(alike)} follow the hand equally closely"
+    elif len(found) == 2:
+        headline = f"{first.label} follows the hand more closely than {found[1].label}"
+    else:
+        headline = f"{first.label} follows the hand most closely of {_count(len(found))} trackers"
+    # Elsewhere, it may be otherwise.
+    headline = headline if _all_judged(lines) else f"Where the truth is known, {headline}"
+    return headline, told
 
 
 def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
@@ -147,6 +150,11 @@ def _winners(lines: Sequence[Line]) -> dict[str, str]:
         if error is not None and (line.source not in found or error < found[line.source][0]):
             found[line.source] = (error, line.label)
     return {source: label for source, (_, label) in found.items()}
+
+
+def _all_judged(lines: Sequence[Line]) -> bool:
+    """Whether every recording says how close trackers are."""
+    return set(_winners(lines)) == {line.source for line in lines}
 
 
 def _error(line: Line, lines: Sequence[Line]) -> float | None:
