@@ -168,4 +168,6 @@ def test_recordings_without_a_hand_are_refused(tmp_path: Path, capsys: pytest.Ca
         choose_views(open_sequence(empty), Observer(), 4)
     assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
     assert "calibrating needs at least 3 frames" in capsys.readouterr().err
+    assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2
+    assert "is a folder: name a file in it" in capsys.readouterr().err
     assert not (tmp_path / "hand.json").exists()

@@ -85,6 +85,13 @@ def test_contenders_that_make_no_sense_are_refused(text: str, told: str) -> None
         read_contenders([text])
 
 
+def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "trackers.toml"
+    file.write_text("ik = " + "[" * 50_000)
+    with pytest.raises(InputError, match="cannot read the trackers"):
+        read_contenders([str(file)])
+
+
 @given(st.floats(0.5, 500), st.floats(0, 20), st.floats(0.1, 40))
 def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float) -> None:
     """Whatever a tracker's costs, linear in its work: within a step of the work, or at the least work there is."""

@@ -53,6 +53,8 @@ class Command:
         for path in (self.out, picture):
             if not path.parent.is_dir():
                 raise InputError(f"the folder {path.parent} does not exist: create it first")
+            if path.is_dir():
+                raise InputError(f"{path} is a folder: name a file in it")
         sequence = self.recording.open()
         observer = Observer.for_sequence(sequence, self.skin_model)
         with tqdm(total=100, unit="%", bar_format="{desc}: {percentage:3.0f}% |{bar}|", disable=None) as bar:

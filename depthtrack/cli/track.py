@@ -60,6 +60,8 @@ class Command:
         from depthtrack.tracking.loop import track_sequence
         from depthtrack.tracking.trackers import create_tracker
 
+        if self.frames is not None and self.frames < 1:
+            raise InputError(f"--frames must be at least 1, found {self.frames}")
         sequence = self.recording.open()
         hand = chosen_hand(sequence, self.hand)
         options = self._options()

@@ -10,6 +10,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from depthtrack.errors import InputError
+from depthtrack.text_files import read_text
 from depthtrack.tracking.trackers import TRACKERS, complete_options
 
 _COMPARISONS = ("seed", "threads")
@@ -71,8 +72,8 @@ def _from_text(text: str) -> list[Contender]:
 
 def _from_file(path: Path) -> list[Contender]:
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        tables = tomllib.loads(read_text(path))
+    except (InputError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"cannot read the trackers in {path}: {error}") from error
     found = []
     for label, table in tables.items():
