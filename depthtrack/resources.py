@@ -1,5 +1,6 @@
-"""Finds the data folders that travel with the program: `sequences/` and `shaders/`."""
+"""What the program finds around it: data folders that travel with it (`sequences/`, `shaders/`), and cores."""
 
+import os
 from pathlib import Path
 
 from depthtrack.errors import InputError
@@ -19,3 +20,8 @@ def resource_folder(name: str) -> Path:
         f"the folder '{name}' of depthtrack is missing beside {_PACKAGE}: "
         "reinstall with  pip install --force-reinstall depthtrack"
     )
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on; where the system does not tell, all there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -14,7 +14,7 @@ from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.evaluation.bench import scoring
 from depthtrack.evaluation.bench.isolation import in_own_process
-from depthtrack.evaluation.bench.machine import describe_machine, usable_cores
+from depthtrack.evaluation.bench.machine import describe_machine
 from depthtrack.evaluation.bench.rivals import INSTALL, RIVALS, Rival, RivalMissingError
 from depthtrack.evaluation.bench.timing import time_calls
 from depthtrack.evaluation.bench.workload import CHECKED, HYPOTHESES, ROIS, make_workloads
@@ -22,6 +22,7 @@ from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.resources import usable_cores
 
 
 def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:

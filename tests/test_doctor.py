@@ -13,6 +13,7 @@ from depthtrack.rendering.doctor import Machine, Outcome, Trial, attempt
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.selfcheck import SelfCheck, self_check
+from depthtrack.resources import usable_cores
 
 GOOD = SelfCheck("numba", True, 1e-5, 1e-7, 0, 70000, 123456.0)
 TRIAL = Trial("a renderer", "egl", {"device": "gpu"})
@@ -152,5 +153,5 @@ def test_everything_there_is_gets_tried() -> None:
     assert labels[0] == "raster"
     assert {"egl on a GPU", "egl in software", "osmesa", "oracle"} < set(labels)
     machine = Machine.here()
-    assert machine.threads == doctor.available_threads()
+    assert machine.threads == usable_cores()
     assert machine.libraries["numba"]

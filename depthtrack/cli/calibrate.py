@@ -38,7 +38,6 @@ class Command:
     """Print JSON instead of text."""
 
     def run(self) -> None:
-        import os
         from json import dumps
 
         from tqdm import tqdm
@@ -46,6 +45,7 @@ class Command:
         from depthtrack.calibration.calibrate import VIEWS, calibrate, summary
         from depthtrack.calibration.views import choose_views
         from depthtrack.observation.observation import Observer
+        from depthtrack.resources import usable_cores
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
 
@@ -69,7 +69,7 @@ class Command:
                 observations,
                 None if self.side == "auto" else self.side,
                 self.seed,
-                self.threads or len(os.sched_getaffinity(0)),
+                self.threads or usable_cores(),
                 f"calibrated on {sequence.name}",
                 tell,
             )

@@ -75,8 +75,8 @@ class Command:
     def _recording(self, name: str, model: Literal["skin", "primitives"]) -> "Source":
         from tqdm import tqdm
 
-        from depthtrack.evaluation.bench.machine import usable_cores
         from depthtrack.recording import open_sequence
+        from depthtrack.resources import usable_cores
         from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 
         folder = self.out / "recordings" / name
@@ -101,7 +101,7 @@ def _measure_hand(source: "Source", file: Path) -> bool:
 
     from depthtrack.calibration.calibrate import VIEWS, calibrate
     from depthtrack.calibration.views import choose_views
-    from depthtrack.evaluation.bench.machine import usable_cores
+    from depthtrack.resources import usable_cores
 
     sequence = source.open()
     print(f"measuring the hand: {file}", flush=True)

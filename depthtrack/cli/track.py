@@ -95,13 +95,12 @@ class Command:
 
     def _options(self) -> dict[str, Any]:
         """What the chosen tracker is made with: what was given, and what it would do anyway."""
-        import os
-
+        from depthtrack.resources import usable_cores
         from depthtrack.tracking.trackers import complete_options
 
         given = {"variant": self.variant, "seed": self.seed} | chosen_options(self.tracker, self.pso, self.ik)
         if self.tracker == "pso":
-            given.setdefault("threads", len(os.sched_getaffinity(0)))
+            given.setdefault("threads", usable_cores())
         return complete_options(self.tracker, given)
 
     def _start_pose(self, sequence: "Sequence") -> "np.ndarray | None":

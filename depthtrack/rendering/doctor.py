@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import depthtrack
 from depthtrack.rendering.selfcheck import SelfCheck
+from depthtrack.resources import usable_cores
 
 _LIBRARIES = (
     *("numpy", "scipy", "numba", "llvmlite", "opencv-python-headless", "PyOpenGL", "trimesh", "matplotlib", "tyro"),
@@ -44,7 +45,7 @@ class Machine:
             python=platform.python_version(),
             system=f"{platform.system()} {platform.release()} {platform.machine()}",
             processor=_model_name() or binding.get_host_cpu_name(),
-            threads=available_threads(),
+            threads=usable_cores(),
             avx2=bool(features.get("avx2")),
             avx512=bool(features.get("avx512f")),
             libraries={name: _version(name) for name in _LIBRARIES},
@@ -75,7 +76,7 @@ class Outcome:
 
 def trials() -> list[Trial]:
     """Everything there is to try on this machine."""
-    threads = available_threads()
+    threads = usable_cores()
     parallel = [Trial(f"raster, {threads} threads", "raster", {"threads": threads})] if threads > 1 else []
     return [
         Trial("raster", "raster"),
@@ -136,11 +137,6 @@ def _outcome(trial: Trial, code: int, printed: str, complaints: str) -> Outcome:
     except (ValueError, TypeError):
         return Outcome(trial, None, f"failed with exit code {code}: {last_words}")
     return Outcome(trial, check, None if check.agrees else "disagrees with the oracle: its driver miscalculates")
-
-
-def available_threads() -> int:
-    """How many threads this process may run at once."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _model_name() -> str | None:

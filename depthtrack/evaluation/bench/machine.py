@@ -9,6 +9,7 @@ from pathlib import Path
 from llvmlite.binding import get_host_cpu_features
 
 from depthtrack import __version__
+from depthtrack.resources import usable_cores
 
 _FEATURES = ("sse4.2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 _PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "PyOpenGL", "trimesh", "embreex", "open3d", "pyrender")
@@ -37,11 +38,6 @@ def describe_machine() -> Machine:
         versions={"depthtrack": __version__, "python": platform.python_version(), **_versions()},
         load=os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     )
-
-
-def usable_cores() -> int:
-    """Cores that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _cpu_model() -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from depthtrack.errors import DepthtrackError, InputError
 from depthtrack.evaluation.bench.isolation import in_own_process
-from depthtrack.evaluation.bench.machine import Machine, describe_machine, usable_cores
+from depthtrack.evaluation.bench.machine import Machine, describe_machine
 from depthtrack.evaluation.bench.rivals import RIVALS
 from depthtrack.evaluation.bench.table import aligned
 from depthtrack.evaluation.bench.timing import time_calls
@@ -22,6 +22,7 @@ from depthtrack.evaluation.bench.workload import CHECKED, HYPOTHESES, ROIS, Roi,
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import BACKENDS, create_scorer
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.resources import usable_cores
 
 CONTENDERS = (*BACKENDS, *RIVALS)
 USUAL = tuple(name for name in CONTENDERS if name != "oracle")
