@@ -17,6 +17,7 @@ from depthtrack.observation.observation import Observation
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
+from depthtrack.tracking.ik.close_by import LookAgain, look_close_by
 from depthtrack.tracking.ik.fit import PAPER_FIT, FitOptions, Fitter
 from depthtrack.tracking.ik.hierarchy import by_energy
 from depthtrack.tracking.ik.prior import Prior
@@ -30,8 +31,8 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 
-_LOST = LostBelow(energy=16.0)
-"""A hand seen edge on by a noisy sensor reaches 15 in its true pose."""
+_LOST = LostBelow(confidence=0.5, energy=16.0)
+"""A hand seen edge on by a noisy sensor reaches 15 in its true pose; and agrees by half where its forearm shows."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class IkOptions:
     components: int | None = None
     soft: bool = False
     seed: int = 0
+    look_again: LookAgain = field(default_factory=LookAgain)
     lost: LostBelow = _LOST
     fit: FitOptions | None = None
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -146,8 +148,9 @@ class IkTracker:
         found = self._fitter.fit(ahead[0], self._space, prior=prior, align=careful)
         clock.lap("fit")
         if self._space.full and self.options.variant == "default":
-            found = self._reconsider(found, ahead[1:], prior)
+            found, status = self._look_again(observation, self._reconsider(found, ahead[1:], prior))
             clock.lap("retry")
+            return self._settle(found, status, clock)
         return self._settle(found, Status.TRACKED, clock)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
@@ -180,13 +183,35 @@ class IkTracker:
         further = self._fitter.fit(best, self._space, 2 * self.options.rounds, prior)
         return by_energy(self._scorer, np.stack([best, further]))[0][0]
 
+    def _look_again(self, observation: Observation, pose: Array) -> tuple[Array, Status]:
+        """The better of a pose and what is found close by: asked now and then where the pose explains little. Where the
+        track would be lost, it is asked at once, and elsewhere too, which has to explain much more."""
+        options, terms = self.options.look_again, self._scorer.terms(pose[None])
+        energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
+        due = options.every > 0 and observation.frame_index % options.every == 0
+        lost = self._memory.is_lost(energy, confidence)
+        if energy <= self.options.search.good_energy or not (due or lost):
+            return pose, Status.TRACKED
+        generator = self._generator(observation)
+        other, lower = look_close_by(self._fitter, self._scorer, pose, self._synergies, options, generator)
+        if lower < options.close_by * energy:
+            pose, energy = other, lower
+        if lost:
+            elsewhere = self._search(observation)
+            if self._scorer.score(elsewhere[None])[0] < options.elsewhere * energy:
+                return elsewhere, Status.STARTED
+        return pose, Status.TRACKED
+
     def _search(self, observation: Observation) -> Array:
-        # Philox keyed by seed and frame: the same whatever happened before.
-        generator = np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
+        generator = self._generator(observation)
         found = find_pose(
             self._fitter, self._scorer, observation.centre, self._synergies, self.options.search, generator
         )[0]
         return found if self.options.synergies is None else self._fitter.fit(found, self._space, prior=self._likely)
+
+    def _generator(self, observation: Observation) -> np.random.Generator:
+        """Philox keyed by seed and frame: the same whatever happened before."""
+        return np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
 
     def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
         terms = self._scorer.terms(pose[None])

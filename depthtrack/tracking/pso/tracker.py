@@ -43,7 +43,7 @@ class PsoOptions:
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
     A pose whose energy is above `search.good_energy` is doubted every `look_again_every` frames (0: never), and at once
     where the track would be lost: hands close by, every finger in some typical posture, are searched through, from
-    orientations `look_again_apart` radians apart, and the best is taken if its energy is lower by `look_again_gain`.
+    orientations `look_again_apart` radians apart, and the best is taken if its energy is less than that share of it.
     The searches of "default" fit surfaces between their rounds, as the IK tracker does.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
     """
@@ -58,7 +58,7 @@ class PsoOptions:
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
     look_again_every: int = 5
     look_again_apart: float = 0.1
-    look_again_gain: float = 0.5
+    look_again_share: float = 0.9
     lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -184,7 +184,7 @@ class PsoTracker:
         """The better of a pose and what is found close by."""
         options, polish = replace(self.options.search, apart=self.options.look_again_apart), self._polish(observation)
         poses, energies = find_candidates(self._scorer, observation.centre, generator, options, polish, near=pose)
-        better = energies[0] < energy - self.options.look_again_gain
+        better = energies[0] < self.options.look_again_share * energy
         return (poses[0], float(energies[0])) if better else (pose, energy)
 
     def _search(self, observation: Observation, generator: np.random.Generator) -> tuple[Array, float]:
