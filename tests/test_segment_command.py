@@ -65,6 +65,22 @@ def test_segment_writes_pictures_and_figures(
     ]
 
 
+def test_a_tracker_tells_where_the_wrist_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "skin"
+    options = ("--sensor", "kinect1", "--background", "room", "--model", "skin", "--frames", "24")
+    assert main(["synth", "everyday", str(recording), *options]) == 0
+    capsys.readouterr()
+    assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--tracker", "ik", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["frames_with_hand"] == 24
+    assert report["mean_iou"] > 0.95
+
+
+def test_sizes_are_for_a_tracker(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--hand", "hand.json"]) == 2
+    assert "--tracker" in capsys.readouterr().err
+
+
 def test_depth_alone_finds_the_hand_too(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--depth-only", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.tracking.loop import follow, hand_place
+from depthtrack.tracking.tracker import Tracker
 
 
 @dataclass(frozen=True)
@@ -39,14 +43,24 @@ class SegmentedFrame:
         }
 
 
-def segment_sequence(sequence: Sequence, observer: Observer) -> Iterator[SegmentedFrame]:
-    """Observe every frame of a recording, in order."""
+def segment_sequence(
+    sequence: Sequence, observer: Observer, tracker: Tracker | None = None, hand: HandShape | None = None
+) -> Iterator[SegmentedFrame]:
+    """Observe every frame of a recording, in order.
+
+    With a `tracker` of a `hand` (the average adult's unless given), it tells the observer where to look while its track
+    is sure, as it does when a recording is tracked; its own time does not count.
+    """
+    model = HandModel(hand or HandShape())
     for frame in sequence:
+        place = None if tracker is None else hand_place(model, tracker.expected)
         begun = time.perf_counter()
-        observation = observer.observe(frame)
+        observation = observer.observe(frame, place)
         if observation is not None:
             observation.points  # noqa: B018 (the cloud belongs to the observation's cost)
         ms = 1e3 * (time.perf_counter() - begun)
+        if tracker is not None:
+            follow(tracker, observation)
         mask = None if observation is None else whole_mask(observation, frame.depth.shape)
         truth = sequence.hand_mask(frame.index)
         yield SegmentedFrame(frame, observation, mask, None if truth is None else overlap(mask, truth), ms)

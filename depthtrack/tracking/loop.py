@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION, rotation_matrix
 from depthtrack.observation.guided import HandPlace
-from depthtrack.observation.observation import Observer
+from depthtrack.observation.observation import Observation, Observer
 from depthtrack.observation.wrist import WristPlane
 from depthtrack.recording.run import RunRow, RunWriter
 from depthtrack.recording.sequence import Sequence
@@ -46,16 +46,21 @@ def track_sequence(
         if number < len(done):
             tracker.recall([_estimate(done[number])])
             continue
-        if observation is None:
-            estimate = ABSENT
-            tracker.recall([estimate])
-        elif awaiting_start:
+        if observation is not None and awaiting_start:
             estimate, awaiting_start = tracker.start(observation, start_pose), False
         else:
-            estimate = tracker.track(observation)
+            estimate = follow(tracker, observation)
         row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
         run.append(row, {"segment": observe_ms, **estimate.stage_ms})
         yield row
+
+
+def follow(tracker: Tracker, observation: Observation | None) -> Estimate:
+    """One frame on; a tracker that is shown no hand remembers that there was none."""
+    if observation is not None:
+        return tracker.track(observation)
+    tracker.recall([ABSENT])
+    return ABSENT
 
 
 def hand_place(model: HandModel, pose: NDArray[np.float64] | None) -> HandPlace | None:
