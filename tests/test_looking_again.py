@@ -1,4 +1,4 @@
-"""Second thoughts: a track that took one finger for the next finds back, and searches respect what a wrist can do."""
+"""Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
 
 import numpy as np
 
@@ -7,11 +7,13 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES, POSITION, rotation_matrix
 from depthtrack.hand.postures import POSTURES
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.looking_again import close_by
-from depthtrack.tracking.pso.search import hypotheses
-from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.pso.search import SearchOptions, find_candidates, hypotheses, refine
+from depthtrack.tracking.pso.swarm import SwarmOptions
+from depthtrack.tracking.pso.tracker import PsoOptions
 from tests.synthetic_observations import observe
 
 MADE = Synthesiser(Synthesis(model="skin"))
@@ -28,19 +30,18 @@ def _shifted(pose: np.ndarray) -> np.ndarray:
     return wrong
 
 
-def _error_after(options: PsoOptions, frames: range) -> float:
-    tracker = PsoTracker(MADE.options.hand, options)
-    wrong = _shifted(MADE.poses[frames.start - 1])
-    tracker.recall([Estimate(wrong, 20.0, 0.75, Status.TRACKED)] * 3)
-    last = [tracker.track(observe(MADE, i)) for i in frames][-1]
-    assert last.pose is not None
-    truth = MADE.poses[frames.stop - 1 : frames.stop]
-    return float(endpoint_error(MODEL, last.pose[None], MODEL, truth).values[0])
-
-
-def test_a_wrong_pose_is_left_for_a_better_one_close_by() -> None:
-    frames = range(8, 12)
-    assert _error_after(PsoOptions(resolution=96, look_again_every=2), frames) < 6
+def test_another_place_is_found_where_a_swarm_stays() -> None:
+    """From one finger further, in a single frame: a swarm of the same spread does not get there."""
+    frame, wrong = 11, _shifted(MADE.poses[11])
+    o = observe(MADE, frame)
+    with RasterScorer(MADE.options.hand) as scorer:
+        scorer.observe(Target(o.camera, o.skin, o.depth).reduced(96))
+        swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
+        stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
+        options = SearchOptions(apart=0.1)
+        found, _ = find_candidates(scorer, o.centre, np.random.default_rng(5), options, near=wrong)
+    errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, MADE.poses[[frame, frame]]).values
+    assert errors[1] < 0.7 * errors[0]
 
 
 def test_poses_close_by_are_possible_and_close() -> None:

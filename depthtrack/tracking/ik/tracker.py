@@ -194,7 +194,7 @@ class IkTracker:
             return pose, Status.TRACKED
         generator = self._generator(observation)
         other, lower = look_close_by(self._fitter, self._scorer, pose, self._synergies, options, generator)
-        if lower < options.close_by * energy:
+        if lower < (1 if lost else options.close_by) * energy:
             pose, energy = other, lower
         if lost:
             elsewhere = self._search(observation)

@@ -43,7 +43,8 @@ class PsoOptions:
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
     A pose whose energy is above `search.good_energy` is doubted every `look_again_every` frames (0: never), and at once
     where the track would be lost: hands close by, every finger in some typical posture, are searched through, from
-    orientations `look_again_apart` radians apart, and the best is taken if its energy is less than that share of it.
+    orientations `look_again_apart` radians apart, and the best is taken if its energy is less than the share
+    `look_again_share` of what it was, or less at all where the track would be lost.
     The searches of "default" fit surfaces between their rounds, as the IK tracker does.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
     """
@@ -122,8 +123,9 @@ class PsoTracker:
             options.swarm,
         )
         pose, energy = space.poses(found.position[None])[0], found.energy
-        if self._looks_again(observation, pose, energy):
-            pose, energy = self._look_again(observation, generator, pose, energy)
+        share = self._doubt(observation, pose, energy)
+        if share is not None:
+            pose, energy = self._look_again(observation, generator, pose, energy, share)
         return self._settle(pose, energy, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
@@ -170,22 +172,23 @@ class PsoTracker:
         )
         return seen - expected if np.isfinite(seen + expected).all() else np.zeros(3)
 
-    def _looks_again(self, observation: Observation, pose: Array, energy: float) -> bool:
-        """Whether another pose close by may explain more: asked now and then, and where the track would be lost."""
+    def _doubt(self, observation: Observation, pose: Array, energy: float) -> float | None:
+        """The share of the energy that a pose close by has to stay under to be taken; None to look for none."""
         options = self.options
         if options.variant != "default" or energy <= options.search.good_energy:
-            return False
+            return None
+        if self._memory.is_lost(energy, float(1 - self._scorer.terms(pose[None]).skin[0])):
+            return 1.0
         due = options.look_again_every > 0 and observation.frame_index % options.look_again_every == 0
-        return due or self._memory.is_lost(energy, float(1 - self._scorer.terms(pose[None]).skin[0]))
+        return options.look_again_share if due else None
 
     def _look_again(
-        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float
+        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float, share: float
     ) -> tuple[Array, float]:
-        """The better of a pose and what is found close by."""
+        """The pose, or what is found close by, if that has less than a share of its energy."""
         options, polish = replace(self.options.search, apart=self.options.look_again_apart), self._polish(observation)
         poses, energies = find_candidates(self._scorer, observation.centre, generator, options, polish, near=pose)
-        better = energies[0] < self.options.look_again_share * energy
-        return (poses[0], float(energies[0])) if better else (pose, energy)
+        return (poses[0], float(energies[0])) if energies[0] < share * energy else (pose, energy)
 
     def _search(self, observation: Observation, generator: np.random.Generator) -> tuple[Array, float]:
         """A pose and its energy from the observation alone."""
