@@ -109,6 +109,22 @@ def test_a_recording_without_true_poses_cannot_start_from_them(
     assert not (tmp_path / "run").exists()
 
 
+def test_sizes_that_are_nobodys_are_told_of(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import shutil
+
+    unsized = tmp_path / "unsized"
+    shutil.copytree(recording, unsized)
+    (unsized / "hand.json").unlink()
+    short = (*_QUICK, "--frames", "1")
+    for path, more, told in ((unsized, (), True), (unsized, ("--hand", str(recording / "hand.json")), False)):
+        assert main(["track", str(path), "-o", str(tmp_path / f"run{told}"), *short, *more]) == 0
+        assert (f"measure this hand with  depthtrack calibrate {unsized}" in capsys.readouterr().out) == told
+    assert main(["track", str(recording), "-o", str(tmp_path / "sized"), *short]) == 0
+    assert "average" not in capsys.readouterr().out
+
+
 def test_mistakes_are_told_in_one_sentence(
     recording: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

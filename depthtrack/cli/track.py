@@ -92,6 +92,9 @@ class Command:
         lost = sum(row.status in ("lost", "absent") for row in run.rows)
         print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
         print(f"see how good they are:  depthtrack evaluate {self.out}")
+        truth = sequence.ground_truth
+        if self.hand is None and (truth is None or truth.hand is None):
+            print(f"sizes: the average adult's; measure this hand with  depthtrack calibrate {self.recording.path}")
 
     def _options(self) -> dict[str, Any]:
         """What the chosen tracker is made with: what was given, and what it would do anyway."""
