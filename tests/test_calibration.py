@@ -1,11 +1,12 @@
 """Calibration: sizes recovered from a recording, gradients held to differences, and what cannot be measured refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from depthtrack.calibration.calibrate import Calibration, calibrate, with_usual_proportions
+from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
 from depthtrack.calibration.evidence import SkinModel, View, gather
 from depthtrack.calibration.joint import fit_jointly
 from depthtrack.calibration.sizes import (
@@ -20,6 +21,7 @@ from depthtrack.calibration.sizes import (
 from depthtrack.calibration.views import choose_views, finger_area
 from depthtrack.camera import Camera
 from depthtrack.cli import main
+from depthtrack.cli.calibrate import _text
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.hand.fitting import KEYPOINT_BODIES
@@ -106,6 +108,17 @@ def test_a_calibrated_hand_is_tracked_better(calibration: Calibration) -> None:
 def test_the_file_can_be_read_as_a_hand(calibration: Calibration, tmp_path: Path) -> None:
     (tmp_path / "hand.json").write_text(calibration.to_json())
     assert HandShape.from_json(tmp_path / "hand.json") == calibration.hand
+
+
+@pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])
+def test_a_side_that_fits_hardly_better_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
+    certain = {name: replace(m, confidence=0.9999) for name, m in calibration.measured.items()}
+    found = replace(calibration, side_margin=margin, measured=certain)
+    assert summary(found)["side_sure"] == sure
+    text = _text(found, Path("hand.json"), Path("hand.png"))
+    assert ("side not sure; give --side" in text) == (not sure)
+    assert "0.99" in text
+    assert "1.00\n" not in text
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -38,6 +38,8 @@ _GOOD_VIEWS = 0.7
 """Share of the views that are fitted: those with the highest energy may well be wrong poses."""
 _HAND_LIKE = 0.55
 """Agreement of silhouettes (1 less the skin term of Eq. 2) below which no hand was found."""
+_SURE_MARGIN = 0.02
+"""The other side's extra energy, a share, below which the side may well be wrong."""
 
 Progress = Callable[[str, float], None]
 
@@ -82,6 +84,11 @@ class Calibration:
     observations: tuple[Observation, ...]
     poses: Array
     poses_before: Array
+
+    @property
+    def side_sure(self) -> bool:
+        """Whether the side was given, or the other one fits clearly worse."""
+        return self.side_margin is None or self.side_margin >= _SURE_MARGIN
 
     def to_json(self) -> str:
         """`hand.json` with what is known of each size beside it."""
@@ -260,6 +267,7 @@ def summary(calibration: Calibration) -> dict[str, Any]:
     return {
         "side": calibration.hand.side,
         "side_margin": calibration.side_margin,
+        "side_sure": calibration.side_sure,
         "scale": calibration.hand.scale,
         "views": len(calibration.observations),
         "distance_before_mm": calibration.before_mm,

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
 
 
+_MOST_SURE = 0.99
+"""The largest confidence told: none is beyond doubt."""
+
+
 @dataclass(frozen=True)
 class Command:
     """Measure the hand of a recording: side, scale, each finger's length and width, and the palm.
@@ -93,13 +97,17 @@ def _write(path: Path, text: str) -> None:
 
 def _text(calibration: "Calibration", out: Path, picture: Path) -> str:
     hand, margin = calibration.hand, calibration.side_margin
-    sure = "" if margin is None else f" (the other side fits {100 * margin:.0f} % worse)"
+    doubt = "" if calibration.side_sure else ": side not sure; give --side"
+    sure = "" if margin is None else f" (the other side fits {100 * margin:.0f} % worse{doubt})"
     before, after, views = calibration.before_mm, calibration.after_mm, len(calibration.observations)
     lines = [
         f"a {hand.side} hand{sure}, {hand.scale:.2f} times the average adult's, from {views} frames",
         f"observed points lie {after:.1f} mm from its skin, {before:.1f} mm from the average hand's",
         f"  {'':16}{'mm':>8}{'± mm':>8}{'confidence':>12}",
-        *(f"  {name:16}{m.mm:8.1f}{m.sigma_mm:8.1f}{m.confidence:12.2f}" for name, m in calibration.measured.items()),
+        *(
+            f"  {name:16}{m.mm:8.1f}{m.sigma_mm:8.1f}{min(m.confidence, _MOST_SURE):12.2f}"
+            for name, m in calibration.measured.items()
+        ),
         f"look at {picture}; use it:  depthtrack track RECORDING --hand {out}",
     ]
     return "\n".join(lines)
