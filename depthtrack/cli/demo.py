@@ -33,7 +33,8 @@ class Command:
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Processes; as many as there are cores unless given."""
     calibrate: bool = True
-    """Measure the hand of your recording first, unless it brings its sizes or --hand tells them: half a minute more."""
+    """Measure the hand of your recording first, unless it brings its sizes or --hand tells them; takes a minute or two
+    on two cores."""
     open: bool = False
     """Open the report in the browser."""
 
