@@ -59,7 +59,7 @@ class PsoOptions:
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
     look_again_every: int = 5
     look_again_apart: float = 0.1
-    look_again_share: float = 0.9
+    look_again_share: float = 0.93
     lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
