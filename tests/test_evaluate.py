@@ -158,6 +158,17 @@ def test_runs_that_make_no_sense_are_refused(
     assert expected in capsys.readouterr().err
 
 
+def test_times_with_compilation_come_with_a_hint(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = write_run(tmp_path / "run", recording, true_poses(recording))
+    timings = (run / "timings.csv").read_text()
+    for text, told in ((timings, False), (timings.replace("16.000", "9000.000", 1), True)):
+        (run / "timings.csv").write_text(text)
+        assert main(["evaluate", str(run), "--no-residuals"]) == 0
+        assert ("compile kernels: read the median" in capsys.readouterr().out) == told
+
+
 def test_skin_colours_that_have_moved_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     coloured = synthesise(tmp_path / "coloured", 2, "--background", "wall")
     run = write_run(tmp_path / "run", coloured, true_poses(coloured), skin_model=str(tmp_path / "skin.npz"))

@@ -95,6 +95,8 @@ def _text(evaluation: "Evaluation") -> str:
     lines += [_row(f"  {finger} (mm)", metric) for finger, metric in evaluation.finger_errors.items()]
     lines.append(_row("ms_per_frame", evaluation.ms_per_frame))
     lines += [_row(f"  {stage} (ms)", metric) for stage, metric in evaluation.stage_ms.items()]
+    if _compiled(evaluation.ms_per_frame):
+        lines.append("  (the first frames compile kernels: read the median)")
     if evaluation.success is None:
         lines.append("  (the recording knows neither true poses nor joints)")
     else:
@@ -114,6 +116,14 @@ def _prediction_text(evaluation: "PredictionEvaluation") -> str:
 
 
 _HEAD = f"  {'':28}{'mean':>9}{'median':>9}{'p95':>9}{'max':>9}"
+_TELLING = 20
+"""Times the median frame's milliseconds beyond which one was no ordinary frame."""
+
+
+def _compiled(time: "Metric") -> bool:
+    """Whether a frame took so long that the mean tells little."""
+    median, longest = (time.statistics()[name] for name in ("median", "max"))
+    return median is not None and longest is not None and longest > _TELLING * median
 
 
 def _shares(success: "SuccessCurve") -> str:
