@@ -9,8 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
+from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.run import Run, RunRow, RunWriter, read_rows
+from depthtrack.recording.run import STATUSES, Run, RunRow, RunWriter, read_rows
+from depthtrack.tracking.tracker import Status
 
 CONFIGURATION = {"tracker": "pso", "seed": 3, "hand": json.loads(HandShape().to_json()), "threads": 2}
 STAGES = ("segment", "swarm")
@@ -20,7 +22,9 @@ def row(index: int, seed: int = 0) -> RunRow:
     rng = np.random.default_rng([seed, index])
     if index % 4 == 3:
         return RunRow(index, index / 30, "absent", float("nan"), 0.0, None)
-    return RunRow(index, index / 30, "tracked", rng.random(), rng.random(), rng.normal(size=27))
+    pose = rng.normal(size=27)
+    pose[ORIENTATION] /= np.linalg.norm(pose[ORIENTATION])
+    return RunRow(index, index / 30, "tracked", rng.random(), rng.random(), pose)
 
 
 def write(folder: Path, count: int, resume: bool = False) -> None:
@@ -131,3 +135,35 @@ def test_a_row_that_is_no_frame_is_named(tmp_path: Path, found: str, damaged: st
     path.write_text(text.replace(found, damaged, 1))
     with pytest.raises(InputError, match=message):
         Run.load(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("timestamp", "1e300", "frame 1: the timestamp must be seconds below 1e[+]12, found 1e[+]300"),
+        ("timestamp", "nan", "frame 1: the timestamp must be .*, found nan"),
+        ("status", "flying", "frame 1: the status must be one of"),
+        ("x", "1e300", "frame 1: a pose must be numbers up to 100"),
+        ("x", "nan", "frame 1: a pose must be numbers"),
+        ("x", "", "line 3: expected 32 values"),
+        ("x", "y" * 100_000, "line 3: expected 32 values .{1,140}$"),
+        ("qw", "3", "frame 1: the quaternion must have length 1, found [0-9.]{1,7}$"),
+    ],
+)
+def test_rows_that_no_tracker_writes_are_refused_by_whoever_reads(
+    tmp_path: Path, column: str, value: str, message: str
+) -> None:
+    write(tmp_path / "run", 2)
+    path = tmp_path / "run" / "poses.csv"
+    header, first, second = path.read_text().splitlines()
+    cells = second.split(",")
+    cells[header.split(",").index(column)] = value
+    path.write_text("\n".join((header, first, ",".join(cells), "")))
+    with pytest.raises(InputError, match=message):
+        Run.load(tmp_path / "run")
+    with pytest.raises(InputError, match=message):
+        write(tmp_path / "run", 3, resume=True)
+
+
+def test_every_status_of_a_tracker_can_be_read_back() -> None:
+    assert set(STATUSES) == {status.value for status in Status}

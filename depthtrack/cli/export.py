@@ -23,14 +23,13 @@ class Command:
     def run(self) -> None:
         import numpy as np
 
-        from depthtrack.evaluation.replay import check_rows, run_hand
+        from depthtrack.evaluation.replay import run_hand
         from depthtrack.recording.joints.benchmarks import find_benchmark
         from depthtrack.recording.joints.export import export_joints
         from depthtrack.recording.joints.track import JointTrack
         from depthtrack.recording.run import Run
 
         run = Run.load(self.path)
-        check_rows(run)
         track = JointTrack.of(run, run_hand(run))
         export_joints(self.out, track, None if self.benchmark is None else find_benchmark(self.benchmark))
         posed = int(np.isfinite(track.poses).all(axis=1).sum())

@@ -12,7 +12,6 @@ from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.evaluation.model_surface import ModelSurface
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
@@ -25,9 +24,6 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-6
-_UNIT_TOLERANCE = 1e-3
-_LARGEST = 100.0
-"""Metres and radians that no pose reaches."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,6 @@ class Replay:
     @classmethod
     def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
         """The run beside the recording it tracked, or beside `sequence` where that has moved. Raises InputError."""
-        check_rows(run)
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(
@@ -125,27 +120,6 @@ def _skin_model(run: Run) -> Path | None:
     return Path(path) if isinstance(path, str) else None
 
 
-def check_rows(run: Run) -> None:
-    """Raises InputError for rows that no tracker writes: they would make no sense of anything they are held against."""
-    known = {status.value for status in Status}
-    for row, pose in enumerate(run.poses):
-        reason = None
-        if run.status[row] not in known:
-            reason = f"the status must be one of {', '.join(known)}, found '{run.status[row][:40]}'"
-        elif not np.isnan(pose).all():
-            reason = _why_no_pose(pose)
-        if reason is not None:
-            raise InputError(f"{run.folder / 'poses.csv'}, frame {run.index[row]}: {reason}")
-
-
-def _why_no_pose(numbers: Array) -> str | None:
-    """What keeps 27 numbers from being a pose."""
-    if not np.all(np.abs(numbers) <= _LARGEST):  # false for NaN
-        return f"a pose must be numbers up to {_LARGEST:g} (metres, radians), or absent"
-    length = np.linalg.norm(numbers[ORIENTATION])
-    return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.4g}"
-
-
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:
     """Raises InputError unless the run's frames are the recording's."""
     outside = (run.index < 0) | (run.index >= len(sequence))
@@ -158,7 +132,7 @@ def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:
     if len(apart) and not apart.max() <= _SAME_TIME:  # not: NaN is no time
         index = run.index[apart.argmax()]
         raise InputError(
-            f"frame {index} of {path} was taken at {sequence.timestamps[index]:.6f} s, but at "
-            f"{run.timestamps[apart.argmax()]:.6f} s in the run {run.folder}: --sequence must name the recording that "
+            f"frame {index} of {path} was taken at {sequence.timestamps[index]:.12g} s, but at "
+            f"{run.timestamps[apart.argmax()]:.12g} s in the run {run.folder}: --sequence must name the recording that "
             "the run was made from"
         )

@@ -18,13 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import POSE_NAMES, POSE_SIZE
+from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.lists import MAX_FRAMES
 from depthtrack.text_files import read_lines, read_text
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
 _LARGEST_TABLE = 1 << 29
 """Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
+STATUSES = ("tracked", "started", "lost", "absent")
+"""What may become of a frame."""
+_LARGEST = 100.0
+"""Metres and radians that no pose reaches."""
+_LATEST = 1e12
+"""Seconds that no clock reaches."""
+_UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -137,19 +144,40 @@ def read_configuration(folder: Path) -> dict[str, Any]:
 
 
 def read_rows(folder: Path) -> list[RunRow]:
-    """The complete rows of `poses.csv`; a last one that was cut short is left out. Raises InputError."""
+    """The complete rows of `poses.csv`; a last one that was cut short is left out.
+
+    Raises InputError, also for rows that no tracker writes: they would make no sense of anything they are held against.
+    """
     path = folder / "poses.csv"
     rows = []
     for number, cells in enumerate(_read_table(path, _COLUMNS), start=2):
         try:
             index, timestamp, status, energy, confidence, *pose = cells
-            numbers = np.array([float(x) for x in pose]) if pose[0] else None
+            numbers = np.array([float(x) for x in pose]) if any(pose) else None
             if not 0 <= int(index) < MAX_FRAMES:
                 raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
             rows.append(RunRow(int(index), float(timestamp), status, float(energy), float(confidence), numbers))
         except (ValueError, IndexError) as error:
-            raise InputError(f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error}") from error
+            raise InputError(
+                f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error!s:.120}"
+            ) from error
+        if (reason := _why_no_row(rows[-1])) is not None:
+            raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
     return rows
+
+
+def _why_no_row(row: RunRow) -> str | None:
+    """What keeps a row from being one that a tracker writes."""
+    if row.status not in STATUSES:
+        return f"the status must be one of {', '.join(STATUSES)}, found '{row.status[:40]}'"
+    if not abs(row.timestamp) < _LATEST:  # false for NaN
+        return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
+    if row.pose is None:
+        return None
+    if not np.all(np.abs(row.pose) <= _LARGEST):
+        return f"a pose must be numbers up to {_LARGEST:g} (metres, radians), or absent"
+    length = np.linalg.norm(row.pose[ORIENTATION])
+    return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.6g}"
 
 
 def _read_timings(path: Path, count: int) -> dict[str, NDArray[np.float64]]:

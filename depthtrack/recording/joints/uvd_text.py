@@ -77,7 +77,9 @@ def _numbers(fields: list[str], count: int, where: str, benchmark: Benchmark) ->
         )
     numbers = [float(field) for field in fields]
     if any(abs(x) > _LARGEST for x in numbers):
-        raise InputError(f"{where}: pixels and millimetres up to {_LARGEST:g} were expected, found {max(numbers):g}")
+        raise InputError(
+            f"{where}: pixels and millimetres up to {_LARGEST:g} were expected, found {max(numbers, key=abs):.6g}"
+        )
     return numbers
 
 
