@@ -16,7 +16,7 @@ from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.recording import open_sequence
 from depthtrack.report import film as films
 from depthtrack.report.build import write_report
-from depthtrack.report.facts import fairness
+from depthtrack.report.facts import at_home, fairness
 from depthtrack.report.film import film_of
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.series import Shown, over_time, shares, top_of_scale, worst_frames
@@ -250,6 +250,19 @@ def test_a_single_tracker_is_told_for_itself() -> None:
     )
 
 
+def test_the_headline_says_where_a_tracker_is_at_home() -> None:
+    lines: list[Line] = [Told("a", "PSO", 3.0), Told("a", "IK", 2.0)]
+    assert said(lines, at_home=("IK",)).startswith("On its home ground, IK follows the hand more closely than PSO.")
+    assert said(lines, at_home=("PSO",)).startswith(
+        "On the home ground of PSO, IK follows the hand more closely than PSO."
+    )
+    lines.append(Told("b", "PSO", 1.0))
+    assert said(lines, at_home=("IK",)).startswith(
+        "Neither tracker is the closest everywhere, on the home ground of IK."
+    )
+    assert "home ground" not in said(lines)
+
+
 def test_equal_figures_have_no_winner() -> None:
     text = said([Told("a", "PSO", 3.0), Told("a", "IK", 3.1, ms=10.2)])
     assert text.startswith("PSO and IK follow the hand equally closely.")
@@ -312,13 +325,17 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
     ]
 
 
-def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, runs: list[Path]) -> None:
-    skin = write_run(
-        runs[0].parent / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin"
-    )
-    lines = lines_of([*evaluations[:2], evaluate_run(skin, residuals=False)])
+def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, tmp_path: Path) -> None:
+    skin = write_run(tmp_path / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin")
+    compared = [*evaluations[:2], evaluate_run(skin, residuals=False)]
+    lines = lines_of(compared)
     told = fairness({"model": "skin"}, lines)
     assert told.startswith("Home ground")
     assert "that Skin fits, and Far <b> and Near do not" in told
     assert "that Far <b> and Near fit, and Skin does not" in fairness({"model": "primitives"}, lines)
     assert fairness({"sensor": "kinect1"}, lines) == ""
+    assert at_home({"model": "skin"}, lines) == ("Skin",)
+    write_report(compared, tmp_path / "report.html")
+    text = Reader((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert "On the home ground of Far <b> and Near, Skin follows the hand most closely of three trackers" in text
+    assert at_home({"model": "skin"}, lines[:1]) == ()

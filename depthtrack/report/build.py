@@ -15,7 +15,7 @@ from depthtrack.evaluation.compare.results import Line, figures_of, lines_of
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.colours import css_variables
-from depthtrack.report.facts import Fact, facts_of_recording, facts_of_tracker, fairness
+from depthtrack.report.facts import Fact, at_home, facts_of_recording, facts_of_tracker, fairness
 from depthtrack.report.film import Film, as_webp, film_of
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.plots import TIMELINE_FROM, TIMELINE_TO, finger_bars, share_curves, stage_bars, timeline
@@ -62,6 +62,7 @@ class Section:
     shown: list[Shown]
     facts: list[Fact]
     fairness: str
+    at_home: tuple[str, ...]
     timeline: Plot
     plots: list[Plot]
     film: Film
@@ -90,14 +91,15 @@ def write_report(
         recordings.setdefault(each.line.source, []).append(each)
     detailed = list(recordings.values())[:MOST_DETAILED]
     most_bytes = min(FILM_BYTES, ALL_FILMS_BYTES // len(detailed))
+    sections = [_section(each, most_bytes, sequence, progress) for each in detailed]
     page = {
         "version": __version__,
-        "verdict": _verdict(lines),
+        "verdict": _verdict(lines, sections if len(sections) == len(recordings) else []),
         "standings": [(standing, numbers[standing.label]) for standing in standings(lines)],
         "judged_by": error_name(lines) + where(lines),
         "head": table_head(lines),
         "rows": table_rows(shown),
-        "sections": [_section(each, most_bytes, sequence, progress) for each in detailed],
+        "sections": sections,
         "left_out": [each[0].line.recording for each in list(recordings.values())[MOST_DETAILED:]],
         "trackers": [(label, number, facts_of_tracker(label, lines)) for label, number in numbers.items()],
         "runs": len(evaluations),
@@ -121,6 +123,7 @@ def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progres
         shown,
         facts_of_recording(painter.sequence, lines[0]),
         fairness(painter.sequence.description, lines),
+        at_home(painter.sequence.description, lines),
         _timeline(shown, metric),
         _plots(shown, metric),
         film,
@@ -173,9 +176,13 @@ def _worst(shown: list[Shown], metric: str, painter: SideBySide) -> list[Worst]:
     return found
 
 
-def _verdict(lines: Sequence[Line]) -> Verdict:
+def _verdict(lines: Sequence[Line], sections: Sequence[Section]) -> Verdict:
+    """`sections` of all recordings, if they are known."""
     budgets = {(e.run.configuration.get("budget") or {}).get("equal_ms") for line in lines for e in line.evaluations}
-    return verdict(lines, next(iter(budgets)) if len(budgets) == 1 else None)
+    homes = {section.at_home for section in sections}
+    return verdict(
+        lines, next(iter(budgets)) if len(budgets) == 1 else None, next(iter(homes)) if len(homes) == 1 else ()
+    )
 
 
 def _template() -> Any:

@@ -60,18 +60,24 @@ def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
 
 def fairness(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
     """A warning where a synthetic hand was drawn from the very model that some trackers fit, and others do not."""
-    drawn = description.get("model")
-    if drawn not in ("skin", "primitives"):
+    favoured = at_home(description, lines)
+    others = [label for label in dict.fromkeys(line.label for line in lines) if label not in favoured]
+    if not favoured:
         return ""
-    fits = {line.label: _surface(line) == drawn for line in lines}
-    favoured = [label for label, same in fits.items() if same]
-    others = [label for label, same in fits.items() if not same]
-    if not favoured or not others:
-        return ""
-    hand = "the skin" if drawn == "skin" else "the spheres and cylinders"
+    hand = "the skin" if description.get("model") == "skin" else "the spheres and cylinders"
     fit, do = ("fits" if len(favoured) == 1 else "fit"), ("does" if len(others) == 1 else "do")
     first, rest = listed(favoured), listed(others)
     return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
+
+
+def at_home(description: Mapping[str, Any], lines: Sequence[Line]) -> tuple[str, ...]:
+    """The trackers whose very model a synthetic hand was drawn from, where others fit another; else none."""
+    drawn = description.get("model")
+    if drawn not in ("skin", "primitives"):
+        return ()
+    labels = dict.fromkeys(line.label for line in lines)
+    favoured = tuple(label for label in labels if all(_surface(line) == drawn for line in lines if line.label == label))
+    return favoured if len(favoured) < len(labels) else ()
 
 
 def _surface(line: Line) -> str:
