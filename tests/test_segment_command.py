@@ -121,13 +121,19 @@ def test_training_on_folders(recording: Path, tmp_path: Path) -> None:
     assert SkinModel.load(tmp_path / "m.json").prior == pytest.approx(SkinModel.load(from_recording).prior)
 
 
+def test_a_skin_model_needs_a_file(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        main(["train-skin", str(recording)])
+    assert exit_info.value.code == 2
+    assert "--out" in capsys.readouterr().err
+
+
 def test_mistakes_are_told_in_one_sentence(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     other = tmp_path / "other"
     other.mkdir()
     (other / "x.png").write_bytes(b"no picture")
     for arguments, expected in (
-        (["train-skin", str(recording)], "-o FILE"),
         (["train-skin", str(tmp_path / "empty"), str(other), "-o", str(tmp_path / "m.json")], "holds no pictures"),
         (["train-skin", str(other), str(recording / "hand_mask"), "-o", str(tmp_path / "m.json")], "no mask"),
         (["train-skin", str(other), str(other), "-o", str(tmp_path / "m.json")], "x.png"),

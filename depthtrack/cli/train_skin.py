@@ -6,8 +6,6 @@ from typing import Annotated
 
 import tyro
 
-from depthtrack.errors import InputError
-
 
 @dataclass(frozen=True)
 class Command:
@@ -19,10 +17,10 @@ class Command:
 
     images: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="IMAGES")]
     """Folder of images, or a recording."""
+    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")]
+    """Where to write the model."""
     masks: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="MASKS")] = None
     """Folder of masks; not needed for a recording."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")] = None
-    """Where to write the model."""
 
     def run(self) -> None:
         from tqdm import tqdm
@@ -30,8 +28,6 @@ class Command:
         from depthtrack.observation.labelled_images import from_folders, from_recording
         from depthtrack.observation.skin_colour import SkinModel
 
-        if self.out is None:
-            raise InputError("say where to write the model: -o FILE.json")
         labelled = from_recording(self.images) if self.masks is None else from_folders(self.images, self.masks)
         model = SkinModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))
         model.save(self.out)
