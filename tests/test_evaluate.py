@@ -169,6 +169,18 @@ def test_times_with_compilation_come_with_a_hint(
         assert ("compile kernels: read the median" in capsys.readouterr().out) == told
 
 
+@pytest.mark.parametrize("name", ["sequence", "skin_model"])
+def test_absurd_paths_are_not_echoed(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    run = write_run(tmp_path / "run", recording, true_poses(recording)[:2])
+    rewritten(run, **{name: "x" * 100_000})
+    assert main(["evaluate", str(run)]) == 2
+    message = capsys.readouterr().err
+    assert f"{name} is no path: 'xxx" in message
+    assert message.count("x") < 120
+
+
 def test_skin_colours_that_have_moved_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     coloured = synthesise(tmp_path / "coloured", 2, "--background", "wall")
     run = write_run(tmp_path / "run", coloured, true_poses(coloured), skin_model=str(tmp_path / "skin.npz"))

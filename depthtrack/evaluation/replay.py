@@ -24,6 +24,8 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-6
+_LONGEST_PATH = 1024
+"""Characters."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class Replay:
     def __iter__(self) -> Iterator[Replayed]:
         """Every frame that is still readable, observed with the run's own settings and guided by its own poses."""
         run, model, memory = self.run, HandModel(self.hand), TrackMemory(LostBelow())
-        observer = Observer.for_sequence(self.sequence, _skin_model(run))
+        observer = Observer.for_sequence(self.sequence, _path(run, "skin_model"))
         row_of = {int(index): row for row, index in enumerate(run.index)}
         for frame in self.sequence.frames(map(int, run.index)):
             row = row_of[frame.index]
@@ -103,9 +105,19 @@ def run_hand(run: Run) -> HandShape:
 
 def recorded_path(run: Run) -> Path:
     """Where the run's recording was. Raises InputError when run.json does not say."""
-    path = run.configuration.get("sequence")
-    if not isinstance(path, str):
+    path = _path(run, "sequence")
+    if path is None:
         raise InputError(f"{run.folder / 'run.json'} does not say which recording it tracked: give --sequence PATH")
+    return path
+
+
+def _path(run: Run, name: str) -> Path | None:
+    """A path that run.json names, or None. Raises InputError for one that no system takes."""
+    path = run.configuration.get(name)
+    if not isinstance(path, str):
+        return None
+    if len(path) > _LONGEST_PATH or "\0" in path:
+        raise InputError(f"{run.folder / 'run.json'}: {name} is no path: {path[:80]!r}")
     return Path(path)
 
 
@@ -113,11 +125,6 @@ def _camera(run: Run) -> Camera | None:
     """The camera that the run was tracked with; None leaves the recording its own."""
     fields: Any = run.configuration.get("camera")
     return None if fields is None else Camera.from_dict(fields, f"{run.folder / 'run.json'}: camera")
-
-
-def _skin_model(run: Run) -> Path | None:
-    path = run.configuration.get("skin_model")
-    return Path(path) if isinstance(path, str) else None
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

@@ -246,6 +246,6 @@ def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> N
     for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             raise InputError(
-                f"{folder} was begun with {key} = {found.get(key)!r}, not {wanted.get(key)!r}: "
+                f"{folder} was begun with {key} = {found.get(key)!r:.80}, not {wanted.get(key)!r:.80}: "
                 "go on with the same options, or choose another folder"
             )
