@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -54,3 +55,25 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         f"{sys.executable} -m depthtrack --help | head -1", shell=True, capture_output=True, text=True, check=False
     )
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (["demo"], "-o"),
+        (["track", "{recording}"], "-o"),
+        (["segment", "{recording}"], "-o"),
+        (["compare", "{recording}"], "-o"),
+        (["reproduce", "fig7", "--quick"], "-o"),
+        (["evaluate", "{recording}"], "--report"),
+    ],
+)
+def test_a_file_is_no_folder_to_write_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], option: str
+) -> None:
+    recording, file = tmp_path / "everyday", tmp_path / "file"
+    assert main(["synth", "everyday", str(recording), "--frames", "1"]) == 0
+    file.write_text("mine")
+    assert main([part.format(recording=recording) for part in arguments] + [option, str(file)]) == 2
+    assert f"{option} must be a folder, {file} is a file" in capsys.readouterr().err
+    assert file.read_text() == "mine"

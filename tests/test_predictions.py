@@ -29,11 +29,28 @@ def test_errors_by_hand(tmp_path: Path) -> None:
     np.testing.assert_allclose(evaluation.points.mean().values, [12 / 21, 5, 0, np.nan], atol=0.01)
     np.testing.assert_allclose(evaluation.by_joint["index_tip"].values, [12, 5, 0, np.nan], atol=0.01)
     assert evaluation.missed_frames == 1
+    assert evaluation.left_out_joints == 0
     report = evaluation.to_json()
     assert report["frames"] == 4
     assert report["frames_within_mm"]["10"] == 0.5
     assert report["frames_within_mm"]["20"] == 0.75
     assert report["finger_joint_error_mm"]["index"]["max"] == pytest.approx(5, abs=0.01)
+
+
+def test_joints_without_a_position_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = TRUTH.copy()
+    found[0, 4:7] = np.nan
+    found[3] = np.nan
+    labels, predictions = tmp_path / "labels.txt", tmp_path / "predictions.txt"
+    write_uvd(labels, MSRA, TRUTH)
+    write_uvd(predictions, MSRA, found)
+    arguments = ["evaluate", "--predictions", str(predictions), "--benchmark", "msra", "--labels", str(labels)]
+    assert main(arguments) == 0
+    told = capsys.readouterr().out
+    assert "1 without a prediction" in told
+    assert "left out: 3 joints" in told
+    assert main([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["left_out_joints"] == 3
 
 
 def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(

@@ -159,6 +159,8 @@ def test_runs_without_frames_are_refused(recording: Path, tmp_path: Path) -> Non
     empty = write_run(tmp_path / "empty", recording, true_poses(recording)[:0])
     with pytest.raises(InputError, match="holds no frame"):
         write_report([evaluate_run(empty)], tmp_path / "report.html")
+    assert main(["evaluate", str(empty), "--report", str(tmp_path / "report")]) == 2
+    assert not (tmp_path / "report").exists()
     with pytest.raises(InputError, match="at least one run"):
         write_report([], tmp_path / "report.html")
 

@@ -7,16 +7,18 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from depthtrack.cli.output_folder import check_output_folder
 from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.recording.sequence import Frame
-from depthtrack.report.build import write_report
+from depthtrack.report.build import check_reportable, write_report
 
 
 def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> None:
     """Make the runs, print the table (or JSON), and write results and report to `folder`."""
+    check_output_folder(folder)
     with _bar() as listener:
         plans = compare(comparison, folder, workers, listener)
     folders = [Path(plan.folder) for plan in plans]
@@ -33,6 +35,7 @@ def write_everything(
     evaluations: Sequence[Evaluation], folder: Path, sequence: Path | None = None, quiet: bool = False
 ) -> None:
     """Write results.csv, results.json and report.html, and say where the report is."""
+    check_reportable(evaluations)
     folder.mkdir(parents=True, exist_ok=True)
     write_results(evaluations, folder)
     write_report(evaluations, folder / "report.html", sequence, _frames)

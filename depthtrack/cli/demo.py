@@ -42,10 +42,12 @@ class Command:
         from time import perf_counter
 
         from depthtrack.cli.comparing import compare_and_report
+        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.compare.comparison import Comparison
         from depthtrack.evaluation.compare.contenders import read_contenders
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
+        check_output_folder(self.out)
         begun = perf_counter()
         workers = chosen_workers(self.jobs)
         sources = self._synthesised() if self.path is None else (self._own(self.path),)

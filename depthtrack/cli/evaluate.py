@@ -44,6 +44,10 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
+        from depthtrack.cli.output_folder import check_output_folder
+
+        if self.report is not None:
+            check_output_folder(self.report, "--report")
         evaluations = self._evaluations() if self.predictions is None else []
         reports, texts = [each.to_json() for each in evaluations], list(map(_text, evaluations))
         if self.predictions is not None:
@@ -112,6 +116,8 @@ def _prediction_text(evaluation: "PredictionEvaluation") -> str:
         *(_row(metric.name, metric) for metric in (evaluation.points.mean(), evaluation.points.largest())),
         *(_row(f"  {name} (mm)", metric) for name, metric in evaluation.by_joint.items()),
     ]
+    if evaluation.left_out_joints:
+        lines.insert(1, f"  left out: {evaluation.left_out_joints} joints of other frames that have no position")
     return "\n".join(lines if evaluation.success is None else [*lines, _shares(evaluation.success)])
 
 

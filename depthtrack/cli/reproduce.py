@@ -54,6 +54,7 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
+        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.experiments.experiment import ExperimentOptions
         from depthtrack.evaluation.experiments.registry import chosen_experiments
         from depthtrack.evaluation.experiments.reproduce import reproduce
@@ -70,6 +71,7 @@ class Command:
             return
         if self.out is None or not self.figures:
             raise InputError("name the figures and a folder to write to, as in  depthtrack reproduce all -o DIR")
+        check_output_folder(self.out)
         workers, done = chosen_workers(self.jobs, self.scheduler), []
         for experiment in experiments:
             folder = self.out / experiment.name

@@ -45,6 +45,7 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
+        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
         from depthtrack.observation.observation import Observer
         from depthtrack.tracking.configuration import chosen_hand
@@ -58,6 +59,7 @@ class Command:
             sequence, self.skin_model, use_colour=not self.depth_only, wrist_margin=self.wrist_margin / 1000
         )
         folder = self.out or Path(f"{sequence.name}-segmented")
+        check_output_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with self._tracker(sequence) as tracker:
             results = segment_sequence(sequence, observer, tracker, chosen_hand(sequence, self.hand))

@@ -53,6 +53,7 @@ class Command:
 
         from tqdm import tqdm
 
+        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.hand.kinematics import HandModel
         from depthtrack.observation.observation import Observer
         from depthtrack.recording.run import RunWriter
@@ -60,6 +61,7 @@ class Command:
         from depthtrack.tracking.loop import track_sequence
         from depthtrack.tracking.trackers import create_tracker
 
+        check_output_folder(self.out)
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
         sequence = self.recording.open()

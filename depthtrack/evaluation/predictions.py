@@ -39,6 +39,12 @@ class PredictionEvaluation:
         return int(np.sum(self.points.known & ~np.isfinite(self.points.mm).any(axis=1)))
 
     @property
+    def left_out_joints(self) -> int:
+        """Joints without a position, here or in the labels, in frames that are judged by their others."""
+        judged = np.isfinite(self.points.mm).any(axis=1)
+        return int(np.sum(~np.isfinite(self.points.mm[judged])))
+
+    @property
     def by_joint(self) -> dict[str, Metric]:
         """The error of each joint, mm, in the benchmark's order."""
         columns = zip(self.points.names, self.points.mm.T, strict=True)
@@ -52,6 +58,7 @@ class PredictionEvaluation:
             "benchmark": self.benchmark.name,
             "frames": self.frames,
             "missed_frames": self.missed_frames,
+            "left_out_joints": self.left_out_joints,
             mean.name: mean.statistics(),
             largest.name: largest.statistics(),
             "finger_joint_error_mm": {name: metric.statistics() for name, metric in self.points.by_finger().items()},

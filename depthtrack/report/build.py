@@ -77,11 +77,7 @@ def write_report(
     progress: Progress = lambda frames, heading, total: frames,
 ) -> None:
     """Write the page; `sequence` is where the recording lies now, if it was moved. Raises InputError."""
-    if not evaluations:
-        raise InputError("a report needs at least one run")
-    for evaluation in evaluations:
-        if evaluation.frames == 0:
-            raise InputError(f"{evaluation.run.folder} holds no frame yet: track it first, or leave it out")
+    check_reportable(evaluations)
     # In the order of their folders' names, so that the page is the same whoever asks for it.
     lines = lines_of(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
     numbers = {label: number for number, label in enumerate(dict.fromkeys(line.label for line in lines))}
@@ -109,6 +105,15 @@ def write_report(
         "dark": Markup(css_variables(dark=True)),
     }
     _write(path, _template().render(page))
+
+
+def check_reportable(evaluations: Sequence[Evaluation]) -> None:
+    """Raise InputError where there is nothing to tell of."""
+    if not evaluations:
+        raise InputError("a report needs at least one run")
+    for evaluation in evaluations:
+        if evaluation.frames == 0:
+            raise InputError(f"{evaluation.run.folder} holds no frame yet: track it first, or leave it out")
 
 
 def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
