@@ -217,7 +217,7 @@ _GOOD_KEY = '{ at = 1, posture = "open" }'
         ('about = "x"\npostures = 3\nkeys = []', "must be a table"),
         ('about = "x"\nrandom = 3', "must be a table"),
         ("this is no TOML", "cannot read the motion file"),
-        ("#" * 1_100_000, "at most 1 MiB"),
+        ("#" * 1_100_000, "at most 1,048,576 bytes"),
     ],
 )
 def test_what_is_wrong_with_a_motion_file_is_said(tmp_path: Path, text: str, complaint: str) -> None:

@@ -9,7 +9,10 @@ import pytest
 from depthtrack.camera import Camera
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.synergies import Synergies
+from depthtrack.observation.skin_colour import SkinModel
 from depthtrack.recording.run import read_configuration, read_rows
+from depthtrack.synthesis.motion_file import read_table
 from depthtrack.text_files import read_lines, read_text
 
 
@@ -40,3 +43,13 @@ def test_files_larger_than_memory_are_refused_unread(tmp_path: Path, read: Calla
     path = tmp_path if read in (read_configuration, read_rows) else tmp_path / "run.json"
     with pytest.raises(InputError, match="bytes long, found 1,099,511,627,776"):
         read(path)
+
+
+@pytest.mark.parametrize("read", [Synergies.from_json, SkinModel.load, read_table])
+def test_readers_of_small_files_refuse_large_and_endless_ones(read: Callable[[Path], object], tmp_path: Path) -> None:
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(1 << 23)
+    with pytest.raises(InputError, match="bytes long, found 8,388,608"):
+        read(tmp_path / "large")
+    with pytest.raises(InputError, match="no regular file"):
+        read(Path("/dev/zero"))

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import FINGERS
 from depthtrack.resources import resource_folder
+from depthtrack.text_files import read_text
 
 Array = NDArray[np.float64]
 
 ANGLE_COUNT = 20
 _ORTHONORMAL = 1e-6
 """How far a file's components may be from orthonormal."""
-_LARGEST_FILE = 1 << 20
 _SPREAD = 1e-12
 """Postures with a smaller total variance, in rad^2, are one posture."""
 
@@ -131,15 +131,12 @@ class Synergies:
     @classmethod
     def from_json(cls, path: Path) -> Self:
         """Read what `to_json` wrote. Raises InputError naming what is missing or does not fit."""
+        text = read_text(path)
         try:
-            with path.open("rb") as file:
-                data = file.read(_LARGEST_FILE + 1)
-            if len(data) > _LARGEST_FILE:
-                raise InputError("a file of synergies is smaller than 1 MiB, found a larger one")
-            return cls._from_fields(json.loads(data.decode("utf-8")))
+            return cls._from_fields(json.loads(text))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
-        except (OSError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise InputError(f"cannot read the synergies {path}: {error}") from error
         except KeyError as error:
             raise InputError(

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from depthtrack.errors import InputError
 from depthtrack.observation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.observation.window import Window
+from depthtrack.text_files import read_text
 
 BINS, LEVELS = 64, 32
 """Bins along U and along V, and steps of R, G and B by which a colour's bin is looked up."""
@@ -113,13 +114,10 @@ class SkinModel:
     @classmethod
     def load(cls, path: Path) -> Self:
         """Read what `save` wrote. Raises InputError."""
+        text = read_text(path, _LARGEST_FILE)
         try:
-            if path.stat().st_size > _LARGEST_FILE:
-                raise InputError(f"{path} is too large to be a skin model: write one with `depthtrack train-skin`")
-            fields = json.loads(path.read_text(encoding="utf-8"))
+            fields = json.loads(text)
             return cls(fields["skin"], fields["other"], float(fields["prior"]))
-        except OSError as error:
-            raise InputError(f"cannot read the skin model {path}: {error.strerror}") from error
         except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise InputError(f"{path} is no skin model: write one with `depthtrack train-skin` ({error!r})") from error
 

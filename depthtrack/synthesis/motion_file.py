@@ -13,11 +13,11 @@ from depthtrack.errors import InputError
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLE_NAMES, FINGERS
 from depthtrack.resources import resource_folder
+from depthtrack.text_files import read_text
 
 Array = NDArray[np.float64]
 
 POSTURES_FILE = "postures.toml"
-_MAX_BYTES = 1 << 20
 
 
 def motion_names() -> list[str]:
@@ -38,12 +38,8 @@ def find_motion(name: str) -> Path:
 def read_table(path: Path) -> dict[str, Any]:
     """The parsed TOML file. Raises InputError when it is missing, larger than 1 MiB, or not TOML."""
     try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
-        if len(data) > _MAX_BYTES:
-            raise InputError(f"{path} must be a motion file of at most 1 MiB, found a larger one")
-        return tomllib.loads(data.decode("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        return tomllib.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"cannot read the motion file {path}: {error}") from error
 
 
