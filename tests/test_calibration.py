@@ -35,6 +35,7 @@ from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.ik.tracker import IkTracker
+from depthtrack.viewing.calibration_picture import shown_views
 from tests.synthetic_observations import observe
 
 
@@ -108,6 +109,13 @@ def test_a_calibrated_hand_is_tracked_better(calibration: Calibration) -> None:
 def test_the_file_can_be_read_as_a_hand(calibration: Calibration, tmp_path: Path) -> None:
     (tmp_path / "hand.json").write_text(calibration.to_json())
     assert HandShape.from_json(tmp_path / "hand.json") == calibration.hand
+
+
+def test_views_are_shown_in_the_order_of_the_recording(calibration: Calibration) -> None:
+    observations = calibration.observations[::-1]
+    shown = [observations[i].frame_index for i in shown_views(observations)]
+    assert len(shown) == 4
+    assert shown == sorted(shown)
 
 
 @pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])

@@ -1,5 +1,7 @@
 """What a calibration changed: the average hand and the measured one over what was observed."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +32,8 @@ def calibration_picture(calibration: Calibration) -> Image:
     """A page (h, w, 3): for a few views, the depth, the average hand over it and the measured one, the observed
     silhouette's outline around each."""
     average = HandShape(side=calibration.hand.side)
-    chosen = np.unique(np.linspace(0, len(calibration.observations) - 1, _ROWS).round().astype(int))
     rows = []
-    for i in chosen:
+    for i in shown_views(calibration.observations):
         o = calibration.observations[i]
         camera = _square(o.camera).resized(_HEIGHT / max(o.camera.shape))
         ground, outline = _ground(o, camera)
@@ -46,6 +47,12 @@ def calibration_picture(calibration: Calibration) -> Image:
             tiles.append(captioned(drawn, name))
         rows.append(beside(tiles))
     return framed(stacked(rows))
+
+
+def shown_views(observations: Sequence[Observation]) -> list[int]:
+    """Which of the observations are shown, in the order of the recording."""
+    chosen = np.unique(np.linspace(0, len(observations) - 1, _ROWS).round().astype(int)).tolist()
+    return sorted(chosen, key=lambda i: observations[i].frame_index)
 
 
 def _square(camera: Camera) -> Camera:
