@@ -155,3 +155,8 @@ def test_text_stays_inside_the_image_and_is_as_wide_as_told() -> None:
     assert abs((v.min() + v.max()) / 2 - 20) <= 3
     for position in ((-15, 2), (290, 38), (500, 20), (-500, -500)):
         put_text(canvas, "frame 12", position, 16)
+
+
+@pytest.mark.parametrize("size", [13, 24])
+def test_words_stand_apart(size: int) -> None:
+    assert text_width("24 frames", size) - text_width("24frames", size) >= 0.3 * size

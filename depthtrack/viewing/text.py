@@ -1,12 +1,16 @@
 """Smooth text on images."""
 
 from functools import lru_cache
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from depthtrack.viewing.theme import TEXT, Rgb
+
+_BLANK = 0.3
+"""Width between words, of the text's size."""
 
 
 def put_text(
@@ -41,7 +45,13 @@ def text_width(text: str, size: int = 14) -> int:
 def _coverage(text: str, size: int) -> NDArray[np.uint8]:
     """How much of each pixel (h, w) the text covers, 0 to 255; h depends on `size` alone."""
     font = ImageFont.load_default(size)
-    width = max(1, round(font.getlength(text)) + 1)
+    # The font's own blank is so thin that words run into one another.
+    words, blank = text.split(" "), ceil(_BLANK * size)
+    lengths = [font.getlength(word) for word in words]
+    width = max(1, round(sum(lengths)) + blank * (len(words) - 1) + 1)
     canvas = Image.new("L", (width, round(1.5 * size)))
-    ImageDraw.Draw(canvas).text((0, canvas.height / 2), text, font=font, fill=255, anchor="lm")
+    x = 0.0
+    for word, length in zip(words, lengths, strict=True):
+        ImageDraw.Draw(canvas).text((round(x), canvas.height / 2), word, font=font, fill=255, anchor="lm")
+        x += length + blank
     return np.asarray(canvas)
