@@ -17,7 +17,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run import Run
 from depthtrack.viewing.close_ups import close_ups
-from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_to_rgb
+from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale, residual_to_rgb
 from depthtrack.viewing.run_film import write_run_film
 from depthtrack.viewing.run_pictures import LAYERS, RunPainter
 from depthtrack.viewing.run_sheet import run_sheet
@@ -97,7 +97,7 @@ def test_a_hypothesis_behind_the_hand_is_red_before_it_blue(
     seen, moved = next(iter(right)), next(iter(wrong))
     exact = RunPainter(right, 240).view(seen, "residual")
     white = (exact > 225).all(axis=-1)
-    assert white.sum() > 0.8 * (is_colour(exact, NO_READING) == 0).sum() - 1500  # all but the legend and the edges
+    assert white.sum() > 0.8 * (is_colour(exact, NO_READING) == 0).sum() - 1500  # all but the edges
     image = RunPainter(wrong, 240).view(moved, "residual").astype(int)
     tinted = image[..., towards] - image[..., 2 - towards]
     assert np.median(tinted[white]) > 80
@@ -175,6 +175,21 @@ def test_a_page_shows_the_frames_asked_for(run: Path) -> None:
     for status in ("tracked", "absent", "lost"):
         assert is_colour(page, STATUS_COLOURS[status]).any()
     assert page.shape[1] > 3 * 2 * 128
+
+
+def test_a_page_says_what_its_colours_mean(run: Path) -> None:
+    """Of a frame without a difference: what is coloured is the legend."""
+    page = run_sheet(opened(run), (0,), height=240)
+    scale = residual_scale(120, 10)
+    found = [
+        (y, x)
+        for y, x in zip(*np.nonzero(is_colour(page, tuple(scale[0, 0]))), strict=True)
+        if np.array_equal(page[y : y + 10, x : x + 120], scale)
+    ]
+    assert len(found) == 1
+    legend = page[found[0][0] : found[0][0] + 10]
+    assert is_colour(legend, UNEXPLAINED).sum() == 100
+    assert is_colour(legend, UNREAD).sum() >= 100
 
 
 @pytest.mark.parametrize(

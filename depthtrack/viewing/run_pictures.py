@@ -41,7 +41,9 @@ class RunPainter:
 
     def picture(self, seen: Replayed) -> Image:
         """All four views of a frame, what the tracker said of it, and its place in the run."""
-        tiles = [captioned(self.view(seen, layer), *self._caption(seen, layer)) for layer in LAYERS]
+        views = {layer: self.view(seen, layer) for layer in LAYERS}
+        _draw_scale(views["residual"])
+        tiles = [captioned(view, *self._caption(seen, layer)) for layer, view in views.items()]
         grid = tile_grid(tiles, columns=2)
         if self._timeline is None:
             self._timeline = Timeline(self._replay.run.energy, self._replay.run.status, grid.shape[1])
@@ -80,9 +82,7 @@ class RunPainter:
         size = camera.width, camera.height
         rendered = np.zeros(camera.shape) if surface is None else surface.depth
         observed = None if close.mask is None else enlarged(close.mask.astype(np.float32), *size) > 0
-        image = residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed)
-        _draw_scale(image)
-        return image
+        return residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed)
 
     def _skeleton(self, seen: Replayed, close: Moment) -> Image:
         camera = close.camera.resized(self._height / close.camera.height)
@@ -104,7 +104,7 @@ class RunPainter:
         if layer == "hypothesis":
             return "hypothesis over depth", "" if seen.estimate.pose is not None else "no pose"
         if layer == "residual":
-            return "residual", "seen nearer red, farther blue"
+            return "residual", "nearer red, farther blue, unexplained magenta"
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
         return "skeleton", "" if truth is None else "the true one thin"
 

@@ -9,6 +9,7 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.replay import Replay
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked, tile_grid
+from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale
 from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, STATUS_COLOURS
@@ -37,7 +38,27 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
         raise InputError(f"the run {replay.run.folder} holds no frame to show")
     grid = tile_grid(tiles, min(columns, len(tiles)))
     timeline = Timeline(replay.run.energy, replay.run.status, grid.shape[1])
-    return framed(stacked([_title(replay, grid.shape[1]), grid, timeline.image], gap=12))
+    return framed(stacked([_title(replay, grid.shape[1]), grid, _legend(grid.shape[1]), timeline.image], gap=12))
+
+
+def _legend(width: int) -> Image:
+    """What the residual's colours mean, left to right as far as there is room."""
+    bar, reach, x = blank(width, 22), f"{1000 * LARGEST:.0f} mm", 0
+    scale = residual_scale(120, 10)
+    for mark, told in (
+        (None, f"seen {reach} nearer"),
+        (scale, f"{reach} farther"),
+        (np.full((10, 10, 3), UNEXPLAINED, dtype=np.uint8), "hand unexplained"),
+        (np.full((10, 10, 3), UNREAD, dtype=np.uint8), "no reading"),
+    ):
+        start = x if mark is None else x + mark.shape[1] + 8
+        if start + text_width(told, 14) > width:
+            break
+        if mark is not None:
+            bar[6:16, x : x + mark.shape[1]] = mark
+        put_text(bar, told, (start, 11), 14, FAINT_TEXT)
+        x = start + text_width(told, 14) + (8 if mark is None else 24)
+    return bar
 
 
 def _title(replay: Replay, width: int) -> Image:
