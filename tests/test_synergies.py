@@ -144,7 +144,7 @@ def test_a_file_that_does_not_fit_together_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"set\.json"):
             load_synergies(path)
     path.write_bytes(b" " * (1 << 20) + b"{}")
-    with pytest.raises(InputError, match="1 MiB"):
+    with pytest.raises(InputError, match="at most 1,048,576 bytes"):
         load_synergies(path)
     with pytest.raises(InputError, match="leap"):
         load_synergies("no-such-set")
