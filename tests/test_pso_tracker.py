@@ -48,6 +48,22 @@ def test_follows_noisy_readings() -> None:
     assert errors_mm(estimates, frames, made).mean() < 4
 
 
+def test_the_skin_finishes_what_cylinders_cannot_fit() -> None:
+    made, frames = Synthesiser(Synthesis(model="skin")), range(100, 115)
+    ways: dict[str, PsoOptions] = {"none": PsoOptions(), "skin": PsoOptions(finish="skin")}
+    errors = {
+        name: errors_mm(follow(PsoTracker(MADE.options.hand, options), frames, made), frames, made).mean()
+        for name, options in ways.items()
+    }
+    assert errors["skin"] < 2
+    assert errors["skin"] < 0.5 * errors["none"]
+
+
+def test_refuses_an_unknown_finish() -> None:
+    with pytest.raises(InputError, match="choose none or skin"):
+        PsoTracker(MADE.options.hand, PsoOptions(finish="paint"))  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("frame", [10, 150, 300])
 def test_starts_by_itself(frame: int) -> None:
     tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=64))

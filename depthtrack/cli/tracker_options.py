@@ -27,6 +27,8 @@ class PsoChoice:
         Literal["raster", "egl", "osmesa", "oracle"] | None, _unless("raster|egl|osmesa|oracle", "raster")
     ] = None
     """What renders and scores the hypotheses."""
+    finish: Annotated[Literal["none", "skin"] | None, _unless("none|skin", "none")] = None
+    """Draw the swarm's pose to the observed points by the hand's skin, for hands that no cylinders look like."""
     threads: Annotated[int | None, _unless("N", "one for each core")] = None
     """Threads of the renderer. Poses do not depend on it."""
 

@@ -61,7 +61,8 @@ class Replay:
 
     def surface(self) -> ModelSurface:
         """The surface that the run fitted. Raises InputError for hand sizes that no skin fits."""
-        return ModelSurface.of(self.hand, skin=self.run.configuration.get("model") == "skin")
+        fitted = {self.run.configuration.get(name) for name in ("model", "finish")}
+        return ModelSurface.of(self.hand, skin="skin" in fitted)
 
     def __len__(self) -> int:
         return len(self.run.index)

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import POSE_SIZE, POSITION, retract
+from depthtrack.hand.pose import ANGLES, POSE_SIZE, POSITION, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.target import Target
 from depthtrack.tracking.ik.fit import FitOptions, Fitter
+from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.space import FULL
 from depthtrack.tracking.ik.surfaces import make_surface
 from depthtrack.tracking.memory import LostBelow, TrackMemory
@@ -27,9 +28,12 @@ from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
+Finish = Literal["none", "skin"]
 
 _POLISH_EVERY, _POLISH_ROUNDS = 6, 8
 """Every so many-th point is used where a search polishes its poses, and so many rounds."""
+_FINISH_EVERY = 3
+"""Every so many-th point is used where a frame's pose is drawn to the skin."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class PsoOptions:
     orientations `look_again_apart` radians apart, and the best is taken if its energy is less than the share
     `look_again_share` of what it was, or less at all where the track would be lost.
     The searches of "default" fit surfaces between their rounds, as the IK tracker does.
+    With `finish` "skin", the swarm's best pose is at last drawn to the observed points by the hand's skin, whose palm
+    is no cylinder; "none" is the paper's way.
     `spread` is the standard deviation of the first generation: metres, radians of rotation, radians of the angles.
     """
 
@@ -57,6 +63,7 @@ class PsoOptions:
     threads: int = 1
     resolution: int | None = None
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
+    finish: Finish = "none"
     look_again_every: int = 5
     look_again_apart: float = 0.1
     look_again_share: float = 0.93
@@ -82,10 +89,14 @@ class PsoTracker:
         self.options = options = options or PsoOptions()
         if options.variant not in ("default", "paper"):
             raise InputError(f"no PSO variant '{options.variant}': choose default or paper")
+        if options.finish not in ("none", "skin"):
+            raise InputError(f"no way '{options.finish}' to finish a pose: choose none or skin")
         threads = {"threads": options.threads} if options.renderer == "raster" else {}
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
         self._shape = shape
         self._fitter: Fitter | None = None
+        if options.finish == "skin":
+            self._skin_fitter()
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -126,6 +137,8 @@ class PsoTracker:
         share = self._doubt(observation, pose, energy)
         if share is not None:
             pose, energy = self._look_again(observation, generator, pose, energy, share)
+        if options.finish == "skin":
+            pose, energy = self._finish(observation, pose)
         return self._settle(pose, energy, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
@@ -200,14 +213,24 @@ class PsoTracker:
 
     def _polish(self, observation: Observation) -> Polish | None:
         """The skin drawn to the observed surface; None for sizes that no skin fits."""
-        if self._fitter is None:
-            try:
-                self._fitter = Fitter(self._shape, make_surface("skin", self._shape), FitOptions())
-            except InputError:
-                return None
-        fitter = self._fitter
+        try:
+            fitter = self._skin_fitter()
+        except InputError:
+            return None
         fitter.observe(observation, _POLISH_EVERY)
         return lambda pose: fitter.fit(pose, FULL, _POLISH_ROUNDS)
+
+    def _finish(self, observation: Observation, pose: Array) -> tuple[Array, float]:
+        """The pose drawn to the skin, its fingers held to what the swarm says; and its energy."""
+        fitter = self._skin_fitter()
+        fitter.observe(observation, _FINISH_EVERY)
+        drawn = fitter.fit(pose, FULL, prior=Prior.held(pose[ANGLES], fitter.options.hold))
+        return drawn, float(self._scorer.score(drawn[None])[0])
+
+    def _skin_fitter(self) -> Fitter:
+        if self._fitter is None:
+            self._fitter = Fitter(self._shape, make_surface("skin", self._shape), FitOptions())
+        return self._fitter
 
     def _generator(self, observation: Observation) -> np.random.Generator:
         """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""
