@@ -21,6 +21,7 @@ from depthtrack.observation.observation import Observation
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.tracking.pso.search import SearchOptions, find_candidates, find_pose
+from depthtrack.tracking.starting import frame_generator
 
 Array = NDArray[np.float64]
 
@@ -175,7 +176,7 @@ class _Searcher:
         with RasterScorer(shape, threads=self._threads) as scorer:
             for o in self.observations[:count]:
                 scorer.observe(_target(o))
-                out.append(find_candidates(scorer, o.centre, self._generator(o), _WIDE))
+                out.append(find_candidates(scorer, o.centre, frame_generator(self._seed, o.frame_index), _WIDE))
         return out
 
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
@@ -190,7 +191,7 @@ class _Searcher:
         with RasterScorer(shape, threads=self._threads) as scorer:
             for n, o in enumerate(observations):
                 scorer.observe(_target(o))
-                pose, _ = find_pose(scorer, o.centre, self._generator(o), options)
+                pose, _ = find_pose(scorer, o.centre, frame_generator(self._seed, o.frame_index), options)
                 tried = np.stack([pose] if known is None else [pose, known[n]])
                 terms = scorer.terms(tried)
                 best = int(np.argmin(terms.energy))
@@ -198,9 +199,6 @@ class _Searcher:
                 energies.append(float(terms.energy[best]))
                 agreements.append(float(1 - terms.skin[best]))
         return Found(np.stack(poses), np.array(energies), np.array(agreements))
-
-    def _generator(self, o: Observation) -> np.random.Generator:
-        return np.random.Generator(np.random.Philox(key=[self._seed, o.frame_index]))
 
 
 def _target(o: Observation) -> Target:

@@ -23,6 +23,7 @@ from depthtrack.tracking.ik.fit import FitOptions, Fitter
 from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
+from depthtrack.tracking.starting import frame_generator
 
 Array = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ class SingleFrameFitter:
         target = Target(observation.camera, observation.skin, observation.depth)
         self._scorer.observe(target.reduced(_LONGEST_SIDE))
         self._fitter.observe(observation, self._subsample)
-        generator = np.random.Generator(np.random.Philox(key=[self._seed, observation.frame_index]))
+        generator = frame_generator(self._seed, observation.frame_index)
         start = np.array(pose, dtype=np.float64)
         return climb(self._fitter, self._scorer, start, self._synergies, self._ladder, generator)
 

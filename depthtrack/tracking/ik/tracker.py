@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ANGLES, POSE_SIZE, retract
+from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.observation.observation import Observation
@@ -26,6 +26,7 @@ from depthtrack.tracking.ik.search import SearchOptions, find_pose
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
 from depthtrack.tracking.memory import LostBelow, TrackMemory
+from depthtrack.tracking.starting import checked_pose, frame_generator
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
@@ -123,10 +124,9 @@ class IkTracker:
             found = self._search(observation)
             clock.lap("retry")
         else:
-            given = np.asarray(pose, dtype=np.float64)
-            if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
-                raise InputError(f"a start pose must be {POSE_SIZE} finite numbers, found shape {given.shape}")
-            found = self._fitter.fit(within_limits(given), self._space, 2 * self.options.rounds, self._likely)
+            found = self._fitter.fit(
+                within_limits(checked_pose(pose)), self._space, 2 * self.options.rounds, self._likely
+            )
             clock.lap("fit")
         return self._settle(found, Status.STARTED, clock)
 
@@ -192,7 +192,7 @@ class IkTracker:
         lost = self._memory.is_lost(energy, confidence)
         if energy <= self.options.search.good_energy or not (due or lost):
             return pose, Status.TRACKED
-        generator = self._generator(observation)
+        generator = frame_generator(self.options.seed, observation.frame_index)
         other, lower = look_close_by(self._fitter, self._scorer, pose, self._synergies, options, generator)
         if lower < (1 if lost else options.close_by) * energy:
             pose, energy = other, lower
@@ -203,15 +203,11 @@ class IkTracker:
         return pose, Status.TRACKED
 
     def _search(self, observation: Observation) -> Array:
-        generator = self._generator(observation)
+        generator = frame_generator(self.options.seed, observation.frame_index)
         found = find_pose(
             self._fitter, self._scorer, observation.centre, self._synergies, self.options.search, generator
         )[0]
         return found if self.options.synergies is None else self._fitter.fit(found, self._space, prior=self._likely)
-
-    def _generator(self, observation: Observation) -> np.random.Generator:
-        """Philox keyed by seed and frame: the same whatever happened before."""
-        return np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
 
     def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
         terms = self._scorer.terms(pose[None])

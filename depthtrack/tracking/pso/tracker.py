@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import ANGLES, POSE_SIZE, POSITION, retract
+from depthtrack.hand.pose import ANGLES, POSITION, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.backends import create_scorer
@@ -24,6 +24,7 @@ from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates, find_pose, refine
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
+from depthtrack.tracking.starting import checked_pose, frame_generator
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
@@ -104,14 +105,11 @@ class PsoTracker:
         begun = time.perf_counter()
         self._observe(observation)
         observed = time.perf_counter()
-        generator = self._generator(observation)
+        generator = frame_generator(self.options.seed, observation.frame_index)
         if pose is None:
             found, energy = self._search(observation, generator)
         else:
-            given = np.asarray(pose, dtype=np.float64)
-            if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):
-                raise InputError(f"a start pose must be {POSE_SIZE} finite numbers, found shape {given.shape}")
-            found, energy = refine(self._scorer, given, self.options.spread, self.options.swarm, generator)
+            found, energy = refine(self._scorer, checked_pose(pose), self.options.spread, self.options.swarm, generator)
         return self._settle(found, energy, Status.STARTED, begun, observed)
 
     def track(self, observation: Observation) -> Estimate:
@@ -122,7 +120,7 @@ class PsoTracker:
         begun = time.perf_counter()
         self._observe(observation)
         observed = time.perf_counter()
-        generator, options = self._generator(observation), self.options
+        options, generator = self.options, frame_generator(self.options.seed, observation.frame_index)
         space = self._space(last)
         found = minimise(
             lambda x: self._scorer.score(space.poses(x)),
@@ -231,10 +229,6 @@ class PsoTracker:
         if self._fitter is None:
             self._fitter = Fitter(self._shape, make_surface("skin", self._shape), FitOptions())
         return self._fitter
-
-    def _generator(self, observation: Observation) -> np.random.Generator:
-        """Random numbers of one frame, whatever happened before: Philox keyed by seed and frame."""
-        return np.random.Generator(np.random.Philox(key=[self.options.seed, observation.frame_index]))
 
     def _settle(self, pose: Array, energy: float, status: Status, begun: float, observed: float) -> Estimate:
         confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
