@@ -238,11 +238,9 @@ def as_text(report: IkReport) -> str:
         )
         for row in report.rows
     ]
-    machine = report.machine
-    busy = "" if machine.load is None else f", load {machine.load:.1f}"
     return "\n".join(
         [
-            f"{machine.cpu}, {machine.cores} cores{busy}",
+            report.machine.headline,
             "one thread, best calls (median), a hand seen in 9,000 pixels:",
             "",
             *aligned([head, *lines], left=2),

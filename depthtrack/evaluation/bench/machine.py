@@ -26,6 +26,12 @@ class Machine:
     versions: dict[str, str] = field(default_factory=dict)
     load: float | None = None
 
+    @property
+    def headline(self) -> str:
+        """The first line above a table of speeds."""
+        busy = "" if self.load is None else f", load {self.load:.1f}"
+        return f"{self.cpu}, {self.cores} cores{busy}"
+
 
 def describe_machine() -> Machine:
     """This machine, now."""

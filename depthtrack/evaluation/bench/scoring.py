@@ -187,14 +187,12 @@ def as_text(report: ScoreReport) -> str:
         )
         for row in report.rows
     ]
-    machine = report.machine
-    busy = "" if machine.load is None else f", load {machine.load:.1f}"
     notes = {row.backend: f"{row.backend} draws with {row.renderer}" for row in report.rows if row.renderer}
     if any(row.kind == "peer" for row in report.rows):
         notes["peer"] = "(in brackets): what one would use instead, on a mesh of the same hand"
     return "\n".join(
         [
-            f"{machine.cpu}, {machine.cores} cores{busy}",
+            report.machine.headline,
             "hypotheses a second, from pose to energy:",
             "",
             *(aligned([head, *lines], left=3) if lines else ["nothing could run"]),

@@ -203,11 +203,9 @@ def as_text(report: SegmentReport) -> str:
         )
         for row in report.rows
     ]
-    machine = report.machine
-    busy = "" if machine.load is None else f", load {machine.load:.1f}"
     return "\n".join(
         [
-            f"{machine.cpu}, {machine.cores} cores{busy}",
+            report.machine.headline,
             "one thread, milliseconds: the best of each frame (median of all calls)",
             "",
             *aligned([head, *lines], left=3),
