@@ -110,6 +110,7 @@ class PsoTracker:
             found, energy = self._search(observation, generator)
         else:
             found, energy = refine(self._scorer, checked_pose(pose), self.options.spread, self.options.swarm, generator)
+        found, energy = self._finish(observation, found, energy)
         return self._settle(found, energy, Status.STARTED, begun, observed)
 
     def track(self, observation: Observation) -> Estimate:
@@ -135,8 +136,7 @@ class PsoTracker:
         share = self._doubt(observation, pose, energy)
         if share is not None:
             pose, energy = self._look_again(observation, generator, pose, energy, share)
-        if options.finish == "skin":
-            pose, energy = self._finish(observation, pose)
+        pose, energy = self._finish(observation, pose, energy)
         return self._settle(pose, energy, Status.TRACKED, begun, observed)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
@@ -218,8 +218,10 @@ class PsoTracker:
         fitter.observe(observation, _POLISH_EVERY)
         return lambda pose: fitter.fit(pose, FULL, _POLISH_ROUNDS)
 
-    def _finish(self, observation: Observation, pose: Array) -> tuple[Array, float]:
-        """The pose drawn to the skin, its fingers held to what the swarm says; and its energy."""
+    def _finish(self, observation: Observation, pose: Array, energy: float) -> tuple[Array, float]:
+        """The pose drawn to the skin, its fingers held to what the swarm says, and its energy; as it is for `none`."""
+        if self.options.finish == "none":
+            return pose, energy
         fitter = self._skin_fitter()
         fitter.observe(observation, _FINISH_EVERY)
         drawn = fitter.fit(pose, FULL, prior=Prior.held(pose[ANGLES], fitter.options.hold))
