@@ -10,7 +10,7 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.tracking.looking_again import close_by
+from depthtrack.tracking.looking_again import close_by, other_finger
 from depthtrack.tracking.pso.search import SearchOptions, find_candidates, hypotheses, refine
 from depthtrack.tracking.pso.swarm import SwarmOptions
 from depthtrack.tracking.pso.tracker import PsoOptions
@@ -62,3 +62,20 @@ def test_orientations_that_no_wrist_allows_are_left_out() -> None:
     assert (towards_wrist @ arm > 0.15).all()
     free = hypotheses(np.array([0, 0, 0.5]), np.random.default_rng(2), 400)
     assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
+
+
+def test_a_finger_that_is_elsewhere_is_found() -> None:
+    """Each finger in turn is bent or stretched; moved alone, it is found again, and no other one moves."""
+    frame = 11
+    o, truth = observe(MADE, frame), MADE.poses[frame]
+    with RasterScorer(MADE.options.hand) as scorer:
+        scorer.observe(Target(o.camera, o.skin, o.depth))
+        for finger in range(1, 5):
+            wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
+            straight = truth[angles][1:].sum() < np.radians(90)
+            wrong[angles] = POSTURES["fist" if straight else "open"][4 * finger : 4 * finger + 4]
+            found, energy = other_finger(scorer, wrong, finger, np.random.default_rng(finger))
+            assert energy == scorer.score(found[None])[0]
+            before, after = endpoint_error(MODEL, np.stack([wrong, found]), MODEL, np.stack([truth, truth])).values
+            assert after < 0.4 * before
+            assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))

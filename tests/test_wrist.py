@@ -128,6 +128,15 @@ def test_the_wrist_stays_where_it_is_while_the_palm_is_mistaken() -> None:
     assert wrist.guess(palm_at(-0.05)) == pytest.approx(0.11, abs=0.005)
 
 
+def test_a_wrist_is_where_a_tracker_said_it_was() -> None:
+    wrist = WristFilter()
+    for _ in range(20):
+        wrist.update(palm_at(0.0), ARM, 0.03)
+    wrist.expect(np.array([0.06, 0.0, 0.5]))
+    assert wrist.guess(palm_at(0.0)) == pytest.approx(0.06)
+    assert wrist.update(palm_at(0.0), ARM, 0.07) == pytest.approx(0.065, abs=1e-3)
+
+
 def test_a_wrist_that_jumps_is_believed_by_and_by() -> None:
     wrist = WristFilter()
     for _ in range(20):

@@ -1,11 +1,12 @@
 """The hand in a frame: start anywhere, then follow it from its last position (Oikonomidis et al. 2011, Sec. 2.1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.observation.arm import Arm, find_arm, find_vanishing_arm
+from depthtrack.observation.flying import flying_pixels
 from depthtrack.observation.grid import Mask
 from depthtrack.observation.guided import PALM_HALF_THICKNESS, HandPlace, find_expected
 from depthtrack.observation.hand_pixels import hand_masks, label_hand
@@ -80,7 +81,7 @@ class Segmenter:
         """The hand, or None where none is seen. `place` is where a tracker is sure to find it: nothing is searched."""
         guided = None if place is None else self._guided(frame, place)
         if guided is not None:
-            return guided
+            return _without_flying(frame, guided)
         if not 0 <= frame.timestamp - self._last_time <= MEMORY:
             self._last = None
         found = None if self._last is None else self._follow(frame, self._last)
@@ -88,19 +89,23 @@ class Segmenter:
             self._forget_arm()
             start = self._start(frame)
             found = None if start is None else self._follow(frame, start)
-        if found is not None:
-            self._last_time = frame.timestamp
-        return found
+        if found is None:
+            return None
+        self._last_time = frame.timestamp
+        return _without_flying(frame, found)
 
     def _guided(self, frame: Frame, place: HandPlace) -> Segmentation | None:
         masks = find_expected(frame, place, self._skin)
         if masks is None:
             return None
-        self._last, self._last_time = place.centre, frame.timestamp
+        to_surface = -PALM_HALF_THICKNESS * place.centre / np.linalg.norm(place.centre)
+        self._last, self._last_time = place.centre + to_surface, frame.timestamp
+        # Should the tracker lose the hand, it is found from here on; of the forearm, a hand tells nothing.
+        self._arm_direction = None
+        self._wrist.expect(place.wrist.point + to_surface)
         radius = float(np.linalg.norm(place.wrist.point - place.centre))
         arm = place.wrist.normal
-        surface = place.centre - PALM_HALF_THICKNESS * place.centre / np.linalg.norm(place.centre)
-        return Segmentation(masks.window, masks.skin, masks.readings, surface, radius, arm, place.wrist)
+        return Segmentation(masks.window, masks.skin, masks.readings, self._last, radius, arm, place.wrist)
 
     def _start(self, frame: Frame) -> Array | None:
         """Where a hand is (3,), metres, looking at the whole frame."""
@@ -153,3 +158,11 @@ class Segmenter:
         left, top = roi.left - view.window.left, roi.top - view.window.top
         skin = view.skin[top : top + roi.height, left : left + roi.width]
         self._skin.learn(view.frame.colour, roi, np.ascontiguousarray(skin), np.ascontiguousarray(hand))
+
+
+def _without_flying(frame: Frame, found: Segmentation) -> Segmentation:
+    """The hand without readings that hang in the air, nor, where depth alone tells what is hand, their silhouette."""
+    flying = flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
+    readings = found.readings & ~flying
+    skin = found.skin if frame.colour is not None else found.skin & ~flying
+    return replace(found, readings=readings, skin=skin)

@@ -40,6 +40,10 @@ class WristFilter:
         self._point: Array | None = None
         self._variance = 0.0
 
+    def expect(self, point: Array) -> None:
+        """Take it to be at `point` (3,), metres, on the visible surface, as if it had just been seen there."""
+        self._point, self._variance = point, SEEN_SIGMA**2
+
     def guess(self, palm: Palm) -> float:
         """About how far (m) the wrist is from the palm's centre, before the arm is known."""
         return anatomical_guess(palm) if self._point is None else float(np.linalg.norm(self._point - palm.centre))

@@ -7,9 +7,10 @@ one, or for the next, stays so for many frames. What other postures would look l
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.hand.limits import within_limits
+from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose, quaternion_exp, quaternion_product
 from depthtrack.hand.postures import POSTURES
+from depthtrack.rendering.scorer import Scorer
 
 Array = NDArray[np.float64]
 
@@ -22,6 +23,11 @@ _FINGERS = np.stack(
 _PLACE, _TURN, _VARIED = 0.02, 0.3, 0.15
 """Metres, and radians of the whole hand and of each angle, by which what is close by differs: standard deviations."""
 
+_FINGER_TRIALS, _FINGER_KEPT, _FINGER_SPREADS = 96, 8, (0.2, 0.1)
+"""Postures of one finger that are looked at together, how many of them lead on, and how far from these the next ones
+are: standard deviations, radians."""
+_FIRST_ANGLE = 7
+
 
 def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
     """Poses (count, 27) of hands close to where the one in `pose` (27,) is, every finger in some typical posture; in
@@ -32,3 +38,22 @@ def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
     angles = np.where(kept, pose[ANGLES], mixed) + _VARIED * generator.standard_normal((count, 20))
     quaternions = quaternion_product(quaternion_exp(turn), pose[ORIENTATION])
     return within_limits(make_pose(pose[POSITION] + shift, quaternions, angles))
+
+
+def other_finger(scorer: Scorer, pose: Array, finger: int, generator: np.random.Generator) -> tuple[Array, float]:
+    """The pose (27,) that explains the observation best if but one finger (0 to 4) of `pose` (27,) is elsewhere, and
+    its energy: among typical and random postures of it, and twice around the best of them."""
+    angles = slice(_FIRST_ANGLE + 4 * finger, _FIRST_ANGLE + 4 * finger + 4)
+    random = generator.uniform(LOWER, UPPER, (_FINGER_TRIALS - len(_FINGERS), 20)).reshape(-1, 5, 4)
+    poses = np.tile(pose, (_FINGER_TRIALS, 1))
+    poses[:, angles] = np.concatenate([_FINGERS, random])[:, finger]
+    for spread in (*_FINGER_SPREADS, None):
+        poses = within_limits(poses)
+        energies = scorer.score(poses)
+        best = np.argsort(energies, kind="stable")[:_FINGER_KEPT]
+        if spread is not None:
+            kept = poses[best]
+            poses = np.repeat(kept, _FINGER_TRIALS // _FINGER_KEPT, axis=0)
+            poses[:, angles] += spread * generator.standard_normal((len(poses), 4))
+            poses[:_FINGER_KEPT] = kept
+    return poses[best[0]], float(energies[best[0]])

@@ -24,7 +24,7 @@ class LostBelow:
 
     confidence: float = 0.6
     energy: float = 12.0
-    sure: float = 0.8
+    sure: float = 0.6
 
 
 class TrackMemory:

@@ -19,7 +19,8 @@ class LookAgain(NamedTuple):
     looked at, which go through `stages`.
 
     The best is taken if its energy is less than the share `close_by` of what it was; one from anywhere else, less than
-    the share `elsewhere`.
+    the share `elsewhere`. In every frame, one that differs by a single finger is, if less than the share `one_finger`
+    (0: never).
     """
 
     every: int = 5
@@ -27,6 +28,7 @@ class LookAgain(NamedTuple):
     stages: tuple[Stage, ...] = (Stage(48, None, 3), Stage(16, None, 4), Stage(6, None, 8), Stage(2, None, 12))
     close_by: float = 0.9
     elsewhere: float = 0.75
+    one_finger: float = 0.98
 
 
 def look_close_by(

@@ -25,6 +25,7 @@ from depthtrack.tracking.ik.residuals import Residual
 from depthtrack.tracking.ik.search import SearchOptions, find_pose
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
+from depthtrack.tracking.looking_again import other_finger
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.starting import checked_pose, frame_generator
 from depthtrack.tracking.tracker import Estimate, Status
@@ -149,6 +150,7 @@ class IkTracker:
         clock.lap("fit")
         if self._space.full and self.options.variant == "default":
             found, status = self._look_again(observation, self._reconsider(found, ahead[1:], prior))
+            found = self._finger_by_finger(observation, found)
             clock.lap("retry")
             return self._settle(found, status, clock)
         return self._settle(found, Status.TRACKED, clock)
@@ -182,6 +184,25 @@ class IkTracker:
             return best
         further = self._fitter.fit(best, self._space, 2 * self.options.rounds, prior)
         return by_energy(self._scorer, np.stack([best, further]))[0][0]
+
+    def _finger_by_finger(self, observation: Observation, pose: Array) -> Array:
+        """The pose, or one with single fingers elsewhere, where that explains clearly more: they are drawn to what they
+        took for another finger, or bent where nothing pulls them."""
+        energy = float(self._scorer.score(pose[None])[0])
+        if energy <= self.options.search.good_energy or self.options.look_again.one_finger == 0:
+            return pose
+        generator = frame_generator(self.options.seed, observation.frame_index)
+        for finger in range(5):
+            clearly_less = self.options.look_again.one_finger * energy
+            other, lower = other_finger(self._scorer, pose, finger, generator)
+            if lower >= clearly_less:
+                continue
+            held = Prior.held(other[ANGLES], self._fitter.options.hold)
+            fitted = self._fitter.fit(other, self._space, prior=held)
+            lower = float(self._scorer.score(fitted[None])[0])
+            if lower < clearly_less:
+                pose, energy = fitted, lower
+        return pose
 
     def _look_again(self, observation: Observation, pose: Array) -> tuple[Array, Status]:
         """The better of a pose and what is found close by: asked now and then where the pose explains little. Where the

@@ -19,6 +19,7 @@ from depthtrack.tracking.ik.fit import FitOptions, Fitter
 from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.space import FULL
 from depthtrack.tracking.ik.surfaces import make_surface
+from depthtrack.tracking.looking_again import other_finger
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates, find_pose, refine
@@ -49,7 +50,8 @@ class PsoOptions:
     A pose whose energy is above `search.good_energy` is doubted every `look_again_every` frames (0: never), and at once
     where the track would be lost: hands close by, every finger in some typical posture, are searched through, from
     orientations `look_again_apart` radians apart, and the best is taken if its energy is less than the share
-    `look_again_share` of what it was, or less at all where the track would be lost.
+    `look_again_share` of what it was, or less at all where the track would be lost. In every such frame, a pose that
+    differs by a single finger is taken if its energy is less than the share `one_finger_share` (0: never).
     The searches of "default" fit surfaces between their rounds, as the IK tracker does.
     With `finish` "skin", the swarm's best pose is at last drawn to the observed points by the hand's skin, whose palm
     is no cylinder; "none" is the paper's way.
@@ -68,6 +70,7 @@ class PsoOptions:
     look_again_every: int = 5
     look_again_apart: float = 0.1
     look_again_share: float = 0.93
+    one_finger_share: float = 0.98
     lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -136,6 +139,7 @@ class PsoTracker:
         share = self._doubt(observation, pose, energy)
         if share is not None:
             pose, energy = self._look_again(observation, generator, pose, energy, share)
+        pose, energy = self._finger_by_finger(generator, pose, energy)
         pose, energy = self._finish(observation, pose, energy)
         return self._settle(pose, energy, Status.TRACKED, begun, observed)
 
@@ -200,6 +204,19 @@ class PsoTracker:
         options, polish = replace(self.options.search, apart=self.options.look_again_apart), self._polish(observation)
         poses, energies = find_candidates(self._scorer, observation.centre, generator, options, polish, near=pose)
         return (poses[0], float(energies[0])) if energies[0] < share * energy else (pose, energy)
+
+    def _finger_by_finger(self, generator: np.random.Generator, pose: Array, energy: float) -> tuple[Array, float]:
+        """The pose and its energy, or one with single fingers elsewhere, where that explains clearly more."""
+        options = self.options
+        if options.variant != "default" or options.one_finger_share == 0:
+            return pose, energy
+        for finger in range(5):
+            if energy <= options.search.good_energy:
+                break
+            other, lower = other_finger(self._scorer, pose, finger, generator)
+            if lower < options.one_finger_share * energy:
+                pose, energy = other, lower
+        return pose, energy
 
     def _search(self, observation: Observation, generator: np.random.Generator) -> tuple[Array, float]:
         """A pose and its energy from the observation alone."""
