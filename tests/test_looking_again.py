@@ -10,8 +10,9 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.hypotheses import hypotheses, typical_angles
 from depthtrack.tracking.looking_again import close_by, other_finger
-from depthtrack.tracking.pso.search import SearchOptions, find_candidates, hypotheses, refine
+from depthtrack.tracking.pso.search import SearchOptions, find_candidates, refine
 from depthtrack.tracking.pso.swarm import SwarmOptions
 from depthtrack.tracking.pso.tracker import PsoOptions
 from tests.synthetic_observations import observe
@@ -56,11 +57,11 @@ def test_poses_close_by_are_possible_and_close() -> None:
 
 
 def test_orientations_that_no_wrist_allows_are_left_out() -> None:
-    arm = np.array([0.0, 0.6, 0.8])
-    poses = hypotheses(np.array([0, 0, 0.5]), np.random.default_rng(2), 400, arm)
+    arm, angles = np.array([0.0, 0.6, 0.8]), typical_angles(np.random.default_rng(3), 400)
+    poses = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2), arm)
     towards_wrist = -rotation_matrix(poses[:, 3:7])[:, :, 1]
     assert (towards_wrist @ arm > 0.15).all()
-    free = hypotheses(np.array([0, 0, 0.5]), np.random.default_rng(2), 400)
+    free = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2))
     assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
 
 

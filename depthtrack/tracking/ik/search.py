@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ORIENTATION, make_pose, quaternion_log, quaternion_product
-from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.tracking.hypotheses import apart, hypotheses, typical_angles
 from depthtrack.tracking.ik.fit import Fitter
 from depthtrack.tracking.ik.hierarchy import Stage, by_energy, descend, postures
 
@@ -41,12 +38,17 @@ def find_pose(
     synergies: Synergies,
     options: SearchOptions,
     generator: np.random.Generator,
+    arm: Array | None = None,
 ) -> tuple[Array, float]:
-    """Pose (27,) and energy that best explain the observation, with the palm near `centre` (3,) metres."""
+    """Pose (27,) and energy that best explain the observation, with the palm near `centre` (3,) metres.
+
+    `arm` (3,), unit, leads from the palm along the forearm, where that is seen.
+    """
     best, lowest = np.empty(0), np.inf
     for _ in range(options.attempts):
-        poses = by_energy(scorer, _hypotheses(centre, synergies, generator, options.hypotheses))[0]
-        poses = poses[_apart(poses, options.apart, options.stages[0].keep)]
+        angles = _angles(synergies, generator, options.hypotheses)
+        poses = by_energy(scorer, hypotheses(centre, angles, generator, arm))[0]
+        poses = poses[apart(poses, options.apart, options.stages[0].keep)]
         poses, energies = descend(fitter, scorer, poses, synergies, options.stages)
         before = lowest
         if energies[0] < lowest:
@@ -56,26 +58,8 @@ def find_pose(
     return best, lowest
 
 
-def _hypotheses(centre: Array, synergies: Synergies, generator: np.random.Generator, count: int) -> Array:
-    """Postures in every orientation, the palm near the observed centre: half of them after the synergies, half after
-    typical postures, some of which may be rare in recordings."""
-    quaternions = Rotation.random(count, rng=generator).as_quat()[:, [3, 0, 1, 2]]
-    positions = centre + generator.standard_normal((count, 3)) * [0.025, 0.025, 0.012]
-    typical = np.stack(list(POSTURES.values()))[generator.integers(0, len(POSTURES), count)]
-    typical = typical + 0.15 * generator.standard_normal((count, 20))
+def _angles(synergies: Synergies, generator: np.random.Generator, count: int) -> Array:
+    """Finger angles (count, 20): half of them after the synergies, half after typical postures, some of which may be
+    rare in recordings."""
     half = np.arange(count)[:, None] % 2 == 0
-    angles = np.where(half, postures(synergies, generator, count), typical)
-    return within_limits(make_pose(positions, quaternions, angles))
-
-
-def _apart(poses: Array, angle: float, count: int) -> list[int]:
-    """The first `count` poses, in order, whose orientations differ from those before by at least `angle`."""
-    chosen: list[int] = []
-    conjugate = poses[:, ORIENTATION] * [1, -1, -1, -1]
-    for i in range(len(poses)):
-        between = quaternion_log(quaternion_product(poses[i, ORIENTATION], conjugate[chosen]))
-        if not chosen or np.linalg.norm(between, axis=-1).min() >= angle:
-            chosen.append(i)
-        if len(chosen) == count:
-            break
-    return chosen
+    return np.where(half, postures(synergies, generator, count), typical_angles(generator, count))

@@ -224,11 +224,15 @@ class IkTracker:
         return pose, Status.TRACKED
 
     def _search(self, observation: Observation) -> Array:
-        generator = frame_generator(self.options.seed, observation.frame_index)
+        options, default = self.options, self.options.variant == "default"
+        generator = frame_generator(options.seed, observation.frame_index)
+        arm = observation.arm_direction if default else None
         found = find_pose(
-            self._fitter, self._scorer, observation.centre, self._synergies, self.options.search, generator
+            self._fitter, self._scorer, observation.centre, self._synergies, options.search, generator, arm
         )[0]
-        return found if self.options.synergies is None else self._fitter.fit(found, self._space, prior=self._likely)
+        if options.synergies is not None:
+            return self._fitter.fit(found, self._space, prior=self._likely)
+        return self._finger_by_finger(observation, found) if default else found
 
     def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
         terms = self._scorer.terms(pose[None])

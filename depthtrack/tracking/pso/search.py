@@ -5,12 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import make_pose, quaternion_log, quaternion_product
-from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.tracking.hypotheses import apart, hypotheses, typical_angles
 from depthtrack.tracking.looking_again import close_by
 from depthtrack.tracking.pso.spaces import TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, minimise
@@ -18,10 +15,6 @@ from depthtrack.tracking.pso.swarm import SwarmOptions, minimise
 Array = NDArray[np.float64]
 Polish = Callable[[Array], Array]
 """Moves a pose (27,) to the nearest one that agrees better with the observation, by whatever measure."""
-
-
-_LEAST_ALONG_ARM = 0.17
-"""Cosine of the 80 degrees that a wrist bends at most (Greene and Heckman 1994), either way."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +88,12 @@ def find_candidates(
     It looks about `near` (27,) where that is given, else everywhere: see `find_pose`.
     """
     if near is None:
-        poses = hypotheses(centre, generator, options.hypotheses, arm)
+        poses = hypotheses(centre, typical_angles(generator, options.hypotheses), generator, arm)
     else:
         poses = close_by(near, generator, options.hypotheses)
     energies = scorer.score(poses)
     poses, energies = poses[np.argsort(energies)], np.sort(energies)
-    starts = poses[_apart(poses, options.apart, options.rounds[0].starts)]
+    starts = poses[apart(poses, options.apart, options.rounds[0].starts)]
     for stage in options.rounds:
         refined = [refine(scorer, pose, stage.spread, stage.swarm, generator) for pose in starts[: stage.starts]]
         poses, energies = np.stack([pose for pose, _ in refined]), np.array([energy for _, energy in refined])
@@ -129,32 +122,3 @@ def refine(
         lambda x: scorer.score(space.poses(x)), particles, space.lower, space.upper, space.fingers, generator, options
     )
     return space.poses(found.position[None])[0], found.energy
-
-
-def hypotheses(centre: Array, generator: np.random.Generator, count: int, arm: Array | None = None) -> Array:
-    """Typical postures, varied, in every orientation, the palm near the observed centre.
-
-    Of the orientations, those come first that a wrist at the end of `arm` (3,) allows.
-    """
-    postures = np.stack(list(POSTURES.values()))
-    angles = postures[generator.integers(0, len(postures), count)] + 0.15 * generator.standard_normal((count, 20))
-    rotations = Rotation.random(count if arm is None else 4 * count, rng=generator)
-    if arm is not None:
-        towards_wrist = rotations.apply([0.0, -1.0, 0.0])
-        rotations = rotations[np.argsort(towards_wrist @ arm < _LEAST_ALONG_ARM, kind="stable")[:count]]
-    quaternions = rotations.as_quat()[:, [3, 0, 1, 2]]
-    positions = centre + generator.standard_normal((count, 3)) * [0.025, 0.025, 0.012]
-    return within_limits(make_pose(positions, quaternions, angles))
-
-
-def _apart(poses: Array, angle: float, count: int) -> list[int]:
-    """The first `count` poses, in order, whose orientations differ from those before by at least `angle`."""
-    chosen: list[int] = []
-    conjugate = poses[:, 3:7] * [1, -1, -1, -1]
-    for i in range(len(poses)):
-        between = quaternion_log(quaternion_product(poses[i, 3:7], conjugate[chosen]))
-        if not len(chosen) or np.linalg.norm(between, axis=-1).min() >= angle:
-            chosen.append(i)
-        if len(chosen) == count:
-            break
-    return chosen

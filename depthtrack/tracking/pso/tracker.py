@@ -224,7 +224,8 @@ class PsoTracker:
         if self.options.variant == "paper":
             return find_pose(self._scorer, centre, generator, options)
         polish, arm = self._polish(observation), observation.arm_direction
-        return find_pose(self._scorer, centre, generator, options, polish, arm)
+        found, energy = find_pose(self._scorer, centre, generator, options, polish, arm)
+        return self._finger_by_finger(generator, found, energy)
 
     def _polish(self, observation: Observation) -> Polish | None:
         """The skin drawn to the observed surface; None for sizes that no skin fits."""
