@@ -35,6 +35,8 @@ Variant = Literal["default", "paper"]
 
 _LOST = LostBelow(confidence=0.5, energy=16.0)
 """A hand seen edge on by a noisy sensor reaches 15 in its true pose; and agrees by half where its forearm shows."""
+_ROUGH = 96
+"""Longest side, pixels, at which postures of single fingers are looked at."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ class IkTracker:
             raise InputError(f"no residual '{options.residual}': choose {', '.join(get_args(Residual))}")
         fitting = options.fitting
         self._fitter = Fitter(shape, make_surface(options.model, shape), fitting)
-        self._scorer = RasterScorer(shape, options.objective)
+        self._scorer, self._rough_scorer = (RasterScorer(shape, options.objective) for _ in range(2))
         given = options.chosen_synergies
         for name in ("components", "soft"):
             if getattr(options, name) and given is None:
@@ -167,6 +169,7 @@ class IkTracker:
 
     def close(self) -> None:
         self._scorer.close()
+        self._rough_scorer.close()
 
     def _observe(self, observation: Observation) -> None:
         self._scorer.observe(Target(observation.camera, observation.skin, observation.depth))
@@ -192,15 +195,16 @@ class IkTracker:
         if energy <= self.options.search.good_energy or self.options.look_again.one_finger == 0:
             return pose
         generator = frame_generator(self.options.seed, observation.frame_index)
+        rough, clearly_less = self._rough_scorer, self.options.look_again.one_finger
+        rough.observe(self._scorer.target.reduced(_ROUGH))
         for finger in range(5):
-            clearly_less = self.options.look_again.one_finger * energy
-            other, lower = other_finger(self._scorer, pose, finger, generator)
-            if lower >= clearly_less:
+            other, lower = other_finger(rough, pose, finger, generator)
+            if lower >= clearly_less * rough.score(pose[None])[0]:
                 continue
             held = Prior.held(other[ANGLES], self._fitter.options.hold)
             fitted = self._fitter.fit(other, self._space, prior=held)
             lower = float(self._scorer.score(fitted[None])[0])
-            if lower < clearly_less:
+            if lower < clearly_less * energy:
                 pose, energy = fitted, lower
         return pose
 
