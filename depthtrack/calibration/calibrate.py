@@ -176,7 +176,8 @@ class _Searcher:
         with RasterScorer(shape, threads=self._threads) as scorer:
             for o in self.observations[:count]:
                 scorer.observe(_target(o))
-                out.append(find_candidates(scorer, o.centre, frame_generator(self._seed, o.frame_index), _WIDE))
+                generator = frame_generator(self._seed, o.frame_index)
+                out.append(find_candidates(scorer, o.centre, generator, _WIDE, arm=o.arm_direction))
         return out
 
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
@@ -191,7 +192,8 @@ class _Searcher:
         with RasterScorer(shape, threads=self._threads) as scorer:
             for n, o in enumerate(observations):
                 scorer.observe(_target(o))
-                pose, _ = find_pose(scorer, o.centre, frame_generator(self._seed, o.frame_index), options)
+                generator = frame_generator(self._seed, o.frame_index)
+                pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
                 tried = np.stack([pose] if known is None else [pose, known[n]])
                 terms = scorer.terms(tried)
                 best = int(np.argmin(terms.energy))
