@@ -15,8 +15,8 @@ STEEPEST = 6.0
 
 
 def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
-    """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row, a column or a
-    diagonal, both neighbours are missing, or farther away than a surface of STEEPEST slope would have them."""
+    """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, both
+    neighbours are missing, or farther away than a surface of STEEPEST slope would have them."""
     out = np.zeros(depth.shape, dtype=np.bool_)
     mark_flying(np.ascontiguousarray(depth), STEEPEST / focal, out)
     return out
@@ -24,22 +24,19 @@ def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
 
 @numba.njit(cache=True, nogil=True)
 def mark_flying(depth: NDArray[np.float32], slope: float, out: Mask) -> None:
-    """True into `out` (h, w) where a reading is farther than `slope` times its depth (times the square root of 2 on
-    diagonals) from both neighbours on some line through it."""
+    """True into `out` (h, w) where a reading is farther than `slope` times its depth from both neighbours in its row,
+    or from both in its column."""
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
             z = np.float64(depth[v, u])
             if z <= 0.0:
                 continue
-            for line in range(4):
-                dv, du = (0, 1) if line == 0 else (1, 0) if line == 1 else (1, 1) if line == 2 else (1, -1)
-                most = slope * z * (1.0 if line < 2 else 1.4142135623730951)
-                alone = True
+            most = slope * z
+            held = 0
+            for dv, du in ((0, 1), (1, 0)):
                 for side in (-1, 1):
                     i, j = v + side * dv, u + side * du
                     if 0 <= i < height and 0 <= j < width and depth[i, j] > 0.0 and abs(depth[i, j] - z) <= most:
-                        alone = False
-                if alone:
-                    out[v, u] = True
-                    break
+                        held |= 1 + dv
+            out[v, u] = held != 3

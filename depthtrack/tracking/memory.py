@@ -43,6 +43,15 @@ class TrackMemory:
         usual = float(np.median(self._usual)) if self._usual else np.inf
         return confidence < self._limits.confidence or energy > max(self._limits.energy, 2 * usual)
 
+    def settle(
+        self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
+    ) -> Estimate:
+        """The estimate of the next frame, remembered: with this `status` unless the pose is not to be trusted."""
+        trusted = not self.is_lost(energy, confidence)
+        estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms)
+        self.remember(estimate)
+        return estimate
+
     def remember(self, estimate: Estimate) -> None:
         """Take in the estimate of the next frame."""
         if estimate.pose is None or estimate.status is Status.LOST:

@@ -1,6 +1,5 @@
 """The IK tracker: the hand's surface drawn to the observed one, from where it was heading (Schroeder et al. 2014)."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
@@ -27,6 +26,7 @@ from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
 from depthtrack.tracking.looking_again import other_finger
 from depthtrack.tracking.memory import LostBelow, TrackMemory
+from depthtrack.tracking.stage_clock import StageClock
 from depthtrack.tracking.starting import checked_pose, frame_generator
 from depthtrack.tracking.tracker import Estimate, Status
 
@@ -120,7 +120,7 @@ class IkTracker:
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by fitting, or by searching."""
-        clock = _Clock()
+        clock = StageClock(self.stages)
         self._observe(observation)
         clock.lap("observe")
         if pose is None:
@@ -138,7 +138,7 @@ class IkTracker:
         last = self._memory.pose
         if last is None:
             return self.start(observation)
-        clock = _Clock()
+        clock = StageClock(self.stages)
         self._observe(observation)
         clock.lap("observe")
         steps = np.outer(self.options.predictions, self._memory.velocity)
@@ -238,25 +238,7 @@ class IkTracker:
             return self._fitter.fit(found, self._space, prior=self._likely)
         return self._finger_by_finger(observation, found) if default else found
 
-    def _settle(self, pose: Array, status: Status, clock: "_Clock") -> Estimate:
+    def _settle(self, pose: Array, status: Status, clock: StageClock) -> Estimate:
         terms = self._scorer.terms(pose[None])
         energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
-        if self._memory.is_lost(energy, confidence):
-            status = Status.LOST
-        stage_ms = {name: clock.milliseconds.get(name, 0.0) for name in self.stages}
-        estimate = Estimate(pose, energy, confidence, status, stage_ms)
-        self._memory.remember(estimate)
-        return estimate
-
-
-class _Clock:
-    """Milliseconds between laps."""
-
-    def __init__(self) -> None:
-        self.milliseconds: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = time.perf_counter()
-        self.milliseconds[name] = 1e3 * (now - self._last)
-        self._last = now
+        return self._memory.settle(pose, energy, confidence, status, clock.milliseconds)

@@ -1,6 +1,5 @@
 """The PSO tracker: one swarm a frame, around the last pose and where it was heading (Oikonomidis 2011, Sec. 2.4)."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -25,6 +24,7 @@ from depthtrack.tracking.pso.centroid import visible_centroid
 from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates, find_pose, refine
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
+from depthtrack.tracking.stage_clock import StageClock
 from depthtrack.tracking.starting import checked_pose, frame_generator
 from depthtrack.tracking.tracker import Estimate, Status
 
@@ -105,25 +105,25 @@ class PsoTracker:
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Begin on this frame, from a pose (27,) refined by a swarm, or by searching."""
-        begun = time.perf_counter()
+        clock = StageClock(self.stages)
         self._observe(observation)
-        observed = time.perf_counter()
+        clock.lap("observe")
         generator = frame_generator(self.options.seed, observation.frame_index)
         if pose is None:
             found, energy = self._search(observation, generator)
         else:
             found, energy = refine(self._scorer, checked_pose(pose), self.options.spread, self.options.swarm, generator)
         found, energy = self._finish(observation, found, energy)
-        return self._settle(found, energy, Status.STARTED, begun, observed)
+        return self._settle(found, energy, Status.STARTED, clock)
 
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
         last = self._memory.pose
         if last is None:
             return self.start(observation)
-        begun = time.perf_counter()
+        clock = StageClock(self.stages)
         self._observe(observation)
-        observed = time.perf_counter()
+        clock.lap("observe")
         options, generator = self.options, frame_generator(self.options.seed, observation.frame_index)
         space = self._space(last)
         found = minimise(
@@ -141,7 +141,7 @@ class PsoTracker:
             pose, energy = self._look_again(observation, generator, pose, energy, share)
         pose, energy = self._finger_by_finger(generator, pose, energy)
         pose, energy = self._finish(observation, pose, energy)
-        return self._settle(pose, energy, Status.TRACKED, begun, observed)
+        return self._settle(pose, energy, Status.TRACKED, clock)
 
     def recall(self, estimates: Sequence[Estimate]) -> None:
         """Take up a track after these estimates, as if they had been made just now."""
@@ -250,11 +250,7 @@ class PsoTracker:
             self._fitter = Fitter(self._shape, make_surface("skin", self._shape), FitOptions())
         return self._fitter
 
-    def _settle(self, pose: Array, energy: float, status: Status, begun: float, observed: float) -> Estimate:
+    def _settle(self, pose: Array, energy: float, status: Status, clock: StageClock) -> Estimate:
         confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
-        if self._memory.is_lost(energy, confidence):
-            status = Status.LOST
-        stage_ms = {"observe": 1e3 * (observed - begun), "swarm": 1e3 * (time.perf_counter() - observed)}
-        estimate = Estimate(pose, energy, confidence, status, stage_ms)
-        self._memory.remember(estimate)
-        return estimate
+        clock.lap("swarm")
+        return self._memory.settle(pose, energy, confidence, status, clock.milliseconds)
