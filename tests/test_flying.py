@@ -18,12 +18,10 @@ def plainly(depth: np.ndarray, focal: float) -> np.ndarray:
     out = np.zeros(depth.shape, np.bool_)
     for v, u in np.argwhere(depth > 0):
         z = float(depth[v, u])
-        for line in ((0, 1), (1, 0)):
-            beside = [(v - line[0], u - line[1]), (v + line[0], u + line[1])]
-            inside = [(i, j) for i, j in beside if 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1]]
-            out[v, u] |= not any(
-                depth[i, j] > 0 and abs(float(depth[i, j]) - z) <= STEEPEST / focal * z for i, j in inside
-            )
+        most = STEEPEST / focal * z
+        for line in (depth[v, max(u - 1, 0) : u + 2], depth[max(v - 1, 0) : v + 2, u]):
+            beside = line[(line > 0) & (line != depth[v, u])].astype(float)
+            out[v, u] |= bool(np.any(z - beside > most) and not np.any(abs(z - beside) <= most))
     return out
 
 

@@ -15,8 +15,8 @@ STEEPEST = 6.0
 
 
 def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
-    """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, both
-    neighbours are missing, or farther away than a surface of STEEPEST slope would have them."""
+    """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, behind
+    a neighbour by more than a surface of STEEPEST slope would be, and no nearer to the one on the other side."""
     out = np.zeros(depth.shape, dtype=np.bool_)
     mark_flying(np.ascontiguousarray(depth), STEEPEST / focal, out)
     return out
@@ -24,8 +24,8 @@ def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
 
 @numba.njit(cache=True, nogil=True)
 def mark_flying(depth: NDArray[np.float32], slope: float, out: Mask) -> None:
-    """True into `out` (h, w) where a reading is farther than `slope` times its depth from both neighbours in its row,
-    or from both in its column."""
+    """True into `out` (h, w) where a reading is farther than `slope` times its depth from all readings beside it in its
+    row, or in its column, and behind one of them."""
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
@@ -33,10 +33,13 @@ def mark_flying(depth: NDArray[np.float32], slope: float, out: Mask) -> None:
             if z <= 0.0:
                 continue
             most = slope * z
-            held = 0
             for dv, du in ((0, 1), (1, 0)):
+                held, behind = False, False
                 for side in (-1, 1):
                     i, j = v + side * dv, u + side * du
-                    if 0 <= i < height and 0 <= j < width and depth[i, j] > 0.0 and abs(depth[i, j] - z) <= most:
-                        held |= 1 + dv
-            out[v, u] = held != 3
+                    if 0 <= i < height and 0 <= j < width and depth[i, j] > 0.0:
+                        step = z - depth[i, j]
+                        held |= abs(step) <= most
+                        behind |= step > most
+                if behind and not held:
+                    out[v, u] = True

@@ -161,8 +161,8 @@ class Segmenter:
 
 
 def _without_flying(frame: Frame, found: Segmentation) -> Segmentation:
-    """The hand without readings that hang in the air, nor, where depth alone tells what is hand, their silhouette."""
-    flying = flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
-    readings = found.readings & ~flying
-    skin = found.skin if frame.colour is not None else found.skin & ~flying
-    return replace(found, readings=readings, skin=skin)
+    """The hand without readings that hang in the air, where depth alone tells what is hand."""
+    if frame.colour is not None:
+        return found
+    hand = ~flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
+    return replace(found, readings=found.readings & hand, skin=found.skin & hand)
