@@ -1,6 +1,7 @@
 """Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
 
 import numpy as np
+import pytest
 
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.hand.kinematics import HandModel
@@ -11,10 +12,12 @@ from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.hypotheses import hypotheses, typical_angles
-from depthtrack.tracking.looking_again import close_by, other_finger
+from depthtrack.tracking.looking_again import close_by, one_finger_further, other_finger
+from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.search import SearchOptions, find_candidates, refine
 from depthtrack.tracking.pso.swarm import SwarmOptions
 from depthtrack.tracking.pso.tracker import PsoOptions
+from depthtrack.tracking.tracker import Status
 from tests.synthetic_observations import observe
 
 MADE = Synthesiser(Synthesis(model="skin"))
@@ -80,3 +83,31 @@ def test_a_finger_that_is_elsewhere_is_found() -> None:
             before, after = endpoint_error(MODEL, np.stack([wrong, found]), MODEL, np.stack([truth, truth])).values
             assert after < 0.4 * before
             assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))
+
+
+def test_one_finger_further_undoes_a_shift() -> None:
+    """A hand one finger beside its place, either way: three of its four fingers are where they should be again."""
+    truth = MADE.poses[11].copy()
+    truth[ANGLES] = POSTURES["open"]
+    for way in (0, 1):
+        shifted = one_finger_further(MODEL, truth)[way]
+        assert not np.allclose(shifted, truth)
+        back = one_finger_further(MODEL, shifted)[1 - way]
+        there, here = (MODEL.endpoints(pose).reshape(5, 4, 3) for pose in (truth, back))
+        distances = np.linalg.norm(there - here, axis=-1)[1:, 3]
+        assert np.sort(distances)[2] < 0.015
+        assert np.linalg.norm(there - MODEL.endpoints(shifted).reshape(5, 4, 3), axis=-1)[1:, 3].min() > 0.015
+
+
+@pytest.mark.parametrize("frames", [14, 16])
+def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int) -> None:
+    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
+    memory.settle(pose, 5.0, 0.9, Status.TRACKED, {})
+    for _ in range(frames):
+        lost = memory.settle(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
+        assert lost.status is Status.LOST
+        assert memory.pose is None
+    if frames <= 15:
+        assert memory.recent is pose
+    else:
+        assert memory.recent is None

@@ -7,8 +7,19 @@ one, or for the next, stays so for many frames. What other postures would look l
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.hand.alignment import rigid_alignment
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
-from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose, quaternion_exp, quaternion_product
+from depthtrack.hand.pose import (
+    ANGLES,
+    ORIENTATION,
+    POSITION,
+    make_pose,
+    quaternion_exp,
+    quaternion_from_matrix,
+    quaternion_product,
+    rotation_matrix,
+)
 from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.scorer import Scorer
 
@@ -57,3 +68,21 @@ def other_finger(scorer: Scorer, pose: Array, finger: int, generator: np.random.
             poses[:, angles] += spread * generator.standard_normal((len(poses), 4))
             poses[:_FINGER_KEPT] = kept
     return poses[best[0]], float(energies[best[0]])
+
+
+def one_finger_further(model: HandModel, pose: Array) -> Array:
+    """Poses (2, 27) of the hand in `pose` (27,) with each finger where the next one was, one way and the other: what
+    remains of a hand that was found one finger beside where it is. The thumb, and a finger that has none beside it on
+    that side, go along."""
+    there = model.endpoints(pose).reshape(5, 4, 3)
+    poses = np.tile(pose, (2, 1))
+    for other, mine, next_ones in zip(poses, ([1, 2, 3], [2, 3, 4]), ([2, 3, 4], [1, 2, 3]), strict=True):
+        angles = pose[ANGLES].reshape(5, 4).copy()
+        angles[mine] = angles[next_ones]
+        other[ANGLES] = angles.ravel()
+        R, t = rigid_alignment(
+            model.endpoints(other).reshape(5, 4, 3)[mine].reshape(-1, 3), there[next_ones].reshape(-1, 3)
+        )
+        turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
+        other[:] = make_pose(R @ pose[POSITION] + t, turned, other[ANGLES])
+    return within_limits(poses)

@@ -11,7 +11,7 @@ from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 
-_USUAL_FRAMES = 30
+_USUAL_FRAMES, _RECENT_FRAMES = 30, 15
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,20 @@ class LostBelow:
 
     Below `confidence`, or where its energy exceeds both `energy` and twice what was usual over the last second: a hand
     of other sizes than the model's has a high energy all the time. From `sure` on, a pose may guide segmentation.
+    A hand seen edge on by a noisy sensor reaches 15 in its true pose; a fist of a hand that is not quite the model's
+    agrees by little more than half.
     """
 
-    confidence: float = 0.6
-    energy: float = 12.0
+    confidence: float = 0.5
+    energy: float = 16.0
     sure: float = 0.6
 
 
 class TrackMemory:
-    """The last pose (27,), or None where there is nothing to follow; `velocity` (26,), its last step; its `energy`."""
+    """The last pose (27,), or None where there is nothing to follow; `velocity` (26,), its last step; its `energy`.
+
+    `recent` (27,) is the last pose that was trusted, for half a second: a hand that was lost has hardly turned over.
+    """
 
     def __init__(self, limits: LostBelow) -> None:
         self._limits = limits
@@ -37,11 +42,14 @@ class TrackMemory:
         self.pose: Array | None = None
         self.velocity = np.zeros(26)
         self.energy = np.inf
+        self.recent: Array | None = None
+        self._frames_lost = 0
 
-    def is_lost(self, energy: float, confidence: float) -> bool:
-        """Whether a pose with this energy and confidence is not to be trusted."""
+    def is_lost(self, energy: float, confidence: float, limits: LostBelow | None = None) -> bool:
+        """Whether a pose with this energy and confidence is not to be trusted, by these or the usual limits."""
+        limits = limits or self._limits
         usual = float(np.median(self._usual)) if self._usual else np.inf
-        return confidence < self._limits.confidence or energy > max(self._limits.energy, 2 * usual)
+        return confidence < limits.confidence or energy > max(limits.energy, 2 * usual)
 
     def settle(
         self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
@@ -56,12 +64,16 @@ class TrackMemory:
         """Take in the estimate of the next frame."""
         if estimate.pose is None or estimate.status is Status.LOST:
             self.pose, self.velocity = None, np.zeros(26)
+            self._frames_lost += 1
+            if self._frames_lost > _RECENT_FRAMES:
+                self.recent = None
             return
         if self.pose is not None and estimate.status is Status.TRACKED:
             self.velocity = tangent_between(self.pose, estimate.pose)
         else:
             self.velocity = np.zeros(26)
         self.pose, self.energy, self._confidence = estimate.pose, estimate.energy, estimate.confidence
+        self.recent, self._frames_lost = estimate.pose, 0
         self._usual.append(estimate.energy)
 
     @property

@@ -9,22 +9,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ANGLES, retract
+from depthtrack.hand.pose import ANGLES, POSITION, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from depthtrack.tracking.ik.close_by import LookAgain, look_close_by
 from depthtrack.tracking.ik.fit import PAPER_FIT, FitOptions, Fitter
 from depthtrack.tracking.ik.hierarchy import by_energy
 from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.residuals import Residual
 from depthtrack.tracking.ik.search import SearchOptions, find_pose
+from depthtrack.tracking.ik.second_thoughts import LookAgain, SecondThoughts
 from depthtrack.tracking.ik.space import FULL, Space
 from depthtrack.tracking.ik.surfaces import Model, make_surface
-from depthtrack.tracking.looking_again import other_finger
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.stage_clock import StageClock
 from depthtrack.tracking.starting import checked_pose, frame_generator
@@ -32,11 +31,6 @@ from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
-
-_LOST = LostBelow(confidence=0.5, energy=16.0)
-"""A hand seen edge on by a noisy sensor reaches 15 in its true pose; and agrees by half where its forearm shows."""
-_ROUGH = 96
-"""Longest side, pixels, at which postures of single fingers are looked at."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +60,7 @@ class IkOptions:
     soft: bool = False
     seed: int = 0
     look_again: LookAgain = field(default_factory=LookAgain)
-    lost: LostBelow = _LOST
+    lost: LostBelow = field(default_factory=LostBelow)
     fit: FitOptions | None = None
     search: SearchOptions = field(default_factory=SearchOptions)
     objective: Objective = field(default_factory=Objective)
@@ -108,7 +102,7 @@ class IkTracker:
             raise InputError(f"no residual '{options.residual}': choose {', '.join(get_args(Residual))}")
         fitting = options.fitting
         self._fitter = Fitter(shape, make_surface(options.model, shape), fitting)
-        self._scorer, self._rough_scorer = (RasterScorer(shape, options.objective) for _ in range(2))
+        self._scorer = RasterScorer(shape, options.objective)
         given = options.chosen_synergies
         for name in ("components", "soft"):
             if getattr(options, name) and given is None:
@@ -116,6 +110,7 @@ class IkTracker:
         self._space: Space = FULL if given is None or options.soft else Space.of(given)
         self._likely = None if given is None else Prior.likely(given, fitting.likely)
         self._synergies = given or load_synergies()
+        self._second_thoughts = SecondThoughts(shape, self._fitter, self._scorer, self._synergies, options.look_again)
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -124,7 +119,7 @@ class IkTracker:
         self._observe(observation)
         clock.lap("observe")
         if pose is None:
-            found = self._search(observation)
+            found = self._found_again(observation, self._search(observation))
             clock.lap("retry")
         else:
             found = self._fitter.fit(
@@ -169,7 +164,7 @@ class IkTracker:
 
     def close(self) -> None:
         self._scorer.close()
-        self._rough_scorer.close()
+        self._second_thoughts.close()
 
     def _observe(self, observation: Observation) -> None:
         self._scorer.observe(Target(observation.camera, observation.skin, observation.depth))
@@ -188,26 +183,6 @@ class IkTracker:
         further = self._fitter.fit(best, self._space, 2 * self.options.rounds, prior)
         return by_energy(self._scorer, np.stack([best, further]))[0][0]
 
-    def _finger_by_finger(self, observation: Observation, pose: Array) -> Array:
-        """The pose, or one with single fingers elsewhere, where that explains clearly more: they are drawn to what they
-        took for another finger, or bent where nothing pulls them."""
-        energy = float(self._scorer.score(pose[None])[0])
-        if energy <= self.options.search.good_energy or self.options.look_again.one_finger == 0:
-            return pose
-        generator = frame_generator(self.options.seed, observation.frame_index)
-        rough, clearly_less = self._rough_scorer, self.options.look_again.one_finger
-        rough.observe(self._scorer.target.reduced(_ROUGH))
-        for finger in range(5):
-            other, lower = other_finger(rough, pose, finger, generator)
-            if lower >= clearly_less * rough.score(pose[None])[0]:
-                continue
-            held = Prior.held(other[ANGLES], self._fitter.options.hold)
-            fitted = self._fitter.fit(other, self._space, prior=held)
-            lower = float(self._scorer.score(fitted[None])[0])
-            if lower < clearly_less * energy:
-                pose, energy = fitted, lower
-        return pose
-
     def _look_again(self, observation: Observation, pose: Array) -> tuple[Array, Status]:
         """The better of a pose and what is found close by: asked now and then where the pose explains little. Where the
         track would be lost, it is asked at once, and elsewhere too, which has to explain much more."""
@@ -217,8 +192,7 @@ class IkTracker:
         lost = self._memory.is_lost(energy, confidence)
         if energy <= self.options.search.good_energy or not (due or lost):
             return pose, Status.TRACKED
-        generator = frame_generator(self.options.seed, observation.frame_index)
-        other, lower = look_close_by(self._fitter, self._scorer, pose, self._synergies, options, generator)
+        other, lower = self._second_thoughts.close_by(pose, self._generator(observation))
         if lower < (1 if lost else options.close_by) * energy:
             pose, energy = other, lower
         if lost:
@@ -227,16 +201,37 @@ class IkTracker:
                 return elsewhere, Status.STARTED
         return pose, Status.TRACKED
 
+    def _finger_by_finger(self, observation: Observation, pose: Array) -> Array:
+        """The pose, or one with single fingers elsewhere: asked where it explains little."""
+        energy = float(self._scorer.score(pose[None])[0])
+        if energy <= self.options.search.good_energy or self.options.look_again.one_finger == 0:
+            return pose
+        return self._second_thoughts.finger_by_finger(pose, energy, self._generator(observation))[0]
+
+    def _found_again(self, observation: Observation, elsewhere: Array) -> Array:
+        """Of a hand that was lost a moment ago: it has hardly turned since, unless `elsewhere` explains much more."""
+        recent = self._memory.recent
+        if recent is None or not self._space.full or self.options.variant == "paper":
+            return elsewhere
+        here = recent.copy()
+        here[POSITION] = observation.centre
+        near = self._second_thoughts.close_by(here, self._generator(observation))[0]
+        near = self._finger_by_finger(observation, near)
+        energies = self._scorer.score(np.stack([near, elsewhere]))
+        return elsewhere if energies[1] < self.options.look_again.elsewhere * energies[0] else near
+
     def _search(self, observation: Observation) -> Array:
         options, default = self.options, self.options.variant == "default"
-        generator = frame_generator(options.seed, observation.frame_index)
-        arm = observation.arm_direction if default else None
+        arm, generator = observation.arm_direction if default else None, self._generator(observation)
         found = find_pose(
             self._fitter, self._scorer, observation.centre, self._synergies, options.search, generator, arm
         )[0]
         if options.synergies is not None:
             return self._fitter.fit(found, self._space, prior=self._likely)
         return self._finger_by_finger(observation, found) if default else found
+
+    def _generator(self, observation: Observation) -> np.random.Generator:
+        return frame_generator(self.options.seed, observation.frame_index)
 
     def _settle(self, pose: Array, status: Status, clock: StageClock) -> Estimate:
         terms = self._scorer.terms(pose[None])

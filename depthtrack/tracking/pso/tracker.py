@@ -1,7 +1,7 @@
 """The PSO tracker: one swarm a frame, around the last pose and where it was heading (Oikonomidis 2011, Sec. 2.4)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -18,10 +18,10 @@ from depthtrack.tracking.ik.fit import FitOptions, Fitter
 from depthtrack.tracking.ik.prior import Prior
 from depthtrack.tracking.ik.space import FULL
 from depthtrack.tracking.ik.surfaces import make_surface
-from depthtrack.tracking.looking_again import other_finger
 from depthtrack.tracking.memory import LostBelow, TrackMemory
 from depthtrack.tracking.pso.centroid import visible_centroid
-from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates, find_pose, refine
+from depthtrack.tracking.pso.search import Polish, SearchOptions, find_pose, refine
+from depthtrack.tracking.pso.second_thoughts import LookAgain, SecondThoughts
 from depthtrack.tracking.pso.spaces import ParameterSpace, Space, TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, constriction, minimise
 from depthtrack.tracking.stage_clock import StageClock
@@ -47,11 +47,7 @@ class PsoOptions:
     around the last pose, its linear prediction, and the last pose moved onto the observed hand, the wider the faster
     the hand; it damps more and randomises half of the fingers near the best. Each was measured to help.
     `resolution` is the longest side, in pixels, of the region hypotheses are rendered at; None keeps the sensor's.
-    A pose whose energy is above `search.good_energy` is doubted every `look_again_every` frames (0: never), and at once
-    where the track would be lost: hands close by, every finger in some typical posture, are searched through, from
-    orientations `look_again_apart` radians apart, and the best is taken if its energy is less than the share
-    `look_again_share` of what it was, or less at all where the track would be lost. In every such frame, a pose that
-    differs by a single finger is taken if its energy is less than the share `one_finger_share` (0: never).
+    "default" also thinks again about poses that explain little: see `second_thoughts.LookAgain`.
     The searches of "default" fit surfaces between their rounds, as the IK tracker does.
     With `finish` "skin", the swarm's best pose is at last drawn to the observed points by the hand's skin, whose palm
     is no cylinder; "none" is the paper's way.
@@ -67,10 +63,7 @@ class PsoOptions:
     resolution: int | None = None
     spread: tuple[float, float, float] = (0.004, 0.04, 0.04)
     finish: Finish = "none"
-    look_again_every: int = 5
-    look_again_apart: float = 0.1
-    look_again_share: float = 0.93
-    one_finger_share: float = 0.98
+    look_again: LookAgain = field(default_factory=LookAgain)
     lost: LostBelow = field(default_factory=LostBelow)
     objective: Objective = field(default_factory=Objective)
     search: SearchOptions = field(default_factory=SearchOptions)
@@ -97,6 +90,7 @@ class PsoTracker:
             raise InputError(f"no way '{options.finish}' to finish a pose: choose none or skin")
         threads = {"threads": options.threads} if options.renderer == "raster" else {}
         self._scorer = create_scorer(options.renderer, shape, options.objective, **threads)
+        self._second_thoughts = SecondThoughts(shape, self._scorer, options.search, options.look_again)
         self._shape = shape
         self._fitter: Fitter | None = None
         if options.finish == "skin":
@@ -110,7 +104,7 @@ class PsoTracker:
         clock.lap("observe")
         generator = frame_generator(self.options.seed, observation.frame_index)
         if pose is None:
-            found, energy = self._search(observation, generator)
+            found, energy = self._found_again(observation, generator, *self._search(observation, generator))
         else:
             found, energy = refine(self._scorer, checked_pose(pose), self.options.spread, self.options.swarm, generator)
         found, energy = self._finish(observation, found, energy)
@@ -136,10 +130,8 @@ class PsoTracker:
             options.swarm,
         )
         pose, energy = space.poses(found.position[None])[0], found.energy
-        share = self._doubt(observation, pose, energy)
-        if share is not None:
-            pose, energy = self._look_again(observation, generator, pose, energy, share)
-        pose, energy = self._finger_by_finger(generator, pose, energy)
+        pose, energy = self._look_again(observation, generator, pose, energy)
+        pose, energy = self._finger_by_finger(observation, generator, pose, energy)
         pose, energy = self._finish(observation, pose, energy)
         return self._settle(pose, energy, Status.TRACKED, clock)
 
@@ -187,36 +179,42 @@ class PsoTracker:
         )
         return seen - expected if np.isfinite(seen + expected).all() else np.zeros(3)
 
-    def _doubt(self, observation: Observation, pose: Array, energy: float) -> float | None:
-        """The share of the energy that a pose close by has to stay under to be taken; None to look for none."""
-        options = self.options
-        if options.variant != "default" or energy <= options.search.good_energy:
-            return None
-        if self._memory.is_lost(energy, float(1 - self._scorer.terms(pose[None]).skin[0])):
-            return 1.0
-        due = options.look_again_every > 0 and observation.frame_index % options.look_again_every == 0
-        return options.look_again_share if due else None
-
     def _look_again(
-        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float, share: float
+        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float
     ) -> tuple[Array, float]:
-        """The pose, or what is found close by, if that has less than a share of its energy."""
-        options, polish = replace(self.options.search, apart=self.options.look_again_apart), self._polish(observation)
-        poses, energies = find_candidates(self._scorer, observation.centre, generator, options, polish, near=pose)
-        return (poses[0], float(energies[0])) if energies[0] < share * energy else (pose, energy)
-
-    def _finger_by_finger(self, generator: np.random.Generator, pose: Array, energy: float) -> tuple[Array, float]:
-        """The pose and its energy, or one with single fingers elsewhere, where that explains clearly more."""
-        options = self.options
-        if options.variant != "default" or options.one_finger_share == 0:
+        """The pose and its energy, or what is found close by: asked now and then where the pose explains little, and
+        at once in doubt."""
+        options = self.options.look_again
+        if self.options.variant != "default" or energy <= self.options.search.good_energy:
             return pose, energy
-        for finger in range(5):
-            if energy <= options.search.good_energy:
-                break
-            other, lower = other_finger(self._scorer, pose, finger, generator)
-            if lower < options.one_finger_share * energy:
-                pose, energy = other, lower
-        return pose, energy
+        confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
+        doubted = self._memory.is_lost(energy, confidence, options.doubted)
+        if not doubted and (options.every == 0 or observation.frame_index % options.every != 0):
+            return pose, energy
+        other, lower = self._second_thoughts.close_by(pose, generator, self._polish(observation))
+        return (other, lower) if lower < (1 if doubted else options.close_by) * energy else (pose, energy)
+
+    def _finger_by_finger(
+        self, observation: Observation, generator: np.random.Generator, pose: Array, energy: float
+    ) -> tuple[Array, float]:
+        """The pose and its energy, or one with single fingers elsewhere: asked where it explains little."""
+        options = self.options
+        if options.variant != "default" or energy <= options.search.good_energy or options.look_again.one_finger == 0:
+            return pose, energy
+        return self._second_thoughts.finger_by_finger(pose, energy, generator, self._polish(observation))
+
+    def _found_again(
+        self, observation: Observation, generator: np.random.Generator, elsewhere: Array, energy: float
+    ) -> tuple[Array, float]:
+        """Of a hand that was lost a moment ago: it has hardly turned since, unless `elsewhere` explains much more."""
+        recent = self._memory.recent
+        if recent is None or self.options.variant == "paper":
+            return elsewhere, energy
+        here = recent.copy()
+        here[POSITION] = observation.centre
+        near = self._second_thoughts.close_by(here, generator, self._polish(observation))
+        near = self._finger_by_finger(observation, generator, *near)
+        return (elsewhere, energy) if energy < self.options.look_again.elsewhere * near[1] else near
 
     def _search(self, observation: Observation, generator: np.random.Generator) -> tuple[Array, float]:
         """A pose and its energy from the observation alone."""
@@ -225,7 +223,7 @@ class PsoTracker:
             return find_pose(self._scorer, centre, generator, options)
         polish, arm = self._polish(observation), observation.arm_direction
         found, energy = find_pose(self._scorer, centre, generator, options, polish, arm)
-        return self._finger_by_finger(generator, found, energy)
+        return self._finger_by_finger(observation, generator, found, energy)
 
     def _polish(self, observation: Observation) -> Polish | None:
         """The skin drawn to the observed surface; None for sizes that no skin fits."""
