@@ -1,5 +1,8 @@
 """Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
 
+from contextlib import closing
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +21,7 @@ from depthtrack.tracking.pso.search import SearchOptions, find_candidates, refin
 from depthtrack.tracking.pso.swarm import SwarmOptions
 from depthtrack.tracking.pso.tracker import PsoOptions
 from depthtrack.tracking.tracker import Status
+from depthtrack.tracking.trackers import create_tracker
 from tests.synthetic_observations import observe
 
 MADE = Synthesiser(Synthesis(model="skin"))
@@ -99,15 +103,80 @@ def test_one_finger_further_undoes_a_shift() -> None:
         assert np.linalg.norm(there - MODEL.endpoints(shifted).reshape(5, 4, 3), axis=-1)[1:, 3].min() > 0.015
 
 
-@pytest.mark.parametrize("frames", [14, 16])
-def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int) -> None:
+@pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
+def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int, remembered: bool) -> None:
     memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
     memory.settle(pose, 5.0, 0.9, Status.TRACKED, {})
     for _ in range(frames):
         lost = memory.settle(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
         assert lost.status is Status.LOST
         assert memory.pose is None
-    if frames <= 15:
-        assert memory.recent is pose
-    else:
-        assert memory.recent is None
+    assert (memory.recent is pose) == remembered
+
+
+def test_a_pose_of_unusual_energy_does_not_guide() -> None:
+    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
+    for _ in range(5):
+        memory.settle(pose, 16.0, 0.8, Status.TRACKED, {})
+        assert memory.expected is not None
+    memory.settle(pose, 22.0, 0.8, Status.TRACKED, {})
+    assert memory.pose is not None
+    assert memory.expected is None
+    memory.settle(pose, 18.0, 0.55, Status.TRACKED, {})
+    assert memory.pose is not None
+    assert memory.expected is None
+
+
+class _Levels:
+    """Stands for a scorer: a lower energy the nearer an angle is to what it is told."""
+
+    def __init__(self, angle: float) -> None:
+        self.angle, self.seen = angle, list[np.ndarray]()
+
+    def score(self, poses: np.ndarray) -> np.ndarray:
+        self.seen.append(poses.copy())
+        return np.abs(poses[:, 13] - self.angle)
+
+
+def test_each_of_the_best_postures_of_a_finger_leads_on() -> None:
+    scorer = _Levels(0.7)
+    other_finger(scorer, MADE.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
+    first, second = scorer.seen[0], scorer.seen[1]
+    kept = first[np.argsort(scorer.score(first), kind="stable")[:8]]
+    assert np.array_equal(second[:8], kept)
+    nearest = np.argmin(np.abs(second[8:, None, 13] - kept[None, :, 13]), axis=1)
+    assert len(second) == 96
+    assert np.all(np.abs(second[:, 13] - np.tile(kept[:, 13], 12)) < 1.0)
+    assert len(set(nearest.tolist())) >= 4
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_a_start_does_not_depend_on_what_was_tracked_before(name: str) -> None:
+    with (
+        closing(create_tracker(name, MADE.options.hand)) as fresh,
+        closing(create_tracker(name, MADE.options.hand)) as used,
+    ):
+        used.start(observe(MADE, 30), MADE.poses[30])
+        first, second = (tracker.start(observe(MADE, 120)) for tracker in (fresh, used))
+    assert first.pose is not None
+    assert first.pose.tolist() == second.pose.tolist()  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str) -> None:
+    """One frame shows a few crumbs far apart, as no hand does: it is lost, and found again beside where it was."""
+    frames = [observe(MADE, index) for index in (20, 21, 22, 23)]
+    crumbs = np.zeros_like(frames[1].skin)
+    crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
+    frames[1] = replace(frames[1], skin=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
+    with (
+        closing(create_tracker(name, MADE.options.hand)) as whole,
+        closing(create_tracker(name, MADE.options.hand)) as cut,
+    ):
+        estimates = [whole.start(frames[0], MADE.poses[20]), *(whole.track(frame) for frame in frames[1:])]
+        assert [estimate.status for estimate in estimates[1:3]] == ["lost", "started"]
+        cut.recall(estimates[:2])
+        again = [cut.track(frame) for frame in frames[2:]]
+    poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
+    assert np.array_equal(poses, poses_again)
+    assert endpoint_error(MODEL, poses, MODEL, MADE.poses[[22, 23]]).values.max() < 10

@@ -16,7 +16,7 @@ STEEPEST = 6.0
 
 def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
     """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, behind
-    a neighbour by more than a surface of STEEPEST slope would be, and no nearer to the one on the other side."""
+    a neighbour by more than a surface of STEEPEST slope would be, and not within that of the one on the other side."""
     out = np.zeros(depth.shape, dtype=np.bool_)
     mark_flying(np.ascontiguousarray(depth), STEEPEST / focal, out)
     return out

@@ -43,7 +43,7 @@ class Segmentation:
 
     `skin` (h, w) the hand's silhouette; `readings` (h, w) where the depth is the hand's; `centre` (3,) of the palm on
     the visible surface, metres, camera frame; `palm_radius` of the circle inscribed in it; `arm_direction` (3,) unit,
-    from the palm along the forearm, or None where no arm is seen; `wrist` the plane of the cut, if any.
+    from the palm along the forearm, or None where no arm is seen or looked for; `wrist` the plane of the cut, if any.
     """
 
     window: Window
@@ -81,7 +81,7 @@ class Segmenter:
         """The hand, or None where none is seen. `place` is where a tracker is sure to find it: nothing is searched."""
         guided = None if place is None else self._guided(frame, place)
         if guided is not None:
-            return _without_flying(frame, guided)
+            return self._without_flying(frame, guided)
         if not 0 <= frame.timestamp - self._last_time <= MEMORY:
             self._last = None
         found = None if self._last is None else self._follow(frame, self._last)
@@ -92,7 +92,7 @@ class Segmenter:
         if found is None:
             return None
         self._last_time = frame.timestamp
-        return _without_flying(frame, found)
+        return self._without_flying(frame, found)
 
     def _guided(self, frame: Frame, place: HandPlace) -> Segmentation | None:
         masks = find_expected(frame, place, self._skin)
@@ -104,8 +104,7 @@ class Segmenter:
         self._arm_direction = None
         self._wrist.expect(place.wrist.point + to_surface)
         radius = float(np.linalg.norm(place.wrist.point - place.centre))
-        arm = place.wrist.normal
-        return Segmentation(masks.window, masks.skin, masks.readings, self._last, radius, arm, place.wrist)
+        return Segmentation(masks.window, masks.skin, masks.readings, self._last, radius, None, place.wrist)
 
     def _start(self, frame: Frame) -> Array | None:
         """Where a hand is (3,), metres, looking at the whole frame."""
@@ -159,10 +158,9 @@ class Segmenter:
         skin = view.skin[top : top + roi.height, left : left + roi.width]
         self._skin.learn(view.frame.colour, roi, np.ascontiguousarray(skin), np.ascontiguousarray(hand))
 
-
-def _without_flying(frame: Frame, found: Segmentation) -> Segmentation:
-    """The hand without readings that hang in the air, where depth alone tells what is hand."""
-    if frame.colour is not None:
-        return found
-    hand = ~flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
-    return replace(found, readings=found.readings & hand, skin=found.skin & hand)
+    def _without_flying(self, frame: Frame, found: Segmentation) -> Segmentation:
+        """The hand without readings that hang in the air, where depth alone tells what is hand."""
+        if self._skin is not None and frame.colour is not None:
+            return found
+        hand = ~flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
+        return replace(found, readings=found.readings & hand, skin=found.skin & hand)

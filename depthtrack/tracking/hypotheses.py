@@ -25,6 +25,7 @@ def hypotheses(centre: Array, angles: Array, generator: np.random.Generator, arm
     forearm.
     """
     count = len(angles)
+    # An arm forbids half of all orientations: there are enough of the others among so many.
     rotations = Rotation.random(count if arm is None else 4 * count, rng=generator)
     if arm is not None:
         towards_wrist = rotations.apply([0.0, -1.0, 0.0])

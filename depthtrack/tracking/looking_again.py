@@ -37,7 +37,6 @@ _PLACE, _TURN, _VARIED = 0.02, 0.3, 0.15
 _FINGER_TRIALS, _FINGER_KEPT, _FINGER_SPREADS = 96, 8, (0.2, 0.1)
 """Postures of one finger that are looked at together, how many of them lead on, and how far from these the next ones
 are: standard deviations, radians."""
-_FIRST_ANGLE = 7
 
 
 def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
@@ -54,20 +53,25 @@ def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
 def other_finger(scorer: Scorer, pose: Array, finger: int, generator: np.random.Generator) -> tuple[Array, float]:
     """The pose (27,) that explains the observation best if but one finger (0 to 4) of `pose` (27,) is elsewhere, and
     its energy: among typical and random postures of it, and twice around the best of them."""
-    angles = slice(_FIRST_ANGLE + 4 * finger, _FIRST_ANGLE + 4 * finger + 4)
-    random = generator.uniform(LOWER, UPPER, (_FINGER_TRIALS - len(_FINGERS), 20)).reshape(-1, 5, 4)
+    limits = slice(4 * finger, 4 * finger + 4)
+    angles = slice(ANGLES.start + limits.start, ANGLES.start + limits.stop)
+    anywhere = generator.uniform(LOWER[limits], UPPER[limits], (_FINGER_TRIALS - len(_FINGERS), 4))
     poses = np.tile(pose, (_FINGER_TRIALS, 1))
-    poses[:, angles] = np.concatenate([_FINGERS, random])[:, finger]
-    for spread in (*_FINGER_SPREADS, None):
-        poses = within_limits(poses)
-        energies = scorer.score(poses)
-        best = np.argsort(energies, kind="stable")[:_FINGER_KEPT]
-        if spread is not None:
-            kept = poses[best]
-            poses = np.repeat(kept, _FINGER_TRIALS // _FINGER_KEPT, axis=0)
-            poses[:, angles] += spread * generator.standard_normal((len(poses), 4))
-            poses[:_FINGER_KEPT] = kept
-    return poses[best[0]], float(energies[best[0]])
+    poses[:, angles] = np.concatenate([_FINGERS[:, finger], anywhere])
+    best, energies = _best(scorer, poses)
+    for spread in _FINGER_SPREADS:
+        poses = np.tile(best, (_FINGER_TRIALS // _FINGER_KEPT, 1))
+        poses[_FINGER_KEPT:, angles] += spread * generator.standard_normal((len(poses) - _FINGER_KEPT, 4))
+        best, energies = _best(scorer, poses)
+    return best[0], float(energies[0])
+
+
+def _best(scorer: Scorer, poses: Array) -> tuple[Array, Array]:
+    """The best few of some poses (N, 27), within the limits, and their energies."""
+    poses = within_limits(poses)
+    energies = scorer.score(poses)
+    best = np.argsort(energies, kind="stable")[:_FINGER_KEPT]
+    return poses[best], energies[best]
 
 
 def one_finger_further(model: HandModel, pose: Array) -> Array:

@@ -12,6 +12,9 @@ from depthtrack.tracking.tracker import Estimate, Status
 Array = NDArray[np.float64]
 
 _USUAL_FRAMES, _RECENT_FRAMES = 30, 15
+"""Frames over which the energy's median is what is usual, and for which a lost hand's last pose is remembered."""
+_HARDLY_USUAL, _UNUSUAL = 1.3, 2.0
+"""Times the usual energy from which a pose is not to guide, and not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -19,20 +22,24 @@ class LostBelow:
     """When a pose no longer explains the hand.
 
     Below `confidence`, or where its energy exceeds both `energy` and twice what was usual over the last second: a hand
-    of other sizes than the model's has a high energy all the time. From `sure` on, a pose may guide segmentation.
-    A hand seen edge on by a noisy sensor reaches 15 in its true pose; a fist of a hand that is not quite the model's
-    agrees by little more than half.
+    of other sizes than the model's has a high energy all the time. A hand seen edge on by a noisy sensor reaches 15 in
+    its true pose; a fist of a hand that is not quite the model's agrees by little more than half.
+
+    A pose may guide segmentation from the confidence `sure` on, unless its energy exceeds both `sure_energy` and 1.3
+    times the usual: else a wrong pose would cut out what agrees with it.
     """
 
     confidence: float = 0.5
     energy: float = 16.0
     sure: float = 0.6
+    sure_energy: float = 12.0
 
 
 class TrackMemory:
     """The last pose (27,), or None where there is nothing to follow; `velocity` (26,), its last step; its `energy`.
 
-    `recent` (27,) is the last pose that was trusted, for half a second: a hand that was lost has hardly turned over.
+    `recent` (27,) is the last pose that was trusted, None after _RECENT_FRAMES without one: half a second at 30 Hz, in
+    which a hand has hardly turned over.
     """
 
     def __init__(self, limits: LostBelow) -> None:
@@ -49,7 +56,7 @@ class TrackMemory:
         """Whether a pose with this energy and confidence is not to be trusted, by these or the usual limits."""
         limits = limits or self._limits
         usual = float(np.median(self._usual)) if self._usual else np.inf
-        return confidence < limits.confidence or energy > max(limits.energy, 2 * usual)
+        return confidence < limits.confidence or energy > max(limits.energy, _UNUSUAL * usual)
 
     def settle(
         self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
@@ -80,5 +87,7 @@ class TrackMemory:
     def expected(self) -> Array | None:
         """The linear prediction (27,), while the track is sure."""
         if self.pose is None or self._confidence < self._limits.sure:
+            return None
+        if self.energy > max(self._limits.sure_energy, _HARDLY_USUAL * float(np.median(self._usual))):
             return None
         return retract(self.pose, self.velocity)

@@ -17,7 +17,7 @@ class Status(StrEnum):
     TRACKED = "tracked"
     """Followed from the frame before."""
     STARTED = "started"
-    """Found from the observation alone, or set by a given pose."""
+    """Found by searching, or set by a given pose."""
     LOST = "lost"
     """The best pose found does not explain the observation; the tracker starts again on the next frame."""
     ABSENT = "absent"

@@ -13,6 +13,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.tracking.memory import LostBelow
+from depthtrack.tracking.pso.second_thoughts import LookAgain
 from depthtrack.tracking.pso.tracker import PsoOptions, PsoTracker
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
@@ -40,6 +41,9 @@ def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
 def how(options: ExperimentOptions) -> Cell:
     """The part of a cell that says how the tracker works."""
     return {"variant": options.variant, "renderer": options.renderer, "resolution": options.side}
+
+
+_NEVER = LostBelow(confidence=0.0, energy=np.inf)
 
 
 def follow(
@@ -78,7 +82,8 @@ def follow(
         renderer=renderer,
         resolution=resolution,
         # Never lost: a search would cost more than many frames of a small swarm, and noise is no loss.
-        lost=LostBelow(confidence=0.0, energy=np.inf),
+        lost=_NEVER,
+        look_again=LookAgain(every=0, one_finger=0, doubted=_NEVER),
     )
     with closing(PsoTracker(seen.hand, options)) as tracker:
         estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]

@@ -14,6 +14,7 @@ from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
+from depthtrack.tracking.ik.second_thoughts import LookAgain
 from depthtrack.tracking.ik.tracker import IkOptions, IkTracker
 from depthtrack.tracking.memory import LostBelow
 from depthtrack.tracking.tracker import Estimate
@@ -69,6 +70,7 @@ def follow(
         soft=soft,
         # Never lost: what is measured is following, and a search would put right what an experiment is about.
         lost=LostBelow(confidence=0.0, energy=np.inf),
+        look_again=LookAgain(every=0, one_finger=0),
     )
     points, seconds, estimates = [], [], list[Estimate]()
     with closing(IkTracker(seen.hand, options)) as tracker:

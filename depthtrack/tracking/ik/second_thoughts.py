@@ -9,6 +9,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
+from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.tracking.ik.fit import Fitter
 from depthtrack.tracking.ik.hierarchy import Stage, by_energy, descend
@@ -24,9 +25,10 @@ _ROUGH = 96
 class LookAgain(NamedTuple):
     """When and how widely to look again.
 
-    At every so many-th frame (0: never) and where the track would be lost, `hypotheses` are looked at, which go through
-    `stages`. The best is taken if its energy is less than the share `close_by` of what it was; one from anywhere else,
-    less than the share `elsewhere`. In every frame, one that differs by a single finger is, if less than the share
+    All of it only where the energy is above `SearchOptions.good_energy`. At every so many-th frame (0: never) and where
+    the track would be lost, `hypotheses` are looked at, which go through `stages`. The best is taken if its energy is
+    less than the share `close_by` of what it was; one from anywhere else, less than the share `elsewhere`. In every
+    frame, one with a single finger elsewhere, or all of them one finger further, is taken, if less than the share
     `one_finger` (0: never).
     """
 
@@ -42,10 +44,16 @@ class SecondThoughts:
     """Looks again at what `fitter` and `scorer` observe; holds a scorer of fewer pixels."""
 
     def __init__(
-        self, shape: HandShape, fitter: Fitter, scorer: RasterScorer, synergies: Synergies, options: LookAgain
+        self,
+        shape: HandShape,
+        fitter: Fitter,
+        scorer: RasterScorer,
+        synergies: Synergies,
+        options: LookAgain,
+        objective: Objective,
     ) -> None:
         self._model, self._fitter, self._scorer, self._synergies = HandModel(shape), fitter, scorer, synergies
-        self._rough_scorer = RasterScorer(shape)
+        self._rough_scorer = RasterScorer(shape, objective)
         self._options = options
 
     def close(self) -> None:
@@ -69,6 +77,7 @@ class SecondThoughts:
         for finger in range(5):
             other, lower = other_finger(rough, pose, finger, generator)
             if lower < self._options.one_finger * rough.score(pose[None])[0]:
+                # It has just been found: what nothing pulls is to stay there.
                 held = Prior.held(other[ANGLES], self._fitter.options.hold)
                 pose, energy = self._clearly_better(pose, energy, [self._fitter.fit(other, prior=held)])
         return pose, energy

@@ -110,7 +110,9 @@ class IkTracker:
         self._space: Space = FULL if given is None or options.soft else Space.of(given)
         self._likely = None if given is None else Prior.likely(given, fitting.likely)
         self._synergies = given or load_synergies()
-        self._second_thoughts = SecondThoughts(shape, self._fitter, self._scorer, self._synergies, options.look_again)
+        self._second_thoughts = SecondThoughts(
+            shape, self._fitter, self._scorer, self._synergies, options.look_again, options.objective
+        )
         self._memory = TrackMemory(options.lost)
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
@@ -119,7 +121,7 @@ class IkTracker:
         self._observe(observation)
         clock.lap("observe")
         if pose is None:
-            found = self._found_again(observation, self._search(observation))
+            found = self._search(observation)
             clock.lap("retry")
         else:
             found = self._fitter.fit(
@@ -131,11 +133,13 @@ class IkTracker:
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
         last = self._memory.pose
-        if last is None:
-            return self.start(observation)
         clock = StageClock(self.stages)
         self._observe(observation)
         clock.lap("observe")
+        if last is None:
+            found = self._found_again(observation, self._search(observation))
+            clock.lap("retry")
+            return self._settle(found, Status.STARTED, clock)
         steps = np.outer(self.options.predictions, self._memory.velocity)
         ahead = within_limits(retract(last, steps))
         ahead = ahead[np.argsort(self._scorer.score(ahead), kind="stable")]
@@ -147,7 +151,8 @@ class IkTracker:
         clock.lap("fit")
         if self._space.full and self.options.variant == "default":
             found, status = self._look_again(observation, self._reconsider(found, ahead[1:], prior))
-            found = self._finger_by_finger(observation, found)
+            if status is Status.TRACKED:
+                found = self._finger_by_finger(observation, found)
             clock.lap("retry")
             return self._settle(found, status, clock)
         return self._settle(found, Status.TRACKED, clock)
@@ -204,7 +209,8 @@ class IkTracker:
     def _finger_by_finger(self, observation: Observation, pose: Array) -> Array:
         """The pose, or one with single fingers elsewhere: asked where it explains little."""
         energy = float(self._scorer.score(pose[None])[0])
-        if energy <= self.options.search.good_energy or self.options.look_again.one_finger == 0:
+        good = energy <= self.options.search.good_energy
+        if good or self.options.look_again.one_finger == 0 or self._likely is not None:
             return pose
         return self._second_thoughts.finger_by_finger(pose, energy, self._generator(observation))[0]
 

@@ -22,8 +22,8 @@ class LookAgain(NamedTuple):
     Every so many-th frame (0: never), and at once where the pose is `doubted`, hands close by, every finger in some
     typical posture, are searched through, from orientations `apart` radians apart. The best is taken if its energy is
     less than the share `close_by` of what it was, or less at all in doubt; after a loss, one from anywhere else, if
-    less than the share `elsewhere`. In every frame, one that differs by a single finger is, if less than the share
-    `one_finger` (0: never).
+    less than the share `elsewhere`. In every frame, one with a single finger elsewhere, or all of them one finger
+    further, is taken, if less than the share `one_finger` (0: never).
     """
 
     every: int = 5

@@ -104,7 +104,7 @@ class PsoTracker:
         clock.lap("observe")
         generator = frame_generator(self.options.seed, observation.frame_index)
         if pose is None:
-            found, energy = self._found_again(observation, generator, *self._search(observation, generator))
+            found, energy = self._search(observation, generator)
         else:
             found, energy = refine(self._scorer, checked_pose(pose), self.options.spread, self.options.swarm, generator)
         found, energy = self._finish(observation, found, energy)
@@ -113,14 +113,15 @@ class PsoTracker:
     def track(self, observation: Observation) -> Estimate:
         """Follow the hand into the next frame; searches where the track was lost or there is none."""
         last = self._memory.pose
-        if last is None:
-            return self.start(observation)
         clock = StageClock(self.stages)
         self._observe(observation)
         clock.lap("observe")
         options, generator = self.options, frame_generator(self.options.seed, observation.frame_index)
+        if last is None:
+            found = self._found_again(observation, generator, *self._search(observation, generator))
+            return self._settle(*self._finish(observation, *found), Status.STARTED, clock)
         space = self._space(last)
-        found = minimise(
+        best = minimise(
             lambda x: self._scorer.score(space.poses(x)),
             self._population(space, last, generator),
             space.lower,
@@ -129,7 +130,7 @@ class PsoTracker:
             generator,
             options.swarm,
         )
-        pose, energy = space.poses(found.position[None])[0], found.energy
+        pose, energy = space.poses(best.position[None])[0], best.energy
         pose, energy = self._look_again(observation, generator, pose, energy)
         pose, energy = self._finger_by_finger(observation, generator, pose, energy)
         pose, energy = self._finish(observation, pose, energy)
