@@ -25,14 +25,13 @@ class LostBelow:
     of other sizes than the model's has a high energy all the time. A hand seen edge on by a noisy sensor reaches 15 in
     its true pose; a fist of a hand that is not quite the model's agrees by little more than half.
 
-    A pose may guide segmentation from the confidence `sure` on, unless its energy exceeds both `sure_energy` and 1.3
-    times the usual: else a wrong pose would cut out what agrees with it.
+    A pose may guide segmentation from the confidence `sure` on, unless its energy exceeds both `energy` and 1.3 times
+    the usual: else a wrong pose would cut out what agrees with it.
     """
 
     confidence: float = 0.5
     energy: float = 16.0
     sure: float = 0.6
-    sure_energy: float = 12.0
 
 
 class TrackMemory:
@@ -88,6 +87,6 @@ class TrackMemory:
         """The linear prediction (27,), while the track is sure."""
         if self.pose is None or self._confidence < self._limits.sure:
             return None
-        if self.energy > max(self._limits.sure_energy, _HARDLY_USUAL * float(np.median(self._usual))):
+        if self.energy > max(self._limits.energy, _HARDLY_USUAL * float(np.median(self._usual))):
             return None
         return retract(self.pose, self.velocity)
