@@ -1,10 +1,10 @@
 """Flying pixels: found where time-of-flight sensors mix two depths, and nowhere on surfaces that a sensor can see."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.camera import Camera
 from depthtrack.observation.flying import STEEPEST, flying_pixels
 from depthtrack.observation.observation import Observer
 from depthtrack.recording.sequence import Frame
@@ -47,8 +47,10 @@ def test_rims_and_wisps_fly_and_a_finger_does_not() -> None:
     assert not flying[finger].any()
 
 
-def test_an_observation_is_rid_of_them() -> None:
-    """Half of the readings beside the hand's outline made to fly: next to none of them is observed."""
+@pytest.mark.parametrize("coloured", [False, True])
+def test_an_observation_is_rid_of_them(coloured: bool) -> None:
+    """Half of the readings beside the hand's outline made to fly: next to none of them is observed by depth alone,
+    whether or not there would be colour."""
     made = Synthesiser(Synthesis(sensor="ideal", model="skin", background="none"))
     frame, camera = made[0], made.sensor.camera
     depth, rng = frame.depth.astype(np.float32), np.random.default_rng(1)
@@ -56,14 +58,10 @@ def test_an_observation_is_rid_of_them() -> None:
     beside = np.logical_or.reduce([np.roll(padded, step, axis) for step in (-1, 1) for axis in (0, 1)])[1:-1, 1:-1]
     outline = beside & ~frame.mask & (rng.random(depth.shape) < 0.5)
     depth[outline] = frame.depth[frame.mask].max() + 0.05 * rng.uniform(0.5, 1.5, np.count_nonzero(outline))
-    o = Observer().observe(_frame(depth, camera))
+    o = Observer().observe(Frame(0, 0.0, depth, frame.colour if coloured else None, camera))
     assert o is not None
     left, top = o.origin
     seen = np.zeros(depth.shape, np.bool_)
     seen[top : top + o.depth.shape[0], left : left + o.depth.shape[1]] = o.depth > 0
     assert np.mean(seen[outline]) < 0.05
     assert np.mean(seen[frame.mask]) > 0.95
-
-
-def _frame(depth: np.ndarray, camera: Camera) -> Frame:
-    return Frame(0, 0.0, depth, None, camera)

@@ -78,3 +78,19 @@ def test_a_segmenter_searches_where_the_guide_was_wrong() -> None:
     found = segmenter.segment(frame_of(0), nowhere)
     assert found is not None
     assert np.linalg.norm(found.centre - MADE.poses[0][:3]) < 0.06
+
+
+def test_a_segmenter_goes_on_from_where_it_was_guided() -> None:
+    """Guided for a few frames and then left alone, it cuts about as well as one that was alone all the time."""
+    overlaps = {}
+    for guided in (True, False):
+        segmenter = Segmenter(SkinModel.default())
+        for index in range(100, 108):
+            found = segmenter.segment(frame_of(index), place_of(index) if guided and index < 107 else None)
+        assert found is not None
+        assert (found.arm_direction is None) == (found.wrist is None)
+        mask = np.zeros(MADE.sensor.camera.shape, np.bool_)
+        mask[found.window.slices] = found.skin
+        truth = MADE[107].mask
+        overlaps[guided] = np.sum(mask & truth) / np.sum(mask | truth)
+    assert overlaps[True] > max(0.9, overlaps[False] - 0.02)

@@ -1,7 +1,10 @@
 """Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
 
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,3 +183,25 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str)
     poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
     assert np.array_equal(poses, poses_again)
     assert endpoint_error(MODEL, poses, MODEL, MADE.poses[[22, 23]]).values.max() < 10
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_the_papers_have_no_second_thoughts(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hand jumps by as much as makes every other variant think again."""
+    thoughts = import_module(f"depthtrack.tracking.{name}.second_thoughts").SecondThoughts
+    thought = list[str]()
+    for method in ("close_by", "finger_by_finger"):
+        monkeypatch.setattr(thoughts, method, _noted(method, getattr(thoughts, method), thought))
+    for variant in ("paper", "default"):
+        with closing(create_tracker(name, MADE.options.hand, variant=variant)) as tracker:
+            tracker.start(observe(MADE, 20), MADE.poses[20])
+            tracker.track(observe(MADE, 130))
+        assert bool(thought) == (variant == "default")
+
+
+def _noted(method: str, original: Callable[..., Any], thought: list[str]) -> Callable[..., Any]:
+    def noted(*given: Any) -> Any:
+        thought.append(method)
+        return original(*given)
+
+    return noted
