@@ -50,7 +50,8 @@ def test_another_place_is_found_where_a_swarm_stays() -> None:
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
         stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
         options = SearchOptions(apart=0.1)
-        found, _ = find_candidates(scorer, o.centre, np.random.default_rng(5), options, near=wrong)
+        generator = np.random.default_rng(5)
+        found, _ = find_candidates(scorer, close_by(wrong, generator, options.hypotheses), generator, options)
     errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, MADE.poses[[frame, frame]]).values
     assert errors[1] < 0.7 * errors[0]
 

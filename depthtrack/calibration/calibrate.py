@@ -20,6 +20,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.observation.observation import Observation
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
+from depthtrack.tracking.hypotheses import hypotheses, typical_angles
 from depthtrack.tracking.pso.search import SearchOptions, find_candidates, find_pose
 from depthtrack.tracking.starting import frame_generator
 
@@ -177,7 +178,9 @@ class _Searcher:
             for o in self.observations[:count]:
                 scorer.observe(_target(o))
                 generator = frame_generator(self._seed, o.frame_index)
-                out.append(find_candidates(scorer, o.centre, generator, _WIDE, arm=o.arm_direction))
+                angles = typical_angles(generator, _WIDE.hypotheses)
+                poses = hypotheses(o.centre, angles, generator, o.arm_direction)
+                out.append(find_candidates(scorer, poses, generator, _WIDE))
         return out
 
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:

@@ -217,7 +217,7 @@ class IkTracker:
     def _found_again(self, observation: Observation, elsewhere: Array) -> Array:
         """Of a hand that was lost a moment ago: it has hardly turned since, unless `elsewhere` explains much more."""
         recent = self._memory.recent
-        if recent is None or not self._space.full or self.options.variant == "paper":
+        if recent is None or self._likely is not None or self.options.variant == "paper":
             return elsewhere
         here = recent.copy()
         here[POSITION] = observation.centre

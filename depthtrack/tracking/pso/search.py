@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.tracking.hypotheses import apart, hypotheses, typical_angles
-from depthtrack.tracking.looking_again import close_by
 from depthtrack.tracking.pso.spaces import TangentSpace
 from depthtrack.tracking.pso.swarm import SwarmOptions, minimise
 
@@ -65,7 +64,8 @@ def find_pose(
     """
     best: tuple[Array, float] | None = None
     for _ in range(options.attempts):
-        poses, energies = find_candidates(scorer, centre, generator, options, polish, arm=arm)
+        poses = hypotheses(centre, typical_angles(generator, options.hypotheses), generator, arm)
+        poses, energies = find_candidates(scorer, poses, generator, options, polish)
         if best is None or energies[0] < best[1]:
             best = poses[0], float(energies[0])
         if best[1] <= options.good_energy:
@@ -75,24 +75,10 @@ def find_pose(
 
 
 def find_candidates(
-    scorer: Scorer,
-    centre: Array,
-    generator: np.random.Generator,
-    options: SearchOptions,
-    polish: Polish | None = None,
-    near: Array | None = None,
-    arm: Array | None = None,
+    scorer: Scorer, poses: Array, generator: np.random.Generator, options: SearchOptions, polish: Polish | None = None
 ) -> tuple[Array, Array]:
-    """What one search ends with: poses (K, 27) and energies (K,), the best first.
-
-    It looks about `near` (27,) where that is given, else everywhere: see `find_pose`.
-    """
-    if near is None:
-        poses = hypotheses(centre, typical_angles(generator, options.hypotheses), generator, arm)
-    else:
-        poses = close_by(near, generator, options.hypotheses)
-    energies = scorer.score(poses)
-    poses, energies = poses[np.argsort(energies)], np.sort(energies)
+    """What one search ends with that begins with `poses` (N, 27): poses (K, 27) and energies (K,), the best first."""
+    poses = poses[np.argsort(scorer.score(poses))]
     starts = poses[apart(poses, options.apart, options.rounds[0].starts)]
     for stage in options.rounds:
         refined = [refine(scorer, pose, stage.spread, stage.swarm, generator) for pose in starts[: stage.starts]]

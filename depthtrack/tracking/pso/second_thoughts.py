@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.tracking.looking_again import one_finger_further, other_finger
+from depthtrack.tracking.looking_again import close_by, one_finger_further, other_finger
 from depthtrack.tracking.memory import LostBelow
 from depthtrack.tracking.pso.search import Polish, SearchOptions, find_candidates
 
@@ -43,7 +43,8 @@ class SecondThoughts:
 
     def close_by(self, pose: Array, generator: np.random.Generator, polish: Polish | None) -> tuple[Array, float]:
         """The best pose (27,) found close to `pose` (27,), and its energy."""
-        poses, energies = find_candidates(self._scorer, pose[:3], generator, self._search, polish, near=pose)
+        poses = close_by(pose, generator, self._search.hypotheses)
+        poses, energies = find_candidates(self._scorer, poses, generator, self._search, polish)
         return poses[0], float(energies[0])
 
     def finger_by_finger(
