@@ -31,7 +31,8 @@ class Command:
     repeats: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Times that every tracker goes through every recording, each time with another seed."""
     equal_time: Annotated[float | None, tyro.conf.arg(metavar="MS")] = None
-    """Give every tracker the same CPU milliseconds a frame: its work is chosen by timing a few frames."""
+    """Give every tracker the same CPU milliseconds an ordinary frame: its work is chosen by timing a few. Frames in
+    doubt cost a search besides; where even the least work takes longer, the report says so."""
     seed: int = 0
     """The first seed."""
 

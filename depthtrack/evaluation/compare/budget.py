@@ -30,7 +30,7 @@ Stretch = tuple[Estimate, list[Observation]]
 
 @dataclass(frozen=True)
 class Budget:
-    """What calibration chose: the `options` that set the work, and the `ms` of CPU time that a frame took with them."""
+    """What calibration chose: the `options` that set the work, and the median frame's `ms` of CPU time with them."""
 
     options: dict[str, Any]
     ms: float
@@ -60,7 +60,7 @@ def calibrate(
     options: dict[str, Any],
     ms: float,
 ) -> Budget:
-    """Find the work that takes `ms` of CPU time a frame, by timing frames at several places of the first `count`.
+    """Find the work with which a frame takes `ms` of CPU time, by timing some at several places of the first `count`.
 
     Where even the least or the most work misses `ms`, the nearest is taken; its own time is told. Where the hand is not
     found, nothing is chosen.
@@ -104,7 +104,7 @@ def _next_size(tried: dict[float, Budget], ms: float) -> float:
 
 
 def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dict[str, Any]) -> float:
-    """Mean CPU milliseconds of a tracked frame."""
+    """CPU milliseconds of an ordinary tracked frame, the median: a frame in doubt costs a search, whatever the work."""
     spent: list[float] = []
     with closing(TimedByProcessor(create_tracker(tracker, hand, **options))) as timed:
         for first, following in places:
@@ -112,7 +112,7 @@ def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dic
             # The first frame after a recall also warms up caches; it counts for nothing.
             estimates = [timed.track(observation) for observation in following][1:]
             spent += [sum(estimate.stage_ms.values()) for estimate in estimates if estimate.status == "tracked"]
-    return float(np.mean(spent)) if spent else float("inf")
+    return float(np.median(spent)) if spent else float("inf")
 
 
 def _stretches(
