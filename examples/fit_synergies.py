@@ -10,7 +10,7 @@ import numpy as np
 
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
-from depthtrack.recording.postures.reading import read_postures
+from depthtrack.posture_databases.registry import read_postures
 from depthtrack.synthesis.motion import load_motion
 
 

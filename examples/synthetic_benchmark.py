@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 from depthtrack.evaluation.compare.comparison import Comparison, compare
-from depthtrack.evaluation.compare.contenders import Contender
 from depthtrack.evaluation.compare.results import as_table, lines_of
 from depthtrack.evaluation.compare.running import Source
+from depthtrack.evaluation.compare.specs import Contender
 from depthtrack.evaluation.evaluate import evaluate_run
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.report.build import write_report

@@ -5,10 +5,10 @@ from contextlib import closing
 
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import Observer
 from depthtrack.recording import open_sequence
+from depthtrack.segmentation.observation import Observer
+from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Status
-from depthtrack.tracking.trackers import create_tracker
 
 
 def main(path: str, tracker_name: str = "ik") -> int:

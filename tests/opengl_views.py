@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.opengl.context import Platform
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
-from tests.test_raster import KINECT, random_poses, random_shape, target_of, window_on
+from tests.rendering.test_raster import KINECT, random_poses, random_shape, target_of, window_on
 
 OBJECTIVE = Objective()
 BOTH_SUMS: tuple[Sums, Sums] = ("cpu", "gpu")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from depthtrack.cli import main
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run import RunRow, RunWriter
+from depthtrack.recording.run_folder import RunRow, RunWriter
 
 STAGES = ("segment", "swarm")
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from depthtrack.observation.observation import Observation
+from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesiser
 
 

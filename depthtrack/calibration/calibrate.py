@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.calibration.evidence import View
-from depthtrack.calibration.joint import JointFit, fit_jointly
-from depthtrack.calibration.sizes import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
+from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
+from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
+from depthtrack.calibration.residuals import View
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.observation.observation import Observation
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from depthtrack.tracking.hypotheses import hypotheses, typical_angles
-from depthtrack.tracking.pso.search import SearchOptions, find_candidates, find_pose
-from depthtrack.tracking.starting import frame_generator
+from depthtrack.segmentation.observation import Observation
+from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
+from depthtrack.tracking.random import frame_generator
+from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, find_pose
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.observation.observation import Observation, Observer
-from depthtrack.observation.view import disc
 from depthtrack.recording.sequence import Sequence
+from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.segmentation.surface_grid import disc
 
 _LOOKED_AT = 240
 """Frames of a recording that are looked at, at most, spread over all of it."""

@@ -52,7 +52,7 @@ class Score(_Benchmark):
     """Only these, of raster, egl, osmesa, oracle, pyrender, open3d, embree; unless told, all but the slow oracle."""
 
     def run(self) -> None:
-        from depthtrack.evaluation.bench import scoring
+        from depthtrack.benchmarks.speed import scoring
 
         self._measure(scoring, scoring.plan(self.backends, self.seconds))
 
@@ -65,7 +65,7 @@ class Ik(_Benchmark):
     """
 
     def run(self) -> None:
-        from depthtrack.evaluation.bench import ik
+        from depthtrack.benchmarks.speed import ik
 
         self._measure(ik, ik.plan(self.seconds))
 
@@ -81,7 +81,7 @@ class Segment(_Benchmark):
     """Sequence folders with a hand in their first frames, in place of the synthetic ones."""
 
     def run(self) -> None:
-        from depthtrack.evaluation.bench import segmenting
+        from depthtrack.benchmarks.speed import segmenting
 
         self._measure(segmenting, segmenting.plan(self.recordings, self.seconds))
 

@@ -48,8 +48,8 @@ class Command:
 
         from depthtrack.calibration.calibrate import VIEWS, calibrate, summary
         from depthtrack.calibration.views import choose_views
-        from depthtrack.observation.observation import Observer
         from depthtrack.resources import usable_cores
+        from depthtrack.segmentation.observation import Observer
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
 

@@ -55,7 +55,7 @@ class Command:
 
     def _comparison(self) -> "Comparison":
         from depthtrack.evaluation.compare.comparison import Comparison
-        from depthtrack.evaluation.compare.contenders import read_contenders
+        from depthtrack.evaluation.compare.specs import read_contenders
 
         return Comparison(
             sources=tuple(map(self.recordings.source, self.sequences)),

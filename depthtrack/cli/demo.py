@@ -44,7 +44,7 @@ class Command:
         from depthtrack.cli.comparing import compare_and_report
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.compare.comparison import Comparison
-        from depthtrack.evaluation.compare.contenders import read_contenders
+        from depthtrack.evaluation.compare.specs import read_contenders
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
         check_output_folder(self.out)

@@ -69,8 +69,8 @@ class Command:
 
     def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:
         from depthtrack.evaluation.predictions import evaluate_predictions
+        from depthtrack.export.benchmark_joints import find_benchmark
         from depthtrack.recording import open_sequence
-        from depthtrack.recording.joints.benchmarks import find_benchmark
 
         if self.runs or self.report is not None:
             raise InputError("--report and run folders are about tracking: --predictions go without them")

@@ -24,10 +24,10 @@ class Command:
         import numpy as np
 
         from depthtrack.evaluation.replay import run_hand
-        from depthtrack.recording.joints.benchmarks import find_benchmark
-        from depthtrack.recording.joints.export import export_joints
-        from depthtrack.recording.joints.track import JointTrack
-        from depthtrack.recording.run import Run
+        from depthtrack.export.benchmark_joints import find_benchmark
+        from depthtrack.export.joint_track import JointTrack
+        from depthtrack.export.registry import export_joints
+        from depthtrack.recording.run_folder import Run
 
         run = Run.load(self.path)
         track = JointTrack.of(run, run_hand(run))

@@ -9,10 +9,10 @@ import tyro
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
-    from depthtrack.camera import Camera
+    from depthtrack.geometry.camera import Camera
     from depthtrack.recording import Sequence
 
-# Written out, because reading them from depthtrack.camera would make `--help` wait for numpy.
+# Written out, because reading them from depthtrack.geometry.camera would make `--help` wait for numpy.
 PresetName = Literal["kinect1", "kinect2", "realsense", "tum"]
 Pixels = Annotated[float | None, tyro.conf.arg(metavar="PIXELS")]
 
@@ -50,7 +50,7 @@ class RecordingOptions:
         """The camera these options describe, or None for the recording's own."""
         from dataclasses import replace
 
-        from depthtrack.camera import PRESETS, Camera
+        from depthtrack.geometry.camera import PRESETS, Camera
         from depthtrack.recording import image_size
 
         numbers = {

@@ -11,7 +11,7 @@ from depthtrack.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from depthtrack.evaluation.experiments.reproduce import Reproduction
+    from depthtrack.benchmarks.papers.reproduce import Reproduction
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
+        from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+        from depthtrack.benchmarks.papers.registry import chosen_experiments
+        from depthtrack.benchmarks.papers.reproduce import reproduce
         from depthtrack.cli.output_folder import check_output_folder
-        from depthtrack.evaluation.experiments.experiment import ExperimentOptions
-        from depthtrack.evaluation.experiments.registry import chosen_experiments
-        from depthtrack.evaluation.experiments.reproduce import reproduce
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
         names = [name for name in self.figures if name != "list"]
@@ -89,7 +89,7 @@ def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterab
 
 
 def _as_text(done: "Reproduction", folder: Path) -> str:
-    from depthtrack.evaluation.bench.table import aligned
+    from depthtrack.text_table import aligned
 
     lines = [("", "paper, in its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
     reused = f"{done.reused} of them from before, " if done.reused else ""

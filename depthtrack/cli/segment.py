@@ -47,7 +47,7 @@ class Command:
 
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
-        from depthtrack.observation.observation import Observer
+        from depthtrack.segmentation.observation import Observer
         from depthtrack.tracking.configuration import chosen_hand
 
         if self.hand is not None and self.tracker is None:
@@ -71,7 +71,7 @@ class Command:
         from contextlib import closing, nullcontext
 
         from depthtrack.tracking.configuration import chosen_hand
-        from depthtrack.tracking.trackers import create_tracker
+        from depthtrack.tracking.registry import create_tracker
 
         if self.tracker is None:
             return nullcontext()
@@ -85,8 +85,8 @@ class Command:
 
         from tqdm import tqdm
 
+        from depthtrack.viewing.annotated_frame import Moment, evenly_chosen, sequence_depth_range
         from depthtrack.viewing.contact_sheet import contact_sheet, describe, frame_rate, save_picture
-        from depthtrack.viewing.moments import Moment, evenly_chosen, sequence_depth_range
         from depthtrack.viewing.panels import panel
         from depthtrack.viewing.video import VideoWriter
 

@@ -48,7 +48,7 @@ class SourceOptions:
     def _camera(self) -> dict[str, Any] | None:
         from dataclasses import asdict
 
-        from depthtrack.camera import PRESETS, Camera
+        from depthtrack.geometry.camera import PRESETS, Camera
 
         if self.camera is not None and self.camera_preset is not None:
             raise InputError("--camera and --camera-preset both name a camera: give one of them")

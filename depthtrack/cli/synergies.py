@@ -10,7 +10,7 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.hand.synergies import Synergies
-    from depthtrack.recording.postures.posture_set import PostureSet
+    from depthtrack.posture_databases.posture_set import PostureSet
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Fit:
         print(f"\nwrote {self.out}: look at it with  depthtrack synergies info {self.out} --picture FILE.png")
 
     def _read(self, path: Path) -> "PostureSet":
-        from depthtrack.recording.postures.reading import read_postures
+        from depthtrack.posture_databases.registry import read_postures
 
         postures = read_postures(path)
         try:
@@ -94,7 +94,7 @@ class Info:
 
     def _draw(self, synergies: "Synergies", path: Path) -> None:
         from depthtrack.hand.shape import HandShape
-        from depthtrack.hand.skin import Skin
+        from depthtrack.hand.skin.mesh import Skin
         from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.synergy_sheet import synergy_sheet
 

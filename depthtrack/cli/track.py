@@ -55,11 +55,11 @@ class Command:
 
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.hand.kinematics import HandModel
-        from depthtrack.observation.observation import Observer
-        from depthtrack.recording.run import RunWriter
+        from depthtrack.recording.run_folder import RunWriter
+        from depthtrack.segmentation.observation import Observer
         from depthtrack.tracking.configuration import chosen_hand, run_configuration
-        from depthtrack.tracking.loop import track_sequence
-        from depthtrack.tracking.trackers import create_tracker
+        from depthtrack.tracking.pipeline import track_sequence
+        from depthtrack.tracking.registry import create_tracker
 
         check_output_folder(self.out)
         if self.frames is not None and self.frames < 1:
@@ -101,7 +101,7 @@ class Command:
     def _options(self) -> dict[str, Any]:
         """What the chosen tracker is made with: what was given, and what it would do anyway."""
         from depthtrack.resources import usable_cores
-        from depthtrack.tracking.trackers import complete_options
+        from depthtrack.tracking.registry import complete_options
 
         given = {"variant": self.variant, "seed": self.seed} | chosen_options(self.tracker, self.pso, self.ik)
         if self.tracker == "pso":

@@ -25,8 +25,8 @@ class Command:
     def run(self) -> None:
         from tqdm import tqdm
 
-        from depthtrack.observation.labelled_images import from_folders, from_recording
-        from depthtrack.observation.skin_colour import SkinModel
+        from depthtrack.segmentation.labelled_images import from_folders, from_recording
+        from depthtrack.segmentation.skin_colour import SkinModel
 
         labelled = from_recording(self.images) if self.masks is None else from_folders(self.images, self.masks)
         model = SkinModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))

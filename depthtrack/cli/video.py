@@ -31,7 +31,7 @@ class Command:
 
     def run(self) -> None:
         from depthtrack.evaluation.replay import Replay
-        from depthtrack.recording.run import Run
+        from depthtrack.recording.run_folder import Run
         from depthtrack.viewing.run_film import write_run_film
         from depthtrack.viewing.video import WEB_CODECS
 

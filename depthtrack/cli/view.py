@@ -13,7 +13,7 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.recording import Sequence
-    from depthtrack.viewing.moments import MaskEstimator, Moment
+    from depthtrack.viewing.annotated_frame import MaskEstimator, Moment
     from depthtrack.viewing.rerun_viewer import RerunViewer
 
 MOST_MOMENTS = 200
@@ -54,7 +54,7 @@ class Command:
     """Where the recording of a run is, if it was moved since."""
 
     def run(self) -> None:
-        from depthtrack.viewing.moments import sequence_depth_range
+        from depthtrack.viewing.annotated_frame import sequence_depth_range
 
         self._check_options()
         if (self.recording.path / "run.json").exists():
@@ -143,7 +143,7 @@ class Command:
         """Every frame, with a progress bar where people watch."""
         from tqdm import tqdm
 
-        from depthtrack.viewing.moments import moments
+        from depthtrack.viewing.annotated_frame import moments
 
         yield from tqdm(
             moments(sequence, None, self._estimator()),
@@ -155,7 +155,7 @@ class Command:
         )
 
     def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[Moment]":
-        from depthtrack.viewing.moments import evenly_chosen, moments
+        from depthtrack.viewing.annotated_frame import evenly_chosen, moments
 
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
         if outside:

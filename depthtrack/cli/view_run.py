@@ -19,7 +19,7 @@ _CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy", "depth_scale")
 def view_run(options: "Command") -> None:
     """Show the run that the options name. Raises InputError, and MissingExtraError for a viewer without its extra."""
     from depthtrack.evaluation.replay import Replay
-    from depthtrack.recording.run import Run
+    from depthtrack.recording.run_folder import Run
 
     for owner, names in ((options, _NOT_FOR_RUNS), (options.recording, _CAMERA)):
         for name in names:
@@ -74,8 +74,8 @@ def _serve(replay: "Replay") -> None:
 
 
 def _write_sheet(replay: "Replay", options: "Command", path: Path) -> None:
+    from depthtrack.viewing.annotated_frame import evenly_chosen
     from depthtrack.viewing.contact_sheet import save_picture
-    from depthtrack.viewing.moments import evenly_chosen
     from depthtrack.viewing.run_sheet import run_sheet
 
     row_of = {int(index): row for row, index in enumerate(replay.run.index)}

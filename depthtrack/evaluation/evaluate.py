@@ -25,7 +25,7 @@ from depthtrack.evaluation.metrics import (
 from depthtrack.evaluation.replay import Replay, Replayed
 from depthtrack.evaluation.residuals import run_residuals
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.recording.run import Run
+from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import Metric, PointErrors, SuccessCurve
+from depthtrack.export.benchmark_joints import Benchmark
+from depthtrack.export.uvd import read_uvd
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
-from depthtrack.recording.joints.benchmarks import Benchmark
-from depthtrack.recording.joints.uvd_text import read_uvd
 from depthtrack.recording.sequence import Sequence
 
 Array = NDArray[np.float64]

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.errors import InputError
-from depthtrack.evaluation.model_surface import ModelSurface
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run import Run
+from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.tracking.loop import hand_place
-from depthtrack.tracking.memory import LostBelow, TrackMemory
+from depthtrack.rendering.hand_surface import ModelSurface
+from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.tracking.pipeline import hand_place
+from depthtrack.tracking.state import LostBelow, TrackMemory
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
-from depthtrack.evaluation.model_surface import ModelSurface
 from depthtrack.evaluation.replay import Replayed
-from depthtrack.observation.observation import Observation
+from depthtrack.geometry.camera import Camera
+from depthtrack.rendering.hand_surface import ModelSurface
+from depthtrack.segmentation.observation import Observation
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.tracking.loop import follow, hand_place
+from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.tracking.pipeline import follow, hand_place
 from depthtrack.tracking.tracker import Tracker
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.files import read_text
 from depthtrack.hand.pose import FINGERS
-from depthtrack.text_files import read_text
 
 Side = Literal["right", "left"]
 

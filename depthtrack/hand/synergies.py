@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.files import read_text
 from depthtrack.hand.pose import FINGERS
 from depthtrack.resources import resource_folder
-from depthtrack.text_files import read_text
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.errors import DamagedFrameError
+from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import DamagedFrame, Frame, OnDamage, Sequence
 
 GAP_FACTOR = 1.5

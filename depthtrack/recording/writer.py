@@ -14,14 +14,12 @@ from typing import Any, Literal, Self, TextIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_SIZE
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.folder import EXACT_DEPTH_SCALE
-from depthtrack.recording.images import write_jpeg, write_png
-from depthtrack.recording.truth import (
+from depthtrack.recording.ground_truth import (
     HAND_FILE,
     JOINTS_FILE,
     JOINTS_HEADER,
@@ -29,6 +27,8 @@ from depthtrack.recording.truth import (
     POSES_HEADER,
     QUATERNION_TOLERANCE,
 )
+from depthtrack.recording.images import write_jpeg, write_png
+from depthtrack.recording.sequences.tum import EXACT_DEPTH_SCALE
 
 ColourFormat = Literal["jpg", "png"]
 _Table = tuple[str, tuple[str, ...]]

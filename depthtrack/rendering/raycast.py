@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.primitives import CYLINDER
 from depthtrack.rendering.surface import NEAR, Surface
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import PRESETS
 from depthtrack.errors import DepthtrackError
+from depthtrack.geometry.camera import PRESETS
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import TANGENT_SIZE, make_pose, retract
 from depthtrack.hand.shape import HandShape

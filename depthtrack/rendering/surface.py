@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 
 NEAR = 1e-3
 """Nothing closer to the lens than this (metres) is seen."""

@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from depthtrack.evaluation.compare.results import Line, figures_of, lines_of
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.colours import css_variables
-from depthtrack.report.facts import Fact, at_home, facts_of_recording, facts_of_tracker, fairness
 from depthtrack.report.film import Film, as_webp, film_of
+from depthtrack.report.narrative import ERRORS, Verdict, error_name, judged_by, standings, verdict, where
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.plots import TIMELINE_FROM, TIMELINE_TO, finger_bars, share_curves, stage_bars, timeline
+from depthtrack.report.provenance import Fact, at_home, facts_of_recording, facts_of_tracker, fairness
 from depthtrack.report.series import Shown, worst_frames
 from depthtrack.report.table import table_head, table_rows
-from depthtrack.report.words import ERRORS, Verdict, error_name, judged_by, standings, verdict, where
 
 FILM_BYTES, ALL_FILMS_BYTES = 5_000_000, 30_000_000
 """A film, and all films of a page, take about so much at most."""

@@ -13,7 +13,7 @@ from PIL import Image as Pictures
 
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.pictures import Image, SideBySide
-from depthtrack.viewing.moments import evenly_chosen
+from depthtrack.viewing.annotated_frame import evenly_chosen
 
 FASTEST = 15.0
 """Pictures a second: more would show little more."""

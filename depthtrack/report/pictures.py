@@ -8,18 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.evaluation.compare.results import figures_of
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.replay import Replay
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.surface import Surface
 from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import Shown
+from depthtrack.viewing.annotated_frame import Moment, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
-from depthtrack.viewing.moments import Moment, true_keypoints
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
 from depthtrack.viewing.panels import captioned, paint, tile_grid
 from depthtrack.viewing.shading import draw_surface

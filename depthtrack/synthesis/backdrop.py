@@ -12,7 +12,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import BODY_COUNT
 from depthtrack.hand.primitives import CYLINDER, SPHERE
 from depthtrack.rendering.raycast import raycast

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.files import read_text
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLE_NAMES, FINGERS
 from depthtrack.resources import resource_folder
-from depthtrack.text_files import read_text
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.skin import Skin
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise

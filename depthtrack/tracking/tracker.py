@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.observation.observation import Observation
+from depthtrack.segmentation.observation import Observation
 
 
 class Status(StrEnum):

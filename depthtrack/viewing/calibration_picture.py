@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.calibration.calibrate import Calibration
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.skin import Skin
-from depthtrack.observation.observation import Observation
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
+from depthtrack.segmentation.observation import Observation
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 
 Array = NDArray[np.float64]
 Window = tuple[int, int, int, int]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
+from depthtrack.viewing.annotated_frame import Moment
 from depthtrack.viewing.depth_colours import colour_scale
-from depthtrack.viewing.moments import Moment
 from depthtrack.viewing.panels import Layer, beside, blank, captioned, paint, smaller, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, TEXT, TRUE_MASK, Rgb

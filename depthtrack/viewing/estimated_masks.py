@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.observation.segmentation import Segmenter
-from depthtrack.observation.skin_colour import SkinModel
 from depthtrack.recording.sequence import Frame
-from depthtrack.viewing.moments import MaskEstimator
+from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.viewing.annotated_frame import MaskEstimator
 
 
 def mask_estimator() -> MaskEstimator:

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.pose import make_pose, quaternion_exp, quaternion_product
-from depthtrack.hand.skin import Skin
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.viewing.panels import blank, smaller
 from depthtrack.viewing.shading import draw_surface

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.camera import Camera
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS
 from depthtrack.viewing.theme import FINGER_COLOURS, OUTLINE, PALM, TRUE_MASK, Rgb

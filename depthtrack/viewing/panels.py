@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Sequence
+from depthtrack.viewing.annotated_frame import MaskEstimator, Moment, evenly_chosen, moments
 from depthtrack.viewing.depth_colours import depth_to_rgb
-from depthtrack.viewing.moments import MaskEstimator, Moment, evenly_chosen, moments
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, SURFACE, TEXT, TRUE_MASK, Rgb

@@ -9,7 +9,7 @@ import numpy as np
 from depthtrack.evaluation.evaluate import evaluate
 from depthtrack.evaluation.replay import Replay, Replayed
 from depthtrack.rendering.surface import Surface
-from depthtrack.viewing.moments import true_keypoints
+from depthtrack.viewing.annotated_frame import true_keypoints
 from depthtrack.viewing.rerun_stream import CAMERA
 from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, MomentStream, bones, jpeg
 from depthtrack.viewing.residual_colours import residual_to_rgb

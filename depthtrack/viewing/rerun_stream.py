@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from depthtrack.camera import Camera
 from depthtrack.errors import InputError, MissingExtraError
+from depthtrack.geometry.camera import Camera
 from depthtrack.viewing.theme import ESTIMATED_MASK, TRUE_MASK
 
 CAMERA = "world/camera"

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.viewing.annotated_frame import Moment
 from depthtrack.viewing.depth_colours import depth_to_rgb
-from depthtrack.viewing.moments import Moment
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES
 from depthtrack.viewing.rerun_stream import CAMERA, ESTIMATED_CLASS, TRUE_CLASS, Item, RerunStream
 from depthtrack.viewing.theme import FINGER_COLOURS, PALM, Rgb

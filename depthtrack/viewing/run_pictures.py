@@ -6,13 +6,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.rendering.surface import Surface
+from depthtrack.viewing.annotated_frame import Moment, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
-from depthtrack.viewing.moments import Moment, true_keypoints
 from depthtrack.viewing.overlay import dimmed, draw_skeleton
 from depthtrack.viewing.panels import blank, captioned, paint, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.viewing.annotated_frame import Moment
 from depthtrack.viewing.depth_colours import depth_range
-from depthtrack.viewing.moments import Moment
 from depthtrack.viewing.panels import Layer, beside, blank, mask_colour, paint, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, Rgb

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.skin import Skin
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.hand.synergies import Synergies
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.hand_picture import hand_picture

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.evaluation.compare.clock import TimedByProcessor
+from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import Observation, Observer
 from depthtrack.recording.sequence import Sequence as Recording
+from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Estimate
-from depthtrack.tracking.trackers import create_tracker
 
 PLACES, STRETCH = 6, 6
 """Frames are timed at so many places of a recording, so many in a row."""

@@ -8,8 +8,8 @@ from threading import Event, Thread
 from typing import Any
 
 from depthtrack.errors import InputError
-from depthtrack.evaluation.compare.contenders import Contender
 from depthtrack.evaluation.compare.running import FrameCount, PlannedRun, Source, calibrate_cell, track_cell
+from depthtrack.evaluation.compare.specs import Contender
 from depthtrack.evaluation.sweep.rows import Cell, Journal
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
 

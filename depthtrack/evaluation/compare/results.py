@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.evaluation.bench.table import aligned
 from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.evaluation.metrics import Metric
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Workers
-from depthtrack.tracking.trackers import TRACKERS, complete_options
+from depthtrack.text_table import aligned
+from depthtrack.tracking.registry import TRACKERS, complete_options
 
 TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
 """Errors against a truth: of the phalanx endpoints of true poses, or of annotated joints."""

@@ -11,20 +11,20 @@ from typing import Any
 
 import cv2
 
-from depthtrack.camera import Camera
-from depthtrack.evaluation.bench.machine import describe_machine
 from depthtrack.evaluation.compare.budget import calibrate
-from depthtrack.evaluation.compare.clock import TimedByProcessor
+from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
 from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.observation.observation import Observer
+from depthtrack.machine import describe_machine
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run import RunWriter, check_same, read_configuration
+from depthtrack.recording.run_folder import RunWriter, check_same, read_configuration
 from depthtrack.recording.sequence import OnDamage, Sequence
+from depthtrack.segmentation.observation import Observer
 from depthtrack.tracking.configuration import chosen_hand, run_configuration
-from depthtrack.tracking.loop import track_sequence
-from depthtrack.tracking.trackers import create_tracker
+from depthtrack.tracking.pipeline import track_sequence
+from depthtrack.tracking.registry import create_tracker
 
 DONE = "done.json"
 """Stands in a run folder once all of its frames are tracked."""

@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
-from depthtrack.rendering.raster.simd import (
+from depthtrack.rendering.raster.spans import find_spans
+from depthtrack.rendering.raster.tiles import BLOCK, COLUMNS, ROWS
+from depthtrack.rendering.raster.work_queue.queue import give_back, take
+from depthtrack.rendering.surface import NEAR
+from depthtrack.simd.functions import (
+    estimated_reciprocal,
+    estimated_reciprocal_sqrt,
+    max_or,
+    vabs,
+    vsum,
+)
+from depthtrack.simd.vectors import (
     F32X16,
     both,
     filler,
@@ -22,17 +33,6 @@ from depthtrack.rendering.raster.simd import (
     store,
     vmin,
 )
-from depthtrack.rendering.raster.simd_functions import (
-    estimated_reciprocal,
-    estimated_reciprocal_sqrt,
-    max_or,
-    vabs,
-    vsum,
-)
-from depthtrack.rendering.raster.spans import find_spans
-from depthtrack.rendering.raster.stripes import BLOCK, COLUMNS, ROWS
-from depthtrack.rendering.raster.tickets import give_back, take
-from depthtrack.rendering.surface import NEAR
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster.quadrics import Coefficients, span, write_cones, write_general, write_spheres
-from depthtrack.rendering.raster.simd import F64X8, filler, kernel_part, loader, select
-from depthtrack.rendering.raster.simd_functions import first, vfloor
+from depthtrack.simd.functions import first, vfloor
+from depthtrack.simd.vectors import F64X8, filler, kernel_part, loader, select
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,11 @@ linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is compute
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.rendering.raster import layout, stripes
-from depthtrack.rendering.raster.simd import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
-from depthtrack.rendering.raster.simd_functions import narrow, vabs, vfloor, vsqrt
+from depthtrack.rendering.raster import layout
+from depthtrack.rendering.raster import tiles as stripes
 from depthtrack.rendering.surface import NEAR
+from depthtrack.simd.functions import narrow, vabs, vfloor, vsqrt
+from depthtrack.simd.vectors import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
 
 Array = NDArray[np.float64]
 Coefficients = NDArray[np.float32]

@@ -13,9 +13,10 @@ from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, Terms
-from depthtrack.rendering.raster import kernel, layout, quadrics, stripes
-from depthtrack.rendering.raster.helper import Helper
-from depthtrack.rendering.raster.tickets import Tickets, is_done, new_tickets, offer, tell_to_leave
+from depthtrack.rendering.raster import kernel, layout, quadrics
+from depthtrack.rendering.raster import tiles as stripes
+from depthtrack.rendering.raster.work_queue.queue import Tickets, is_done, new_tickets, offer, tell_to_leave
+from depthtrack.rendering.raster.work_queue.worker import Helper
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import quadrics as q
-from depthtrack.rendering.raster import stripes
-from depthtrack.rendering.raster.simd import F32X16, kernel_part, loader, select, vmax, vmin
-from depthtrack.rendering.raster.simd_functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
+from depthtrack.rendering.raster import tiles as stripes
+from depthtrack.simd.functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
+from depthtrack.simd.vectors import F32X16, kernel_part, loader, select, vmax, vmin
 
 _load = loader(F32X16)
 _COLUMNS: NDArray[np.float32] = np.arange(16, dtype=np.float32)

@@ -5,8 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import Camera
 from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.surface import Surface
 
 Array = NDArray[np.float64]

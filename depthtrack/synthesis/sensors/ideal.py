@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import PRESETS, Camera
+from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import normal_noise
 

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.camera import PRESETS, Camera
+from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow

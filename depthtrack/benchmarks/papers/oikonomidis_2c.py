@@ -1,0 +1,59 @@
+"""Fig. 2c of Oikonomidis et al. 2011: the error against noise in depth and in the skin's labels."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.evaluation.sweep.rows import Cell, Row
+
+NOISE_MM, QUICK_NOISE_MM = (0.0, 10.0, 20.0, 40.0, 80.0), (0.0, 20.0, 80.0)
+"""Standard deviation of the depth; the paper's text gives none, but says that it was very heavy."""
+FLIPS_PERCENT, QUICK_FLIPS_PERCENT = (0.0, 10.0, 20.0, 30.0, 40.0), (0.0, 40.0)
+"""Pixels whose skin label is wrong."""
+PAPER_MM = (5.0, 25.0)
+"""Read from the text: the error stays in this range."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    noise = QUICK_NOISE_MM if options.quick else NOISE_MM
+    flips = QUICK_FLIPS_PERCENT if options.quick else FLIPS_PERCENT
+    return following.cells(options, ({"depth_noise_mm": n, "skin_flips_percent": f} for f in flips for n in noise))
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    return following.tabulate(rows, ("skin_flips_percent", "depth_noise_mm"))
+
+
+def compare(rows: Sequence[Row]) -> list[Comparison]:
+    errors = [line["error_mm"] for line in tabulate(rows)]
+    return [
+        Comparison(
+            "error without noise", "5 mm", following.median_error(rows, depth_noise_mm=0, skin_flips_percent=0), "mm"
+        ),
+        Comparison("largest error, of all levels of noise", "25 mm", max(errors), "mm"),
+    ]
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    table = tabulate(rows)
+    axes.axhspan(*PAPER_MM, color="0.92", zorder=0, label="paper's range, read from its text")
+    for flips in sorted({line["skin_flips_percent"] for line in table}):
+        lines = [line for line in table if line["skin_flips_percent"] == flips]
+        noise = [line["depth_noise_mm"] for line in lines]
+        axes.plot(noise, [line["error_mm"] for line in lines], marker="o", label=f"ours, {flips:g} % of labels flipped")
+    axes.set(xlabel="depth noise, standard deviation (mm)", ylabel="error $M_d$ (mm)", ylim=(0, None))
+    axes.legend()
+
+
+EXPERIMENT = Experiment(
+    "oikonomidis-2c",
+    "Error against noise in depth and skin labels",
+    f"{following.OIKONOMIDIS_2011}, Fig. 2c",
+    cells,
+    following.follow,
+    tabulate,
+    compare,
+    draw,
+)

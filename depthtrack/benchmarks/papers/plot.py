@@ -1,0 +1,84 @@
+"""The picture of an experiment: ours as its module draws it, and below, the paper's text beside our figures."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment
+from depthtrack.evaluation.sweep.rows import Row
+
+_STYLE: dict[Any, Any] = {
+    "font.size": 9,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "0.9",
+    "legend.frameon": False,
+    "lines.linewidth": 1.6,
+    "lines.markersize": 4.5,
+    # Told apart by most eyes (Okabe and Ito 2008), in an order that also reads in grey.
+    "axes.prop_cycle": "cycler('color', ['#0072B2', '#E69F00', '#009E73', '#D55E00', '#CC79A7', '#56B4E9'])",
+}
+_INCHES = (7.2, 4.2)
+_LINE = 0.2
+"""Inches that a line of text takes below the axes."""
+
+
+def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[Comparison], note: str) -> bytes:
+    """The picture as a PNG file; `note` says how the rows came to be."""
+    below = [_head(), *map(_line, comparisons), ("", "", ""), (note, "", "")]
+    height = _INCHES[1] + _LINE * (len(below) + 1)
+    with rc_context(_STYLE):
+        figure = Figure((_INCHES[0], height), dpi=150)
+        axes = figure.add_axes((0.09, 1 - (_INCHES[1] - 0.55) / height, 0.88, (_INCHES[1] - 1.0) / height))
+        experiment.draw(axes, rows)
+        axes.set_title(f"{experiment.title}\n", loc="left", fontweight="bold")
+        axes.text(0, 1.02, experiment.source, transform=axes.transAxes, color="0.4")
+        for number, cells in enumerate(below, start=1):
+            y = (_LINE * (len(below) - number) + 0.12) / height
+            for x, text in zip((0.09, 0.56, 0.86), cells, strict=True):
+                figure.text(x, y, text, color="0.4" if number in (1, len(below)) else "0.1")
+        picture = BytesIO()
+        figure.savefig(picture, format="png")
+    return picture.getvalue()
+
+
+def mark(axes: Axes, x: float, text: str) -> None:
+    """A vertical line at `x`, with a word on what the paper says of it."""
+    axes.axvline(x, color="0.5", linestyle=":")
+    axes.text(x, 0.98, f" {text}".replace("\n", "\n "), va="top", color="0.35", transform=axes.get_xaxis_transform())
+
+
+def _head() -> tuple[str, str, str]:
+    return "", "paper, in its text", "ours"
+
+
+def _line(comparison: Comparison) -> tuple[str, str, str]:
+    return comparison.what, comparison.paper, comparison.ours_text
+
+
+def error_and_time(
+    axes: Axes, x: Sequence[float], rows: Sequence[Row], at: float, paper_deg: float, paper_ms: float
+) -> None:
+    """Mean joint angle error over `x` on the left axis, milliseconds of the median frame on the right one.
+
+    In the paper, the error is less than `paper_deg` at x = `at`, and the time about `paper_ms`.
+    """
+    box = axes.get_position()
+    axes.set_position((box.x0, box.y0, 0.945 * box.width, box.height))
+    clock = axes.twinx()
+    axes.plot(x, [row["error_deg"] for row in rows], marker="o", label="ours: error, left")
+    clock.plot(x, [row["ms_per_frame"] for row in rows], marker="s", color="C1", label="ours: time on one core, right")
+    axes.plot([at - 0.4, at + 0.4], [paper_deg] * 2, color="C0", linestyle="--", label="paper: error, less than this")
+    clock.plot(at, paper_ms, "D", color="C1", mec="black", ms=6, label="paper: time on eight threads")
+    axes.set(ylabel="joint angle error (deg)", ylim=(0, 1.4 * axes.get_ylim()[1]))
+    clock.set(ylabel="time of a frame (ms)", ylim=(0, 1.2 * clock.get_ylim()[1]))
+    clock.grid(visible=False)
+    clock.spines["right"].set_visible(True)
+    handles = [handle for each in (axes, clock) for handle in each.get_legend_handles_labels()[0]]
+    clock.legend(handles=handles, loc="upper right")

@@ -1,0 +1,94 @@
+"""Fig. 10 of Schroeder et al. 2014 and its text: grasps whose fingers the back of the hand hides."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from depthtrack.benchmarks.papers import schroeder
+from depthtrack.benchmarks.papers import synergy_sources as bases
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.evaluation.sweep.rows import Cell, Row
+
+MOTION, OTHER_GRASPS = "grasp", "other-grasps"
+SHARE, LARGER_SHARE = 0.99, 0.998
+"""As many synergies are taken as cover this share of their variance, the paper's; and, alone, a few more of them."""
+FRAME_RATE = 30
+PAPER_DEG = {"all angles": 12.0, "synergies alone": 4.0}
+"""Read from the text; which grasps its synergies are of, the tracked ones or others, it does not tell."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    """All angles; synergies of other grasps, and of these, alone and (not in the paper) as what angles are drawn to."""
+    ways = (False,) if options.variant == "paper" else (False, True)
+    spaces: list[Cell] = [{}]
+    for name in dict.fromkeys([bases.chosen(options.synergies, OTHER_GRASPS), MOTION]):
+        synergies = bases.basis(name).synergies
+        count, larger = synergies.components_for(SHARE), synergies.components_for(LARGER_SHARE)
+        spaces += [{"synergies": name, "components": count, "soft": soft} for soft in ways]
+        if larger > count:
+            spaces.append({"synergies": name, "components": larger, "soft": False})
+    return schroeder.cells(options, ({"motion": MOTION} | space for space in spaces))
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    return schroeder.tabulate(rows, ("synergies", "components", "soft"))
+
+
+def compare(rows: Sequence[Row]) -> list[Comparison]:
+    other = next((row["synergies"] for row in rows if row["synergies"] not in (None, MOTION)), MOTION)
+    most = max((row["components"] for row in rows if row["synergies"] == other), default=0)
+
+    def ours(name: str, synergies: str | None = other, soft: bool = False) -> float | None:
+        return schroeder.value(rows, name, synergies=synergies, soft=soft)
+
+    hertz = [schroeder.ratio(1000, ours("ms_per_frame", synergies)) for synergies in (None, other)]
+    return [
+        Comparison("joint angle error, all angles", "about 12 deg", ours("error_deg", None), "deg"),
+        Comparison("synergies of other grasps alone", "about 4 deg", ours("error_deg"), "deg"),
+        Comparison(
+            f"{most} synergies of other grasps alone ({100 * LARGER_SHARE:g} %)",
+            "not told",
+            schroeder.value(rows, "error_deg", synergies=other, soft=False, components=most),
+            "deg",
+        ),
+        Comparison("synergies of these grasps alone", "about 4 deg", ours("error_deg", MOTION), "deg"),
+        Comparison("all angles, drawn to synergies of other grasps", "not told", ours("error_deg", soft=True), "deg"),
+        Comparison("synergies for 99 % of other grasps' variance", "5", ours("components"), "of them"),
+        Comparison("endpoint error, all angles", "not told", ours("error_mm", None), "mm"),
+        Comparison("endpoint error, synergies of other grasps alone", "not told", ours("error_mm"), "mm"),
+        Comparison("frames a second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
+        Comparison("frames a second, synergies alone", "30 (8 threads)", hertz[1], "Hz"),
+    ]
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    drawn = set[tuple[object, bool]]()
+    for row in rows:
+        # Of other grasps' synergies, only as many as in the paper: they come first.
+        if row["synergies"] == MOTION or (row["synergies"], row["soft"]) in drawn:
+            continue
+        drawn.add((row["synergies"], row["soft"]))
+        soft, kind = row["soft"], "all angles" if row["synergies"] is None else "synergies alone"
+        colour, label = ("C2", "all angles, drawn to synergies") if soft else (_COLOURS[kind], kind)
+        seconds = np.arange(len(row["frame_errors_deg"])) / FRAME_RATE
+        axes.plot(seconds, row["frame_errors_deg"], color=colour, label=f"ours, {label}")
+        if not soft:
+            axes.axhline(PAPER_DEG[kind], color=colour, linestyle="--", lw=1, label=f"paper, mean, {kind}")
+    axes.set(xlabel="time into the motion (s)", ylabel="joint angle error (deg)")
+    axes.set(ylim=(0, 1.25 * axes.get_ylim()[1]))
+    axes.legend(ncols=2, loc="upper left")
+
+
+_COLOURS = {"all angles": "C1", "synergies alone": "C0"}
+
+EXPERIMENT = Experiment(
+    "schroeder-10",
+    "Grasps with hidden fingers: all angles, and synergies",
+    f"{schroeder.SCHROEDER_2014}, Fig. 10",
+    cells,
+    schroeder.follow,
+    tabulate,
+    compare,
+    draw,
+)

@@ -1,0 +1,135 @@
+"""Fig. 7 of Schroeder et al. 2014 and Sec. VI-A: what is left of postures in so many principal components."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from depthtrack.benchmarks.papers import synergy_sources as bases
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.schroeder import SCHROEDER_2014, value
+from depthtrack.evaluation.metrics import angle_error, endpoint_error
+from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.shape import HandShape
+
+Array = NDArray[np.float64]
+
+COUNTS, QUICK_COUNTS = tuple(range(1, 21)), (1, 2, 3, 4, 6, 8, 10, 12, 16, 20)
+SETS = (("signs", "signs"), ("leap", "signs"), ("leap-grasps", "grasp"))
+"""Synergies, and the motion whose postures they are to approximate: the motion's own, as in the paper, and those of
+other hands."""
+PAPER_SHARES: dict[str, dict[int, str]] = {
+    "signs": {},
+    "leap": {3: "about 80 %", 6: "about 90 %"},
+    "leap-grasps": {2: "about 83 %", 3: "90 %"},
+}
+"""Share of the variance in so many components, read from the text of Sec. VI-A: of all its motions, and of grasps."""
+EITHER = {2: "about 83 % of grasps", 3: "about 80 %, 90 % of grasps", 6: "about 90 %"}
+"""The same, for synergies of who knows what."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    sets: list[tuple[str, str | None]] = [*SETS]
+    if options.synergies is not None:
+        name = bases.chosen(options.synergies, "")
+        sets = [(name, "signs" if bases.basis(name).postures is None else None)]
+    return [
+        {"synergies": name, "postures": motion, "components": n}
+        for name, motion in sets
+        for n in (QUICK_COUNTS if options.quick else COUNTS)
+        if n <= len(bases.basis(name).synergies)
+    ]
+
+
+def measure(*, synergies: str, postures: str | None, components: int) -> Row:
+    """Approximate every posture of a motion, or of the set that the synergies were fitted to, by the first components.
+
+    The posture that is least like their mean stands for the paper's particular one. Errors as in `schroeder.follow`,
+    the hand as a whole being where it is.
+    """
+    found = bases.basis(synergies)
+    true = found.postures if postures is None else bases.motion_postures(postures)
+    assert true is not None
+    reduced = found.synergies.truncated(components)
+    hand = HandModel(HandShape())
+    poses, true_poses = (_still(angles) for angles in (reduced.angles(reduced.project(true)), true))
+    degrees = angle_error(poses, true_poses).values
+    particular = int(np.argmax(np.abs(true - true.mean(axis=0)).sum(axis=1)))
+    return {
+        "particular_deg": float(degrees[particular]),
+        "error_deg": float(degrees.mean()),
+        "p95_deg": float(np.percentile(degrees, 95)),
+        "error_mm": float(endpoint_error(hand, poses, hand, true_poses).values.mean()),
+        "variance_percent": 100 * found.synergies.variance_share(components),
+    }
+
+
+def _still(angles: Array) -> Array:
+    """Poses (N, 27) of a hand with finger angles (N, 20) that stays where it is."""
+    return make_pose(np.zeros((len(angles), 3)), np.tile([1.0, 0, 0, 0], (len(angles), 1)), angles)
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    names = ("synergies", "postures", "components", "variance_percent", "particular_deg", "error_deg", "p95_deg")
+    return [{name: row[name] for name in (*names, "error_mm")} for row in rows]
+
+
+def compare(rows: Sequence[Row]) -> list[Comparison]:
+    shares = [
+        Comparison(
+            f"variance in the first {count} of {bases.label(name)}",
+            paper,
+            value(rows, "variance_percent", synergies=name, components=count),
+            "%",
+        )
+        for name in _names(rows)
+        for count, paper in PAPER_SHARES.get(name, EITHER).items()
+    ]
+    errors = [
+        Comparison(
+            f"mean error of {_postures(rows, name)}, 6 of {bases.label(name)}",
+            "not told",
+            value(rows, "error_deg", synergies=name, components=6),
+            "deg",
+        )
+        for name in _names(rows)
+    ]
+    return [*shares, *errors]
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    for number, name in enumerate(_names(rows)):
+        mine = [row for row in rows if row["synergies"] == name]
+        counts, colour = [row["components"] for row in mine], f"C{number}"
+        label = f"{_postures(rows, name)}, by components of {bases.label(name)}"
+        axes.plot(counts, [row["particular_deg"] for row in mine], marker="o", color=colour, label=label)
+        axes.plot(counts, [row["error_deg"] for row in mine], linestyle="--", color=colour)
+    axes.plot([], [], linestyle="--", color="0.3", label="mean of all postures")
+    axes.set(xlabel="principal components", ylabel="joint angle error (deg)", ylim=(0, None), xlim=(0.5, 20.5))
+    axes.set_xticks(COUNTS)
+    axes.legend(title="the posture least like the others", alignment="left")
+
+
+def _names(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["synergies"] for row in rows))
+
+
+def _postures(rows: Sequence[Row], name: str) -> str:
+    """What the synergies of this name are to approximate."""
+    motion = next(row["postures"] for row in rows if row["synergies"] == name)
+    return "its postures" if motion is None else str(motion)
+
+
+EXPERIMENT = Experiment(
+    "schroeder-7",
+    "Approximation of postures by principal components",
+    f"{SCHROEDER_2014}, Fig. 7",
+    cells,
+    measure,
+    tabulate,
+    compare,
+    draw,
+)

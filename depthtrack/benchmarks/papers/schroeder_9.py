@@ -1,0 +1,71 @@
+"""Fig. 9 of Schroeder et al. 2014: error and time against the subsampling of the point cloud."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from depthtrack.benchmarks.papers import schroeder
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.plot import error_and_time
+from depthtrack.evaluation.sweep.rows import Cell, Row
+
+SUBSAMPLINGS, QUICK_SUBSAMPLINGS = tuple(range(1, 11)), (1, 3, 5, 7, 10)
+"""Every so many-th point is used."""
+RETAINED = 3
+"""Of all further experiments in the paper."""
+PAPER_DEG, PAPER_MS = 2.0, 40.0
+"""Read from the text: less than 2 degrees (on Fig. 8, the same setting); about 40 ms on all cores of an eight-core
+Xeon."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    subsamplings = QUICK_SUBSAMPLINGS if options.quick else SUBSAMPLINGS
+    return schroeder.cells(options, ({"subsampling": n} for n in subsamplings))
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    return schroeder.tabulate(rows, ("subsampling",))
+
+
+def compare(rows: Sequence[Row]) -> list[Comparison]:
+    time = schroeder.value(rows, "ms_per_frame", subsampling=RETAINED)
+    return [
+        Comparison(
+            "joint angle error with a third of the points",
+            "under 2 deg (its Fig. 8)",
+            schroeder.value(rows, "error_deg", subsampling=RETAINED),
+            "deg",
+        ),
+        Comparison(
+            "the same with a tenth of the points",
+            "not told",
+            schroeder.value(rows, "error_deg", subsampling=SUBSAMPLINGS[-1]),
+            "deg",
+        ),
+        Comparison(
+            "endpoint error with a third of the points",
+            "not told",
+            schroeder.value(rows, "error_mm", subsampling=RETAINED),
+            "mm",
+        ),
+        Comparison("time of a frame at a third (ours: one core)", "about 40 ms (8 threads)", time, "ms"),
+        Comparison("frames a second at a third", "about 25", schroeder.ratio(1000, time), "Hz"),
+    ]
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    error_and_time(axes, [row["subsampling"] for row in rows], rows, RETAINED, PAPER_DEG, PAPER_MS)
+    axes.set(xlabel="share of the points")
+    axes.set_xticks(SUBSAMPLINGS, [f"1/{n}" for n in SUBSAMPLINGS])
+
+
+EXPERIMENT = Experiment(
+    "schroeder-9",
+    "Error and time against subsampling",
+    f"{schroeder.SCHROEDER_2014}, Fig. 9",
+    cells,
+    schroeder.follow,
+    tabulate,
+    compare,
+    draw,
+)

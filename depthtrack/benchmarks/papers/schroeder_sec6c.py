@@ -1,0 +1,114 @@
+"""Sec. VI-C of Schroeder et al. 2014: cylinders in place of the mesh, for all angles and for few synergies."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from depthtrack.benchmarks.papers import schroeder
+from depthtrack.benchmarks.papers import synergy_sources as bases
+from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.evaluation.sweep.rows import Cell, Row
+
+MODELS = ("skin", "cylinders")
+WORDS = {"skin": "mesh", "cylinders": "cylinders"}
+COMPONENTS, QUICK_COMPONENTS = (3, 6, 9, 12, 15, 18), (6, 12)
+REDUCED = 6
+"""The paper's (6 + 6) degrees of freedom."""
+PAPER_DEG = {"skin": 2.0, "cylinders": 4.0}
+"""Read from the text: all degrees of freedom."""
+BASES = (schroeder.USUAL["motion"], "leap")
+"""The paper's synergies and motions come from the same recordings: so do the motion's own; and those of other hands."""
+ALL_ANGLES = 21
+"""Where all angles stand on the plot's axis of synergies."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    names = [bases.chosen(options.synergies, name) for name in BASES]
+    spaces: list[Cell] = [{}]
+    for name in dict.fromkeys(names):
+        known = len(bases.basis(name).synergies)
+        counts = QUICK_COMPONENTS if options.quick else COMPONENTS
+        spaces += [{"synergies": name, "components": n} for n in counts if n <= known]
+    return schroeder.cells(options, ({"model": model} | space for space in spaces for model in MODELS))
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    return schroeder.tabulate(rows, ("model", "synergies", "components"))
+
+
+def compare(rows: Sequence[Row]) -> list[Comparison]:
+    skin, cylinders = (schroeder.value(rows, "error_deg", model=model, components=None) for model in MODELS)
+    skin_mm, cylinders_mm = (schroeder.value(rows, "error_mm", model=model, components=None) for model in MODELS)
+    lines = [
+        Comparison("joint angle error, all angles, mesh", "about 2 deg", skin, "deg"),
+        Comparison("joint angle error, all angles, cylinders", "about 4 deg", cylinders, "deg"),
+        Comparison("endpoint error, all angles, mesh", "not told", skin_mm, "mm"),
+        Comparison("endpoint error, all angles, cylinders", "not told", cylinders_mm, "mm"),
+    ]
+    for name in _names(rows):
+        skin, cylinders = (
+            schroeder.value(rows, "error_deg", model=model, synergies=name, components=REDUCED) for model in MODELS
+        )
+        lines += [
+            Comparison(f"6 + 6, synergies {_label(name)}, mesh", "not told", skin, "deg"),
+            Comparison(f"6 + 6, synergies {_label(name)}, cylinders", "virtually as mesh", cylinders, "deg"),
+        ]
+    full, few = (_hertz(rows, n) for n in (None, REDUCED))
+    return [
+        *lines,
+        Comparison("frames a second, all angles (ours: mesh, one core)", "25 (8 threads)", full, "Hz"),
+        Comparison("frames a second, 6 + 6", "30 (8 threads)", few, "Hz"),
+    ]
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    for model, colour in zip(MODELS, ("C0", "C1"), strict=True):
+        for name, line in zip(_names(rows), ("-", ":"), strict=False):
+            reduced = [row for row in rows if row["model"] == model and row["synergies"] == name]
+            axes.plot(
+                [row["components"] for row in reduced],
+                [row["error_deg"] for row in reduced],
+                line,
+                marker="o",
+                color=colour,
+                label=f"ours, {WORDS[model]}, synergies {_label(name)}",
+            )
+        full = schroeder.value(rows, "error_deg", model=model, components=None)
+        if full is not None:
+            axes.plot(ALL_ANGLES - 0.3, full, "s", color=colour, label=f"ours, {WORDS[model]}, all angles")
+        paper: dict[str, Any] = {
+            "mec": colour,
+            "mfc": "black",
+            "mew": 1.5,
+            "label": f"paper, {WORDS[model]}, all angles",
+        }
+        axes.plot(ALL_ANGLES + 0.3, PAPER_DEG[model], "D", **paper)
+    axes.set(xlabel="synergies solved for, besides the 6 of the global pose", ylabel="joint angle error (deg)")
+    axes.set(ylim=(0, 1.5 * axes.get_ylim()[1]), xlim=(0, ALL_ANGLES + 1))
+    axes.set_xticks([*COMPONENTS, ALL_ANGLES], [*map(str, COMPONENTS), "all angles"])
+    axes.legend(ncols=2, loc="upper right")
+
+
+def _names(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["synergies"] for row in rows if row["synergies"] is not None))
+
+
+def _label(name: str) -> str:
+    return "of this motion" if name == schroeder.USUAL["motion"] else f"'{bases.label(name)}'"
+
+
+def _hertz(rows: Sequence[Row], components: int | None) -> float | None:
+    return schroeder.ratio(1000, schroeder.value(rows, "ms_per_frame", model="skin", components=components))
+
+
+EXPERIMENT = Experiment(
+    "schroeder-sec6c",
+    "Cylinders in place of the mesh",
+    f"{schroeder.SCHROEDER_2014}, Sec. VI-C",
+    cells,
+    schroeder.follow,
+    tabulate,
+    compare,
+    draw,
+)

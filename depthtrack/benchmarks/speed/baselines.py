@@ -1,0 +1,179 @@
+"""What a user would score hypotheses with instead: ready renderers and ray casters, on a mesh of the same hand.
+
+Each draws one hypothesis at a time, as their interfaces have it, and hands its depth map to the same objective.
+"""
+
+import os
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.benchmarks.speed.tessellation import Tessellation
+from depthtrack.errors import DepthtrackError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import Objective, Terms, evaluate
+from depthtrack.rendering.scorer import ScorerBase, as_batch
+from depthtrack.rendering.target import Target
+
+Array = NDArray[np.float64]
+INSTALL = {
+    "pyrender": "pip install pyrender && pip install --upgrade PyOpenGL",  # it pins a PyOpenGL too old for numpy 2
+    "open3d": "pip install open3d",
+    "embree": "pip install 'depthtrack[witness]'",
+}
+"""Libraries compared with, and the line that brings each."""
+
+
+class RivalMissingError(DepthtrackError):
+    """A library to compare with is not installed, or cannot be loaded; the message names the line that brings it."""
+
+
+class Rival(ScorerBase):
+    """A scorer that draws a mesh of the 37 primitives with someone else's library. Raises RivalMissingError."""
+
+    name: str
+
+    def __init__(self, shape: HandShape, objective: Objective | None = None) -> None:
+        self._model, self._objective = HandModel(shape), objective or Objective()
+        self._mesh = Tessellation.of(Primitives.of(shape))
+        try:
+            self._load()
+        except ModuleNotFoundError as error:
+            raise RivalMissingError(f"not installed: run  {INSTALL[self.name]}") from error
+        except (ImportError, AttributeError, OSError) as error:
+            raise RivalMissingError(f"installed, but it cannot be loaded: {error}") from error
+
+    def observe(self, target: Target) -> None:
+        self._target = target
+        self._prepare(target.camera)
+
+    def score(self, poses: ArrayLike) -> Array:
+        return self.terms(poses).energy
+
+    def terms(self, poses: ArrayLike) -> Terms:
+        batch, target = as_batch(poses), self.target
+        sums = [
+            evaluate(self._objective, target.skin, target.depth, self._depth(transforms))
+            for transforms in self._model.transforms(batch)
+        ]
+        clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
+        return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
+
+    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+        batch = as_batch(np.asarray(pose)[None])
+        return self._depth(self._model.transforms(batch[0])).astype(np.float32, copy=False)
+
+    @abstractmethod
+    def _load(self) -> None:
+        """Import the library, and set up what does not depend on the observation."""
+
+    @abstractmethod
+    def _prepare(self, camera: Camera) -> None:
+        """Set up what depends on the camera alone."""
+
+    @abstractmethod
+    def _depth(self, transforms: Array) -> NDArray[np.floating]:
+        """Depth (h, w) in metres for T_camera_body (16, 4, 4), 0 where nothing is hit."""
+
+
+class PyrenderScorer(Rival):
+    """pyrender on EGL: one rigid mesh a body, its depth pass alone."""
+
+    name = "pyrender"
+
+    def _load(self) -> None:
+        # Read once, when OpenGL is first imported; only a process of its own may do that.
+        os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+        import pyrender
+        from trimesh import Trimesh
+
+        self._pyrender: Any = pyrender
+        self._scene: Any = pyrender.Scene()
+        self._nodes = []
+        for body in range(int(self._mesh.bodies.max()) + 1):
+            faces = self._mesh.faces[self._mesh.bodies[self._mesh.faces[:, 0]] == body]
+            mesh = Trimesh(self._mesh.vertices, faces, process=False)
+            mesh.remove_unreferenced_vertices()
+            self._nodes.append(self._scene.add(pyrender.Mesh.from_trimesh(mesh)))
+        self._eye: Any = None
+        self._renderer: Any = None
+
+    def _prepare(self, camera: Camera) -> None:
+        if self._eye is not None:
+            self._scene.remove_node(self._eye)
+        # OpenGL's camera looks along -z with y up, and counts pixels from their corners.
+        intrinsics = self._pyrender.IntrinsicsCamera(camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5, 0.01, 10.0)
+        self._eye = self._scene.add(intrinsics, pose=np.diag([1.0, -1.0, -1.0, 1.0]))
+        if self._renderer is None:
+            self._renderer = self._pyrender.OffscreenRenderer(camera.width, camera.height)
+        self._renderer.viewport_width, self._renderer.viewport_height = camera.width, camera.height
+
+    def _depth(self, transforms: Array) -> NDArray[np.floating]:
+        for node, T in zip(self._nodes, transforms, strict=True):
+            self._scene.set_pose(node, T)
+        depth: NDArray[np.float32] = self._renderer.render(self._scene, self._pyrender.RenderFlags.DEPTH_ONLY)
+        return depth
+
+    def close(self) -> None:
+        if self._renderer is not None:
+            self._renderer.delete()
+
+
+class RayCaster(Rival):
+    """Casts a ray through every pixel; (dx, dy, 1) makes the distance along it the depth."""
+
+    def _prepare(self, camera: Camera) -> None:
+        v, u = np.mgrid[: camera.height, : camera.width]
+        self._rays = camera.unproject(np.stack([u, v], axis=-1), np.ones(camera.shape)).astype(np.float32)
+        self._flat = np.ascontiguousarray(self._rays.reshape(-1, 3))
+
+
+class Open3DScorer(RayCaster):
+    """Open3D's RaycastingScene, built anew for every hypothesis: its geometry cannot be moved."""
+
+    name = "open3d"
+
+    def _load(self) -> None:
+        import open3d
+
+        self._core: Any = open3d.core
+        self._new_scene: Any = open3d.t.geometry.RaycastingScene
+        self._faces: Any = self._core.Tensor(self._mesh.faces.astype(np.uint32))
+
+    def _prepare(self, camera: Camera) -> None:
+        super()._prepare(camera)
+        self._tensor: Any = self._core.Tensor(np.concatenate([np.zeros_like(self._rays), self._rays], axis=-1))
+
+    def _depth(self, transforms: Array) -> NDArray[np.floating]:
+        scene = self._new_scene()
+        scene.add_triangles(self._core.Tensor(self._mesh.posed(transforms).astype(np.float32)), self._faces)
+        distance: NDArray[np.float32] = scene.cast_rays(self._tensor)["t_hit"].numpy()
+        return np.where(np.isfinite(distance), distance, 0)
+
+
+class EmbreeScorer(RayCaster):
+    """Embree through trimesh's binding `embreex`, at its lower level: trimesh's own calls take twice as long."""
+
+    name = "embree"
+
+    def _load(self) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self._new_scene: Any = EmbreeScene
+        self._add_triangles: Any = TriangleMesh
+        self._faces = self._mesh.faces.astype(np.int32)
+
+    def _depth(self, transforms: Array) -> NDArray[np.floating]:
+        scene = self._new_scene()
+        self._add_triangles(scene, self._mesh.posed(transforms).astype(np.float32), self._faces)
+        distance: NDArray[np.float32] = scene.run(np.zeros_like(self._flat), self._flat, query="DISTANCE")
+        return np.where(distance < 1e30, distance, 0).reshape(self._rays.shape[:2])
+
+
+RIVALS: dict[str, type[Rival]] = {rival.name: rival for rival in (PyrenderScorer, Open3DScorer, EmbreeScorer)}

@@ -1,0 +1,82 @@
+"""What every scorer is timed on: swarms of hypotheses around frames of the `everyday` motion, half a metre away."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.geometry.camera import PRESETS
+from depthtrack.hand.limits import within_limits
+from depthtrack.hand.pose import TANGENT_SIZE, retract
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.rendering.target import Target
+from depthtrack.synthesis.motion import load_motion
+from depthtrack.synthesis.viewpoint import Viewpoint
+
+Array = NDArray[np.float64]
+Roi = Literal["native", "96", "64"]
+ROIS: tuple[Roi, ...] = ("native", "96", "64")
+"""Regions of interest: the sensor's own pixels, or reduced to so many a side."""
+
+HYPOTHESES = 64
+FRAME_TIMES = (1.0, 4.5, 8.0, 11.0)
+"""Seconds into the motion: from the open hand to the closed one."""
+DISTANCE = 0.5
+MARGIN = 1 / 7
+"""Of the hand's longer side in the image, added to make the window: room for it to move until the next frame."""
+CHECKED = 8
+"""Hypotheses of a frame that the oracle scores too."""
+
+# Standard deviations of a swarm about half-way: metres, radians, radians.
+_SPREAD = np.repeat([0.01, 0.1, 0.2], [3, 3, TANGENT_SIZE - 6])
+
+
+@dataclass(frozen=True)
+class Workload:
+    """Observations at one resolution, and for each the hypotheses to score against it.
+
+    `poses` (frames, HYPOTHESES, 27) camera frame; `expected` (frames, CHECKED) the oracle's energies of the first.
+    """
+
+    roi: Roi
+    shape: HandShape
+    targets: tuple[Target, ...]
+    poses: Array
+    expected: Array
+
+
+def make_workloads(rois: Iterable[Roi] = ROIS, seed: int = 0) -> list[Workload]:
+    """The benchmark's workloads: ideal observations of frames of the motion, seen by a Kinect; the same every time."""
+    shape, oracle = HandShape(), OracleScorer(HandShape())
+    truth = Viewpoint(distance=DISTANCE).see(load_motion("everyday").poses(np.array(FRAME_TIMES), seed))
+    random = np.random.Generator(np.random.Philox(key=seed))
+    steps = random.normal(size=(len(truth), HYPOTHESES, TANGENT_SIZE)) * _SPREAD
+    poses = within_limits(retract(truth[:, None], steps))
+    windows = _windows(oracle, truth)
+    return [_workload(roi, shape, oracle, windows, poses) for roi in rois]
+
+
+def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, windows: list[Target], poses: Array) -> Workload:
+    targets = windows if roi == "native" else [window.reduced(int(roi)) for window in windows]
+    expected = []
+    for target, swarm in zip(targets, poses, strict=True):
+        oracle.observe(target)
+        expected.append(oracle.score(swarm[:CHECKED]))
+    return Workload(roi, shape, tuple(targets), poses, np.stack(expected))
+
+
+def _windows(oracle: OracleScorer, truth: Array) -> list[Target]:
+    """Square windows on the hand at full resolution, all of one size: the largest hand's, with a margin."""
+    camera = PRESETS["kinect1"]
+    oracle.observe(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    depths = [oracle.render(pose) for pose in truth]
+    extents = np.array([[(hit.min(), hit.max() + 1) for hit in np.nonzero(depth)] for depth in depths])
+    side = round(float(np.diff(extents, axis=-1).max()) * (1 + MARGIN))
+    corners = np.rint(extents.mean(axis=-1) - side / 2).astype(int)
+    return [
+        Target(camera, depth > 0, depth).window(int(left), int(top), side, side)
+        for depth, (top, left) in zip(depths, corners, strict=True)
+    ]

@@ -1,0 +1,185 @@
+"""What one view says of a pose and of the sizes: the distances between hand and observation, linearised.
+
+Observed points are drawn to the nearest skin that the camera sees, along normals. The outline of the seen skin is drawn
+to that of the observed silhouette, from either side: skin beside the observed hand inwards (as by Tagliasacchi et al.,
+"Robust articulated-ICP for real-time hand tracking", SGP 2015, Sec. 4), skin that leaves it bare outwards. The first
+alone would let a hand be too small, and depth alone sees neither how broad nor how long a finger is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_edt
+from scipy.spatial import cKDTree
+
+from depthtrack.calibration.parameters import COUNT, motion_of
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel, body_of
+from depthtrack.hand.pose import TANGENT_SIZE
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.segmentation.observation import Observation
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_POINTS = 1200
+"""Points of a view that are used, about."""
+_REACH, _AGREEMENT = 0.04, 0.3
+"""Metres, and the cosine between normals, within which a point can be matched."""
+_WRIST_ROOM = 0.012
+"""Metres from the wrist within which nothing is asked of the hand: where it was cut off is not sure."""
+PATCH = 0.010
+"""Metres: errors of sensor and model are alike within a patch of this side, which counts as one measurement."""
+
+
+class View:
+    """One frame's observation, prepared for many fits."""
+
+    def __init__(self, observation: Observation) -> None:
+        self.observation = observation
+        every = max(1, round(len(observation.points) / _POINTS))
+        pick = slice(every // 2, None, every)
+        self.points, self.normals = observation.points[pick], observation.normals[pick]
+        self.beyond = _beyond(observation.skin)
+        """(h, w) pixels by which each lies outside the silhouette, negative inside."""
+        slope = np.stack([np.gradient(self.beyond, axis=axis) for axis in (0, 1)])
+        self.outward = slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-9)
+        """(2, h, w) unit, by row and column: away from the silhouette."""
+        pixel = float(observation.centre[2]) / observation.camera.fx
+        self.patches = max(1.0, np.count_nonzero(observation.depth) * pixel**2 / PATCH**2)
+        """Independent measurements that the view amounts to."""
+
+
+class SkinModel:
+    """The skin of a hand of some sizes, as cameras see it.
+
+    While sizes are sought, it is the average hand's skin stretched along and across its bones, which takes no time;
+    `exact` makes the skin of those very sizes, and raises InputError where it does not hold together.
+    """
+
+    def __init__(self, shape: HandShape, exact: bool = False) -> None:
+        average = HandShape(side=shape.side)
+        self.model, self._skin = HandModel(shape), Skin.of(shape if exact else average)
+        self._stretch = np.tile(np.eye(4), (BODY_COUNT, 1, 1)) if exact else _stretches(shape, average)
+        self.wrist = shape.wrist[1] + _WRIST_ROOM
+
+    def seen(self, view: View, pose: Array) -> Surface:
+        """The skin in a pose (27,) through the view's camera."""
+        skin = self._skin
+        vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)
+        return rasterise(view.observation.camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
+
+    def is_hand(self, pose: Array, points: Array) -> NDArray[np.bool_]:
+        """Which points (N, 3) lie before the wrist, towards the fingers."""
+        T = self.model.transforms(pose)[0]
+        return np.asarray((points - T[:3, 3]) @ T[:3, 1] > self.wrist)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Weighted sums over a view's residuals e (m) with gradients a by pose and sizes (26 + 35): `H` of a a^T, `g` of
+    a e; `count` of residuals; `distance` (m), the median of the observed points to the skin."""
+
+    H: Array
+    g: Array
+    count: int
+    distance: float
+
+
+@dataclass(frozen=True)
+class _Residuals:
+    """`errors` (N,) m of skin points `x` (N, 3) on `bodies` (N,) along `directions` (N, 3); each counts by its whole
+    `distance` (N,)."""
+
+    bodies: Index
+    x: Array
+    directions: Array
+    errors: Array
+    distances: Array
+
+
+def gather(view: View, skin: SkinModel, pose: Array, softness: float) -> Evidence:
+    """The evidence of a view for a pose (27,); residuals are weighted as Geman and McClure's estimator does, by 1/4 at
+    a distance of `softness` (m)."""
+    surface = skin.seen(view, pose)
+    row, column = np.nonzero(surface.depth)
+    if len(row) == 0:
+        return Evidence(np.zeros((TANGENT_SIZE + COUNT,) * 2), np.zeros(TANGENT_SIZE + COUNT), 0, np.inf)
+    x = view.observation.camera.unproject(np.stack([column, row], axis=-1), surface.depth[row, column])
+    bodies, normals = surface.label[row, column].astype(np.int64), surface.normal[row, column]
+    places = np.full(surface.depth.shape, -1)
+    places[row, column] = np.arange(len(row))
+    on_surface = _surface_residuals(view, skin, pose, bodies, x, normals)
+    parts = [on_surface, _outline_residuals(view, skin, pose, bodies, x, places)]
+    a = np.concatenate([_gradients(skin.model, pose, part) for part in parts])
+    errors, distances = (np.concatenate([getattr(part, name) for part in parts]) for name in ("errors", "distances"))
+    weights = 1 / (1 + (distances / softness) ** 2) ** 2
+    found = on_surface.distances
+    return Evidence(
+        (a * weights[:, None]).T @ a,
+        a.T @ (weights * errors),
+        len(errors),
+        float(np.median(found)) if len(found) else np.inf,
+    )
+
+
+def _stretches(shape: HandShape, average: HandShape) -> Array:
+    """(16, 4, 4) that bring the average hand's flesh to these sizes, in the frame of the body it is fixed to."""
+    S = np.tile(np.eye(4), (BODY_COUNT, 1, 1))
+    sizes = ("palm_breadth", "palm_length", "palm_thickness")
+    S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(average, size) for size in sizes]
+    longer, wider = shape.lengths / average.lengths, (shape.radii / average.radii).mean(axis=1)
+    for finger in range(5):
+        for phalanx in range(3):
+            factors = wider[finger], longer[finger, phalanx], wider[finger]
+            S[body_of(finger, phalanx), [0, 1, 2], [0, 1, 2]] = factors
+    S[:, :3] *= shape.scale
+    return S
+
+
+def _surface_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, x: Array, normals: Array) -> _Residuals:
+    """From the nearest seen skin to each point, along the mean of both normals (Rusinkiewicz 2019)."""
+    distance, nearest = map(np.asarray, cKDTree(x).query(view.points, distance_upper_bound=_REACH))
+    found = np.flatnonzero(np.isfinite(distance))
+    found = found[skin.is_hand(pose, view.points[found])]
+    found = found[np.sum(normals[nearest[found]] * view.normals[found], axis=1) > _AGREEMENT]
+    k = nearest[found]
+    directions = normals[k] + view.normals[found]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    errors = np.sum(directions * (x[k] - view.points[found]), axis=1)
+    return _Residuals(bodies[k], x[k], directions, errors, distance[found])
+
+
+def _outline_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, x: Array, places: Index) -> _Residuals:
+    """From the outline of the seen skin to that of the silhouette, across both; `places` (h, w) index `x`, -1 for no
+    skin."""
+    inner = binary_erosion(places >= 0, border_value=1)
+    row, column = np.nonzero((places >= 0) & ~inner)
+    k = places[row, column]
+    across = view.outward[:, row, column]
+    # The outline runs along the outer side of its pixels.
+    pixels = view.beyond[row, column] + 0.5
+    kept = skin.is_hand(pose, x[k]) & (np.abs(across).sum(axis=0) > 0)
+    k, pixels, across = k[kept], pixels[kept], across[:, kept]
+    z = x[k, 2]
+    directions = np.stack([across[1], across[0], -(across[1] * x[k, 0] + across[0] * x[k, 1]) / z], axis=-1)
+    errors = pixels * z / view.observation.camera.fx
+    return _Residuals(bodies[k], x[k], directions, errors, np.abs(errors))
+
+
+def _gradients(model: HandModel, pose: Array, residuals: _Residuals) -> Array:
+    """(N, 26 + 35) of the errors, by pose and sizes."""
+    bodies, x, n = residuals.bodies, residuals.x, residuals.directions
+    a = np.empty((len(x), TANGENT_SIZE + COUNT))
+    a[:, :TANGENT_SIZE] = np.einsum("ni,nij->nj", n, model.point_jacobian(pose, bodies, x))
+    a[:, TANGENT_SIZE:] = np.einsum("ni,nij->nj", n, motion_of(model, pose, bodies, x))
+    return a
+
+
+def _beyond(mask: NDArray[np.bool_]) -> Array:
+    """(h, w) how many pixels each lies outside the mask's outline, negative inside."""
+    outside, inside = (np.asarray(distance_transform_edt(part), dtype=np.float64) for part in (~mask, mask))
+    return np.where(mask, 0.5 - inside, outside - 0.5)

@@ -1,0 +1,35 @@
+"""A table that every spreadsheet reads: a line a frame, pose and keypoints; empty cells where there is no pose."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from depthtrack.export.joint_track import JointTrack
+from depthtrack.export.writing import written_aside
+from depthtrack.hand.pose import POSE_NAMES
+from depthtrack.recording.ground_truth import JOINTS_HEADER
+
+HEADER = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES, *JOINTS_HEADER[1:])
+"""Columns: the 27 pose values, then x, y, z of each keypoint, named as in a recording's `joints.csv`."""
+
+
+def write_csv(path: Path, track: JointTrack) -> None:
+    """Write a track; every number comes back bit for bit. Raises InputError."""
+    with written_aside(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(HEADER)
+        for row, index in enumerate(track.index):
+            numbers = [*track.poses[row], *track.keypoints[row].ravel()]
+            table.writerow(
+                [
+                    int(index),
+                    float(track.timestamps[row]),
+                    track.status[row],
+                    *(_cell(x) for x in (track.energy[row], track.confidence[row], *numbers)),
+                ]
+            )
+
+
+def _cell(value: float) -> str:
+    return repr(float(value)) if np.isfinite(value) else ""

@@ -1,0 +1,35 @@
+"""What a run says of the hand, frame by frame, for writing it out."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.run_folder import Run
+
+
+@dataclass(frozen=True)
+class JointTrack:
+    """Poses and keypoints (T rows), NaN where no hand was observed.
+
+    `index` (T,) in the recording, `timestamps` (T,) seconds, `status` (T,) "tracked", "started", "lost" (a pose not to
+    be trusted) or "absent"; `energy`, `confidence` (T,); `poses` (T, 27); `keypoints` (T, 21, 3) metres in the camera
+    frame, MediaPipe's order.
+    """
+
+    index: NDArray[np.int64]
+    timestamps: NDArray[np.float64]
+    status: tuple[str, ...]
+    energy: NDArray[np.float64]
+    confidence: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    keypoints: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, run: Run, hand: HandShape) -> Self:
+        """The track of a run of a hand of these sizes."""
+        keypoints = HandModel(hand).keypoints(run.poses)
+        return cls(run.index, run.timestamps, run.status, run.energy, run.confidence, run.poses, keypoints)

@@ -1,0 +1,40 @@
+"""Arrays for numpy: `numpy.load(file)` without pickles; NaN where there is no pose."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from depthtrack.export.joint_track import JointTrack
+from depthtrack.export.writing import written_aside
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
+from depthtrack.hand.pose import POSE_NAMES
+
+CONVENTIONS = {
+    "length": "m",
+    "angle": "rad",
+    "time": "s",
+    "frame": "camera: x right, y down, z forward",
+    "quaternion": "w x y z, of the palm in the camera frame",
+}
+
+
+def write_npz(path: Path, track: JointTrack) -> None:
+    """Write the arrays of a track under their names, with `pose_names`, `keypoint_names` and `conventions` (JSON).
+
+    Raises InputError.
+    """
+    with written_aside(path) as aside, aside.open("wb") as file:
+        np.savez_compressed(
+            file,
+            index=track.index,
+            timestamps=track.timestamps,
+            status=np.array(track.status, dtype=np.str_),
+            energy=track.energy,
+            confidence=track.confidence,
+            poses=track.poses,
+            keypoints=track.keypoints,
+            pose_names=np.array(POSE_NAMES, dtype=np.str_),
+            keypoint_names=np.array(KEYPOINT_NAMES, dtype=np.str_),
+            conventions=np.array(json.dumps(CONVENTIONS), dtype=np.str_),
+        )

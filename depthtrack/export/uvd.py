@@ -1,0 +1,91 @@
+"""The text format of public predictions and labels: a line a frame, u v d of each joint; pixels and millimetres.
+
+As published for NYU, ICVL and MSRA (see `benchmarks`): numbers between blanks, or commas; a file name may come first.
+A joint that is not known is `nan nan nan`, or has no positive depth.
+"""
+
+import math
+from array import array
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.export.benchmark_joints import Benchmark
+from depthtrack.export.writing import written_aside
+from depthtrack.files import read_lines
+from depthtrack.geometry.camera import Camera
+from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
+
+Array = NDArray[np.float64]
+
+MAX_BYTES = 1 << 28
+"""Largest file read: a hundred times the benchmarks' own."""
+_LARGEST = 1e6
+"""Pixels or millimetres beyond which a number is no coordinate."""
+
+
+def read_uvd(path: Path, benchmark: Benchmark) -> Array:
+    """Joints (T, J, 3) in metres, camera frame (y down), NaN where unknown; in the benchmark's order.
+
+    Raises InputError naming the line that does not have three numbers for each joint.
+    """
+    values, frames = array("d"), 0
+    for number, line in enumerate(read_lines(path, MAX_BYTES), start=1):
+        fields = line.replace(",", " ").split()
+        if not fields:
+            continue
+        values.extend(_numbers(fields, 3 * len(benchmark.joints), f"{path}, line {number}", benchmark))
+        frames += 1
+        if frames > MAX_FRAMES:
+            raise InputError(f"{path} holds more than {MAX_FRAMES:,} frames: split it")
+    if frames == 0:
+        raise InputError(f"{path} holds no frame: expected a line of u v d for each")
+    uvd = np.array(values).reshape(frames, len(benchmark.joints), 3)
+    return _from_uvd(uvd, benchmark.camera)
+
+
+def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
+    """Write joints (T, J, 3) in metres, camera frame (y down), as the benchmark's camera sees them. Raises InputError.
+
+    Unknown joints, and what lies behind the camera, become nan.
+    """
+    with written_aside(path) as aside, aside.open("w", encoding="utf-8") as file:
+        for frame in _to_uvd(joints, benchmark.camera):
+            file.write(" ".join(f"{x:.3f}" for x in frame.ravel()) + "\n")
+
+
+def _from_uvd(uvd: Array, camera: Camera) -> Array:
+    depth = np.where(uvd[..., 2] > 0, uvd[..., 2] / 1000, np.nan)
+    return camera.unproject(uvd[..., :2], depth)
+
+
+def _to_uvd(joints: Array, camera: Camera) -> Array:
+    pixels = camera.project(joints)
+    depth = np.where(np.isfinite(pixels[..., 0]), 1000 * joints[..., 2], np.nan)
+    return np.concatenate([pixels, depth[..., None]], axis=-1)
+
+
+def _numbers(fields: list[str], count: int, where: str, benchmark: Benchmark) -> list[float]:
+    if len(fields) == count + 1 and not _is_number(fields[0]):
+        fields = fields[1:]  # the image's name
+    if len(fields) != count or not all(map(_is_number, fields)):
+        raise InputError(
+            f"{where}: expected {count} numbers, u v d of the {count // 3} joints of {benchmark.name}, "
+            f"found {len(fields)} fields beginning with {' '.join(fields)[:40]!r}"
+        )
+    numbers = [float(field) for field in fields]
+    if any(abs(x) > _LARGEST for x in numbers):
+        raise InputError(
+            f"{where}: pixels and millimetres up to {_LARGEST:g} were expected, found {max(numbers, key=abs):.6g}"
+        )
+    return numbers
+
+
+def _is_number(text: str) -> bool:
+    """Whether `text` is a number of ordinary size, or nan; infinity is none."""
+    try:
+        return not math.isinf(float(text))
+    except ValueError:
+        return False

@@ -1,0 +1,1 @@
+"""Cameras, rectangles, rotations, alignment: geometry without a hand in it."""

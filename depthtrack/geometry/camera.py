@@ -1,0 +1,132 @@
+"""Pinhole cameras. Camera frame: x right, y down, z forward; pixel centres at integer coordinates."""
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.files import read_text
+
+MAX_SIDE = 8192
+"""Largest image side accepted, in pixels: bounds the memory an absurd header can ask for."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Intrinsics of an undistorted pinhole camera, in pixels.
+
+    `depth_scale` is what one unit of a stored 16-bit depth image is worth, in metres.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    depth_scale: float = 0.001
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            side = getattr(self, name)
+            if not (isinstance(side, int) and 1 <= side <= MAX_SIDE):
+                raise InputError(f"camera {name} must be a whole number from 1 to {MAX_SIDE} pixels, found {side!r}")
+        for name in ("fx", "fy"):
+            # A window of a few pixels has any ratio of focal length to side; `from_dict` is stricter with files.
+            if not (_is_number(getattr(self, name)) and 1e-3 <= getattr(self, name) <= 1e6):
+                raise InputError(f"camera {name} must be a focal length in pixels, found {getattr(self, name)!r}")
+        for name in ("cx", "cy"):
+            # A window of an image may lie far from the principal point, so only nonsense is refused.
+            if not (_is_number(getattr(self, name)) and abs(getattr(self, name)) <= 4 * MAX_SIDE):
+                raise InputError(f"camera {name} must be a principal point in pixels, found {getattr(self, name)!r}")
+        if not (_is_number(self.depth_scale) and 1e-6 <= self.depth_scale <= 0.1):
+            raise InputError(
+                f"camera depth_scale must be metres per depth unit (0.001 for millimetres), found {self.depth_scale!r}"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width), as numpy orders an image."""
+        return self.height, self.width
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """(3, 3) intrinsic matrix K."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], dtype=np.float64)
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Pixels (..., 2) of camera-frame points (..., 3), in metres; points with z <= 0 give NaN."""
+        p = np.asarray(points, dtype=np.float64)
+        z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
+        return np.stack([self.fx * p[..., 0] / z + self.cx, self.fy * p[..., 1] / z + self.cy], axis=-1)
+
+    def unproject(self, pixels: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
+        """Camera-frame points (..., 3) in metres of pixels (..., 2) at depth (...)."""
+        uv = np.asarray(pixels, dtype=np.float64)
+        z = np.asarray(depth, dtype=np.float64)
+        return np.stack([(uv[..., 0] - self.cx) / self.fx * z, (uv[..., 1] - self.cy) / self.fy * z, z], axis=-1)
+
+    def crop(self, left: int, top: int, width: int, height: int) -> Self:
+        """Camera of the window whose first pixel is (left, top); the window may reach outside the image."""
+        return replace(self, width=int(width), height=int(height), cx=self.cx - int(left), cy=self.cy - int(top))
+
+    def resized(self, factor: float) -> Self:
+        """Camera of the image resampled by `factor` (0.5 halves both sides), pixel areas aligned at the corner."""
+        return replace(
+            self,
+            width=max(1, round(self.width * factor)),
+            height=max(1, round(self.height * factor)),
+            fx=self.fx * factor,
+            fy=self.fy * factor,
+            cx=(self.cx + 0.5) * factor - 0.5,
+            cy=(self.cy + 0.5) * factor - 0.5,
+        )
+
+    def to_json(self) -> str:
+        """The text of `camera.json`."""
+        return json.dumps(asdict(self), indent=2) + "\n"
+
+    @classmethod
+    def from_json(cls, path: Path) -> Self:
+        """Read `camera.json`. Raises InputError when it is missing, not JSON, or describes no usable camera."""
+        try:
+            fields = json.loads(read_text(path))
+        except (InputError, ValueError, RecursionError) as error:
+            raise InputError(f"cannot read the camera file {path}: {error}") from error
+        return cls.from_dict(fields, str(path))
+
+    @classmethod
+    def from_dict(cls, fields: Any, where: str) -> Self:
+        """Build from parsed JSON; `where` names the source in error messages."""
+        required = ("width", "height", "fx", "fy", "cx", "cy")
+        if not isinstance(fields, dict) or any(name not in fields for name in required):
+            raise InputError(f"{where} must be a JSON object with {', '.join(required)} (and depth_scale)")
+        try:
+            camera = cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+        # Between a 170 degree and a 0.5 degree field of view: outside it, units or columns were mixed up.
+        for name in ("fx", "fy"):
+            focal = getattr(camera, name)
+            if not 0.04 <= focal / max(camera.shape) <= 120:
+                raise InputError(f"{where}: {name} must be a focal length in pixels, found {focal:g}")
+        return camera
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12  # false for NaN
+
+
+PRESETS: dict[str, Camera] = {
+    # Nominal factory intrinsics: Kinect v1 as OpenNI registers depth to colour, Kinect v2 and SR300 depth cameras.
+    "kinect1": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.001),
+    "kinect2": Camera(512, 424, 365.5, 365.5, 255.5, 211.5, 0.001),
+    "realsense": Camera(640, 480, 475.0, 475.0, 319.5, 239.5, 0.000125),
+    # What the TUM RGB-D benchmark recommends for its registered recordings, and its depth unit of 1/5000 m.
+    "tum": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.0002),
+}
+"""Cameras by sensor name, for recordings and synthesis that bring none of their own."""

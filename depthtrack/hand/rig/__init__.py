@@ -1,0 +1,1 @@
+"""Rigged hands in glTF: reading, measuring, writing."""

@@ -1,0 +1,1 @@
+"""The skin: an implicit surface, its mesh and the weights that pose it."""

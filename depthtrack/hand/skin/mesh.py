@@ -1,0 +1,125 @@
+"""The skinned triangle mesh of the hand (Schroeder et al. 2014, Sec. III), built from the sizes of a `HandShape`."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from trimesh import Trimesh
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.isosurface import Faces, neighbour_average, polygonise
+from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.implicit import Flesh, rest_pose
+from depthtrack.hand.skin.weights import skin_weights
+
+Array = NDArray[np.float64]
+
+_VERTICES = 7000
+"""About how many vertices a hand of usual proportions gets."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """A triangle mesh that the 16 bodies of `HandModel(shape)` move by linear blend skinning.
+
+    `rest` (V, 3) vertices in the palm frame, metres; `faces` (F, 3), counter-clockwise from outside; `weights`
+    (V, 16), each row convex; `T_body_rest` (16, 4, 4) from the palm frame at rest to each body's own frame.
+    """
+
+    shape: HandShape
+    rest: Array
+    faces: Faces
+    weights: Array
+    T_body_rest: Array
+
+    def __post_init__(self) -> None:
+        for array in (self.rest, self.faces, self.weights, self.T_body_rest):
+            array.flags.writeable = False
+
+    @classmethod
+    def of(cls, shape: HandShape) -> "Skin":
+        """The closed skin of a hand of these sizes; made once for each shape (under a second), then remembered.
+
+        Raises InputError for sizes whose flesh is not one solid without holes, such as fingers grown together.
+        """
+        return _skin_of(shape)
+
+    def vertices(self, transforms: ArrayLike) -> Array:
+        """Vertices (..., V, 3) in the camera frame for T_camera_body (..., 16, 4, 4), as `HandModel.transforms` gives.
+
+        Every vertex goes to the weighted mean of where the bodies take it (Schroeder et al. 2014, Eq. 2).
+        """
+        moved = (np.asarray(transforms, dtype=np.float64) @ self.T_body_rest)[..., :3, :]
+        batch = moved.shape[:-3]
+        by_body = np.moveaxis(moved, -3, 0).reshape(BODY_COUNT, -1)
+        blended = (self._sparse_weights @ by_body).reshape(-1, *batch, 3, 4)
+        rest = self.rest.reshape(-1, *(1,) * len(batch), 1, 3)
+        return np.moveaxis(np.sum(blended[..., :3] * rest, axis=-1) + blended[..., 3], 0, -2)
+
+    def at(self, pose: ArrayLike) -> Array:
+        """Vertices (..., V, 3) in the camera frame of poses (..., 27)."""
+        return self.vertices(HandModel(self.shape).transforms(pose))
+
+    def normals(self, vertices: Array) -> Array:
+        """Outward unit normals (..., V, 3) of posed vertices (..., V, 3): the mean over the faces around, by area."""
+        a, b, c = (vertices[..., self.faces[:, k], :] for k in range(3))
+        of_faces = np.cross(b - a, c - a)
+        flat = np.moveaxis(of_faces, -2, 0).reshape(len(self.faces), -1)
+        total = np.moveaxis((self._faces_around @ flat).reshape(-1, *of_faces.shape[:-2], 3), 0, -2)
+        return np.asarray(total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30))
+
+    def to_trimesh(self, vertices: Array) -> Trimesh:
+        """The mesh of posed vertices (V, 3) for trimesh: queries, and export to PLY, OBJ, STL, GLB."""
+        return Trimesh(vertices, self.faces, process=False)
+
+    @cached_property
+    def face_bodies(self) -> NDArray[np.int64]:
+        """(F,) body that moves each face most."""
+        return np.asarray(self.weights[self.faces].sum(axis=1).argmax(axis=-1), dtype=np.int64)
+
+    @cached_property
+    def _sparse_weights(self) -> csr_array:
+        return csr_array(self.weights)
+
+    @cached_property
+    def _faces_around(self) -> csr_array:
+        """(V, F) incidence."""
+        columns = np.repeat(np.arange(len(self.faces)), 3)
+        ones = np.ones(len(columns))
+        return csr_array((ones, (self.faces.ravel(), columns)), shape=(len(self.rest), len(self.faces)))
+
+
+@lru_cache(maxsize=8)
+def _skin_of(shape: HandShape) -> Skin:
+    flesh = Flesh.of(shape)
+    low, high = flesh.bounds()
+    vertices, faces = polygonise(flesh.distance, low, high, _cell(shape, high - low))
+    _check_closed(vertices, faces)
+    weights = skin_weights(flesh, vertices, faces)
+    # The flesh is a right hand's of scale 1: a left one is its mirror image, inside out.
+    rest = vertices * np.array([shape.mirror, 1, 1]) * shape.scale
+    if shape.side == "left":
+        faces = np.ascontiguousarray(faces[:, ::-1])
+    T_palm_body = HandModel(shape).transforms(rest_pose(shape))
+    return Skin(shape, rest, faces, weights, np.asarray(np.linalg.inv(T_palm_body), dtype=np.float64))
+
+
+def _cell(shape: HandShape, box: Array) -> float:
+    """Grid spacing that gives about `_VERTICES` vertices, finer for thin fingers but within bounded memory."""
+    area = 2 * shape.palm_length * shape.palm_breadth + 2 * np.pi * float(np.sum(shape.lengths * shape.radii[:, 1:]))
+    wanted = min(np.sqrt(1.4 * area / _VERTICES), 0.65 * shape.radii.min())
+    return max(float(wanted), float(np.cbrt(np.prod(box) / 4e5)))
+
+
+def _check_closed(vertices: Array, faces: Faces) -> None:
+    # Every edge of a surface net has two faces, so Euler's formula for one sphere reads V - F / 2 = 2.
+    pieces = connected_components(neighbour_average(faces, len(vertices)), directed=False)[0] if len(faces) else 0
+    if pieces != 1 or len(vertices) - len(faces) // 2 != 2:
+        raise InputError(
+            "the hand sizes must give one solid hand with five free fingers, found flesh that falls apart or fingers "
+            "that grow together: bring radii and base positions closer to the default hand's proportions"
+        )

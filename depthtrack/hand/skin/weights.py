@@ -1,0 +1,72 @@
+"""How much each body moves each point of the skin at rest: smooth, convex, and never across to another finger.
+
+Along a finger the share passes from one bone to the next around each joint, over about one radius to either side.
+Across the hand it goes by distance to the flesh of each finger, so that webs follow both their neighbours.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.geometry.isosurface import Faces, neighbour_average
+from depthtrack.hand.kinematics import BODY_COUNT, body_of
+from depthtrack.hand.skin.implicit import Flesh
+
+Array = NDArray[np.float64]
+
+_BLEND = (1.4, 1.0, 1.0)
+"""Half the width of the passage at each joint of a finger, in radii; the skin over a knuckle slides furthest."""
+
+
+def skin_weights(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
+    """Convex weights (V, 16) of vertices (V, 3) on the flesh at rest."""
+    to_finger = np.stack([flesh.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
+    to_palm = flesh.palm_distance(vertices)
+    weights = np.zeros((len(vertices), BODY_COUNT))
+
+    # The thumb shares its muscles with the palm: halfway where both are equally near.
+    unit = flesh.shape.palm_length
+    elsewhere = np.minimum(to_palm, to_finger[:, 1:].min(axis=-1))
+    thumb = _step((elsewhere - to_finger[:, 0]) / (0.2 * unit))
+    # Between the other fingers the web belongs to both.
+    nearness = -to_finger[:, 1:] / (0.02 * unit)
+    nearness = np.exp(nearness - nearness.max(axis=-1, keepdims=True))
+    nearness /= nearness.sum(axis=-1, keepdims=True)
+    share = np.concatenate([thumb[:, None], (1 - thumb[:, None]) * nearness], axis=-1)
+
+    for finger in range(5):
+        chain = share[:, finger, None] * _along(flesh, finger, vertices, to_finger[:, finger])
+        weights[:, 0] += chain[:, 0]
+        weights[:, body_of(finger, 0) : body_of(finger, 2) + 1] += chain[:, 1:]
+    average = neighbour_average(faces, len(vertices))
+    for _ in range(4):
+        weights = 0.5 * (weights + average @ weights)
+    # Four bodies a vertex are what rigged files and graphics cards usually carry.
+    fourth = np.sort(weights, axis=-1)[:, -4:-3]
+    weights[weights < np.maximum(fourth, 1e-3)] = 0
+    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+
+
+def _along(flesh: Flesh, finger: int, points: Array, distance: Array) -> Array:
+    """Convex shares (N, 4) of the palm and the three phalanges, looking at one finger alone."""
+    passed = np.ones(len(points))
+    shares = np.empty((len(points), 4))
+    before = np.array([0.0, 1.0, 0.0])
+    for k in range(3):
+        T, radius = flesh.bones[body_of(finger, k)], flesh.shape.radii[finger, k]
+        # The joint's plane halves the angle of its bones; flesh off the finger is further behind.
+        normal = before + T[:3, 1]
+        beyond = (points - T[:3, 3]) @ (normal / np.linalg.norm(normal))
+        if k == 0:
+            beyond = beyond - np.maximum(distance, 0)
+        here = passed * _step(beyond / (_BLEND[k] * radius))
+        shares[:, k] = passed - here
+        passed = here
+        before = T[:3, 1]
+    shares[:, 3] = passed
+    return shares
+
+
+def _step(x: Array) -> Array:
+    """Smooth passage from 0 at x = -1 to 1 at x = 1."""
+    t = np.clip((x + 1) / 2, 0, 1)
+    return t * t * (3 - 2 * t)

@@ -1,0 +1,136 @@
+"""Joint positions in NumPy's `.npz`, as tracking devices' recordings are exchanged.
+
+`joints` (N, 5, 4, 3): thumb to little finger, base to tip; or (N, 20, 3), or (N, 21, 3) with the wrist first; metres,
+centimetres or millimetres. Several tracks of hands may follow one another: `start` and `length` (tracks,) say where
+each lies, `right` (tracks,) which side it is, `name` (tracks,) what it is called. Without them all joints are one
+hand's, and its side is found out.
+"""
+
+import math
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from tokenize import TokenError
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.files import check_size
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
+from depthtrack.hand.shape import Side
+from depthtrack.posture_databases.joint_postures import postures_of_joints
+from depthtrack.posture_databases.posture_set import MAX_BYTES, Array, PostureSet, check_count
+
+MAX_TRACKS = 10_000
+_MOST = 1 << 28
+"""Bytes of the largest array read."""
+_DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, EOFError, OSError),
+    *(RuntimeError, ValueError, TypeError, SyntaxError, TokenError, MemoryError),
+)
+"""What zipfile and numpy's header parser raise over damaged, encrypted or unknown content."""
+
+
+def matches(path: Path) -> bool:
+    """Whether the file is named like one of these."""
+    return path.suffix.lower() == ".npz" and path.is_file()
+
+
+def read(path: Path) -> PostureSet:
+    """Postures of all tracks, each hand's sizes measured by itself. Raises InputError."""
+    check_size(path, MAX_BYTES)
+    arrays = _read_arrays(path, ("joints", "start", "length", "right", "name"))
+    if "joints" not in arrays:
+        raise InputError(f"{path}: expected an array 'joints' (N, 5, 4, 3), found none")
+    keypoints = _keypoints(path, arrays["joints"])
+    tracks = _tracks(path, arrays, len(keypoints))
+    sets = [postures_of_joints(path, keypoints[track.where], track.side) for track in tracks]
+    counts = [len(one.angles) for one in sets]
+    return PostureSet(
+        angles=np.concatenate([one.angles for one in sets]),
+        misfit=float(np.average([one.misfit or 0.0 for one in sets], weights=counts)),
+        tracks=np.repeat([track.name for track in tracks], counts),
+    )
+
+
+@dataclass(frozen=True)
+class _Track:
+    """Where the joints of one hand lie, and what is known of it."""
+
+    where: slice
+    side: Side | None
+    name: str
+
+
+def _keypoints(path: Path, joints: NDArray[Any]) -> Array:
+    """(N, 21, 3), NaN for a wrist that the file has not."""
+    count = len(KEYPOINT_NAMES)
+    shapes = ((5, 4, 3), (count - 1, 3), (count, 3))
+    if joints.shape[1:] not in shapes or not len(joints) or joints.dtype.kind not in "fiu":
+        raise InputError(
+            f"{path}: 'joints' must be numbers (N, 5, 4, 3), (N, 20, 3) or (N, 21, 3),"
+            f" found {joints.dtype} {joints.shape}"
+        )
+    check_count(path, len(joints))
+    keypoints = np.full((len(joints), count, 3), np.nan)
+    flat = joints.reshape(len(joints), -1, 3)
+    keypoints[:, count - flat.shape[1] :] = flat
+    if np.any(np.abs(keypoints) > 1e6):
+        raise InputError(f"{path}: 'joints' must lie within a kilometre of their origin")
+    return keypoints
+
+
+def _tracks(path: Path, arrays: dict[str, NDArray[Any]], count: int) -> list[_Track]:
+    start, length = arrays.get("start", np.array([0])), arrays.get("length", np.array([count]))
+    right, name = arrays.get("right"), arrays.get("name")
+    if start.ndim != 1 or start.shape != length.shape or not 1 <= len(start) <= MAX_TRACKS:
+        raise InputError(f"{path}: 'start' and 'length' must say where 1 to {MAX_TRACKS:,} tracks lie, found others")
+    if start.dtype.kind not in "iu" or length.dtype.kind not in "iu":
+        raise InputError(f"{path}: 'start' and 'length' must be whole numbers")
+    check_count(path, sum(length.tolist()))
+    if any(array is not None and array.shape != start.shape for array in (right, name)):
+        raise InputError(f"{path}: 'right' and 'name' must say one thing for each of the {len(start)} tracks")
+    tracks = []
+    for i, (first, frames) in enumerate(zip(start.tolist(), length.tolist(), strict=True)):
+        if not 0 <= first < first + frames <= count:
+            raise InputError(f"{path}: each track must hold one or more of the {count} hands, found {first}+{frames}")
+        side: Side | None = None if right is None else "right" if right[i] else "left"
+        called = "" if name is None else str(name[i])
+        tracks.append(_Track(slice(first, first + frames), side, called if called.isprintable() else ""))
+    return tracks
+
+
+def _read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Those of the arrays that the file has. Headers are checked before memory is reserved; nothing is unpickled."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            present = set(archive.namelist())
+            return {name: _read_array(archive, f"{name}.npy") for name in names if f"{name}.npy" in present}
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except _DAMAGE as error:
+        raise InputError(f"{path} must be a sound .npz file: {error}") from error
+
+
+def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    size = archive.getinfo(name).file_size
+    with archive.open(name) as file:
+        version = np.lib.format.read_magic(file)
+        if version == (1, 0):
+            shape, column_major, dtype = np.lib.format.read_array_header_1_0(file)
+        elif version == (2, 0):
+            shape, column_major, dtype = np.lib.format.read_array_header_2_0(file)
+        else:
+            raise InputError(f"{name} must be of NumPy's array format 1.0 or 2.0, found {version}")
+        if dtype.kind not in "fiubU":
+            raise InputError(f"{name} must hold numbers or names, found {dtype}")
+        claimed = math.prod(shape) * dtype.itemsize
+        if claimed > min(size, _MOST) or any(extent < 0 for extent in shape):
+            raise InputError(f"{name} claims {claimed:,} bytes in a file of {size:,}, of which {_MOST:,} are read")
+        values = np.frombuffer(file.read(claimed), dtype=dtype)
+    if dtype.kind == "U":
+        values.tolist()  # bytes that are no text raise here
+    return values.reshape(shape, order="F" if column_major else "C")

@@ -1,0 +1,99 @@
+"""Ground truth beside the images: `hand_poses.csv`, `joints.csv` and `hand.json`."""
+
+import math
+from array import array
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.files import check_size, read_lines
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
+from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.sequence import GroundTruth
+
+POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
+QUATERNION_TOLERANCE = 1e-3
+"""How far from 1 the length of a pose's quaternion may be: what rounding to a few digits does."""
+MAX_TABLE_BYTES = 1 << 28
+"""Largest table read: hours of ground truth."""
+POSES_HEADER = ("timestamp", *POSE_NAMES)
+JOINTS_HEADER = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"))
+
+
+def read_ground_truth(folder: Path) -> GroundTruth | None:
+    """What `folder` knows, or None where it has none of the files. Raises InputError for a malformed one."""
+    poses = _read_table(folder / POSES_FILE, POSES_HEADER)
+    joints = _read_table(folder / JOINTS_FILE, JOINTS_HEADER)
+    hand = _read_hand(folder / HAND_FILE)
+    tables = [table for table in (poses, joints) if table is not None]
+    if not tables and hand is None:
+        return None
+    if poses is not None and joints is not None and not _same_times(poses[:, 0], joints[:, 0]):
+        raise InputError(f"{folder}: {POSES_FILE} and {JOINTS_FILE} must annotate the same timestamps, line by line")
+    if poses is not None:
+        lengths = np.linalg.norm(poses[:, 1:][:, ORIENTATION], axis=1)
+        if np.any(np.abs(lengths - 1) > QUATERNION_TOLERANCE):
+            worst = int(np.argmax(np.abs(lengths - 1)))
+            raise InputError(
+                f"{folder / POSES_FILE}: quaternions (qw, qx, qy, qz) must have length 1, found {lengths[worst]:.4g}"
+                f" at timestamp {poses[worst, 0]}"
+            )
+    return GroundTruth(
+        timestamps=tables[0][:, 0] if tables else np.zeros(0),
+        poses=None if poses is None else poses[:, 1:],
+        joints=None if joints is None else joints[:, 1:].reshape(-1, len(KEYPOINT_NAMES), 3),
+        hand=hand,
+    )
+
+
+def _same_times(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    return len(a) == len(b) and bool(np.all(np.abs(a - b) < 1e-6))
+
+
+def _read_hand(path: Path) -> HandShape | None:
+    if not path.exists():
+        return None
+    check_size(path, 1 << 20)
+    return HandShape.from_json(path)
+
+
+def _read_table(path: Path, header: tuple[str, ...]) -> NDArray[np.float64] | None:
+    """Rows (T, len(header)) of a CSV with that header, finite and in order of time; None where the file is absent."""
+    if not path.exists():
+        return None
+    lines = read_lines(path, MAX_TABLE_BYTES)
+    found = next(lines, "").strip().split(",")
+    if tuple(found) != header:
+        raise InputError(
+            f"{path}: the header must be '{header[0]},{header[1]},...,{header[-1]}', found {_start(found)}"
+        )
+    # A flat array of doubles: a list of Python floats would take several times the file's size.
+    values, last = array("d"), -math.inf
+    for number, line in enumerate(lines, start=2):
+        fields = line.strip().split(",")
+        row = _numbers(fields)
+        if len(row) != len(header):
+            raise InputError(f"{path}, line {number}: expected {len(header)} finite numbers, found {_start(fields)}")
+        if row[0] <= last:
+            raise InputError(f"{path}, line {number}: timestamps must increase, found {row[0]} after {last}")
+        values.extend(row)
+        last = row[0]
+    if not values:
+        raise InputError(f"{path} holds no row below its header: delete the file if nothing is annotated")
+    return np.array(values).reshape(-1, len(header))
+
+
+def _numbers(fields: list[str]) -> list[float]:
+    """The fields as finite numbers, or nothing when one of them is none."""
+    try:
+        row = [float(text) for text in fields]
+    except ValueError:
+        return []
+    return row if all(map(math.isfinite, row)) else []
+
+
+def _start(fields: list[str]) -> str:
+    return f"{len(fields)} fields beginning with {','.join(fields)[:60]!r}"

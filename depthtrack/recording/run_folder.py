@@ -1,0 +1,251 @@
+"""The run folder: what a tracker said of every frame, appended as it goes and readable after a kill at any moment.
+
+`run.json` holds the configuration that made the run, `poses.csv` a row a frame: index, timestamp, status, energy,
+confidence and the pose (empty where there is none), `timings.csv` the milliseconds of each stage. Poses are bitwise
+the same whether a run was interrupted or not; timings, of course, are not.
+"""
+
+import csv
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.errors import InputError
+from depthtrack.files import read_lines, read_text
+from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
+from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
+
+_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
+_LARGEST_TABLE = 1 << 29
+"""Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
+STATUSES = ("tracked", "started", "lost", "absent")
+"""What may become of a frame."""
+_LARGEST = 100.0
+"""Metres and radians that no pose reaches."""
+_LATEST = 1e12
+"""Seconds that no clock reaches."""
+_UNIT_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class RunRow:
+    """One frame of a run. `pose` (27,), or None where no hand was observed; `energy` is NaN then."""
+
+    index: int
+    timestamp: float
+    status: str
+    energy: float
+    confidence: float
+    pose: NDArray[np.float64] | None
+
+
+class RunWriter:
+    """Appends frames to a run folder; every row is complete on disk before the next is written."""
+
+    def __init__(
+        self, folder: Path, configuration: dict[str, Any], stages: Sequence[str], resume: bool = False
+    ) -> None:
+        """Begin, or with `resume` go on with, a run. Raises InputError where the folder does not allow it."""
+        self.folder = folder
+        self._stages = tuple(stages)
+        self.rows: list[RunRow] = []
+        started = (folder / "run.json").exists()
+        if started and not resume:
+            raise InputError(f"{folder} already holds a run: go on with --resume, or choose another folder")
+        folder.mkdir(parents=True, exist_ok=True)
+        if started:
+            check_same(read_configuration(folder), configuration, folder)
+            self.rows = read_rows(folder)
+            _rewrite(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
+            kept = _read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
+            _rewrite(folder / "timings.csv", ("index", *self._stages), kept)
+        else:
+            _rewrite(folder / "poses.csv", _COLUMNS, ())
+            _rewrite(folder / "timings.csv", ("index", *self._stages), ())
+            _replace(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
+        self._poses = (folder / "poses.csv").open("a", newline="", encoding="utf-8")
+        self._timings = (folder / "timings.csv").open("a", newline="", encoding="utf-8")
+
+    def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
+        """Add the next frame."""
+        # Timings first: a kill between the two leaves a surplus there, which resuming drops.
+        csv.writer(self._timings).writerow([row.index, *(f"{stage_ms.get(stage, 0):.3f}" for stage in self._stages)])
+        self._timings.flush()
+        csv.writer(self._poses).writerow(_cells(row))
+        self._poses.flush()
+        self.rows.append(row)
+
+    def close(self) -> None:
+        self._poses.close()
+        self._timings.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run as it was written, whole or cut short.
+
+    `poses` (T, 27) hold NaN where no hand was observed; `stage_ms` has an array (T,) for each stage.
+    """
+
+    folder: Path
+    configuration: dict[str, Any]
+    index: NDArray[np.int64]
+    timestamps: NDArray[np.float64]
+    status: tuple[str, ...]
+    energy: NDArray[np.float64]
+    confidence: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    stage_ms: dict[str, NDArray[np.float64]]
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
+        """Read a run folder. Raises InputError when it holds no run, or a damaged one."""
+        configuration, rows = read_configuration(folder), read_rows(folder)
+        nowhere = np.full(POSE_SIZE, np.nan)
+        return cls(
+            folder,
+            configuration,
+            np.array([row.index for row in rows], dtype=np.int64),
+            np.array([row.timestamp for row in rows], dtype=np.float64),
+            tuple(row.status for row in rows),
+            np.array([row.energy for row in rows], dtype=np.float64),
+            np.array([row.confidence for row in rows], dtype=np.float64),
+            np.array([nowhere if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
+            _read_timings(folder / "timings.csv", len(rows)),
+        )
+
+
+def read_configuration(folder: Path) -> dict[str, Any]:
+    """What `run.json` says. Raises InputError."""
+    try:
+        configuration = json.loads(read_text(folder / "run.json"))
+    except InputError as error:
+        raise InputError(f"{folder} holds no run ({error}); make one with `depthtrack track`") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{folder} holds no run (run.json: {error}); make one with `depthtrack track`") from error
+    if not isinstance(configuration, dict):
+        raise InputError(f"{folder / 'run.json'} must hold a JSON object")
+    return configuration
+
+
+def read_rows(folder: Path) -> list[RunRow]:
+    """The complete rows of `poses.csv`; a last one that was cut short is left out.
+
+    Raises InputError, also for rows that no tracker writes: they would make no sense of anything they are held against.
+    """
+    path = folder / "poses.csv"
+    rows = []
+    for number, cells in enumerate(_read_table(path, _COLUMNS), start=2):
+        try:
+            index, timestamp, status, energy, confidence, *pose = cells
+            numbers = np.array([float(x) for x in pose]) if any(pose) else None
+            if not 0 <= int(index) < MAX_FRAMES:
+                raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
+            rows.append(RunRow(int(index), float(timestamp), status, float(energy), float(confidence), numbers))
+        except (ValueError, IndexError) as error:
+            raise InputError(
+                f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error!s:.120}"
+            ) from error
+        if (reason := _why_no_row(rows[-1])) is not None:
+            raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
+    return rows
+
+
+def _why_no_row(row: RunRow) -> str | None:
+    """What keeps a row from being one that a tracker writes."""
+    if row.status not in STATUSES:
+        return f"the status must be one of {', '.join(STATUSES)}, found '{row.status[:40]}'"
+    if not abs(row.timestamp) < _LATEST:  # false for NaN
+        return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
+    if row.pose is None:
+        return None
+    if not np.all(np.abs(row.pose) <= _LARGEST):
+        return f"a pose must be numbers up to {_LARGEST:g} (metres, radians), or absent"
+    length = np.linalg.norm(row.pose[ORIENTATION])
+    return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.6g}"
+
+
+def _read_timings(path: Path, count: int) -> dict[str, NDArray[np.float64]]:
+    """Milliseconds (T,) of each stage, of at most `count` frames. Raises InputError."""
+    header, *lines = _read_table(path, None)
+    if header[:1] != ["index"]:
+        raise InputError(f"{path} must begin with a line of columns, 'index' and the tracker's stages")
+    rows = []
+    for number, cells in enumerate(lines[:count], start=2):
+        try:
+            rows.append([float(cell) for cell in cells[1:]])
+        except ValueError as error:
+            raise InputError(f"{path}, line {number}: expected milliseconds: {error}") from error
+        if len(cells) != len(header):
+            raise InputError(f"{path}, line {number}: expected {len(header)} columns, found {len(cells)}")
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(header) - 1)
+    return {stage: columns[:, k] for k, stage in enumerate(header[1:])}
+
+
+def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
+    """Complete lines of a table, without the header if `columns` says what it must be."""
+    lines = [line for line in read_lines(path, _LARGEST_TABLE) if line.endswith("\n")]
+    try:
+        # No cell of ours needs quotes: one that strays in must not swallow the lines after it.
+        header, *rows = list(csv.reader(lines, quoting=csv.QUOTE_NONE)) or [[]]
+    except csv.Error as error:
+        raise InputError(f"{path} is no table: {error}") from error
+    if columns is None:
+        return [header, *rows]
+    if tuple(header) != tuple(columns):
+        raise InputError(f"{path} must begin with the columns {', '.join(columns[:5])}...")
+    # A row that was cut inside its line break still has all its cells.
+    if rows and len(rows[-1]) != len(columns):
+        rows.pop()
+    for number, cells in enumerate(rows, start=2):
+        if len(cells) != len(columns):
+            raise InputError(f"{path}, line {number}: expected {len(columns)} columns, found {len(cells)}")
+    return rows
+
+
+def _cells(row: RunRow) -> list[str]:
+    pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
+    return [str(row.index), repr(row.timestamp), row.status, repr(row.energy), repr(row.confidence), *pose]
+
+
+def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
+    import io
+
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(rows)
+    _replace(path, text.getvalue())
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    aside = path.with_name(f".{path.name}.writing")
+    aside.write_text(text, encoding="utf-8", newline="")
+    os.replace(aside, path)
+
+
+def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
+    """A run goes on only as it began; threads, versions and machine may differ. Raises InputError."""
+    # The tracker first, for its options follow from it.
+    for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
+        if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
+            raise InputError(
+                f"{folder} was begun with {key} = {found.get(key)!r:.80}, not {wanted.get(key)!r:.80}: "
+                "go on with the same options, or choose another folder"
+            )

@@ -1,0 +1,1 @@
+"""Readers of RGB-D recordings, one file a format."""

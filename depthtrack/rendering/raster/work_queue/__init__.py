@@ -1,0 +1,1 @@
+"""A lock-free work queue that spreads a batch of hypotheses over threads."""

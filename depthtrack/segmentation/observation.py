@@ -1,0 +1,101 @@
+"""What a tracker sees of a frame: the hand's skin and depth maps over a region of interest, and its point cloud."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.geometry.camera import Camera
+from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.segmentation.point_cloud import point_cloud
+from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, HandPlace
+from depthtrack.segmentation.segmenter import Segmentation, Segmenter
+from depthtrack.segmentation.skin_colour import SkinModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Observation O = (o_s, o_d) of Oikonomidis et al. 2011, Sec. 2.1, made once a frame and shared by all trackers.
+
+    `camera` of the region of interest, whose first pixel is `origin` (left, top) in the frame; `skin` (h, w) the
+    hand's silhouette o_s; `depth` (h, w) float32 metres o_d, 0 where there is no reading of the hand. `centre` (3,)
+    metres, camera frame: about the palm's centre; `palm_radius` metres; `arm_direction` (3,) unit, from the palm
+    along the forearm, None where no arm is seen.
+    """
+
+    frame_index: int
+    timestamp: float
+    camera: Camera
+    origin: tuple[int, int]
+    skin: NDArray[np.bool_]
+    depth: NDArray[np.float32]
+    centre: Array
+    palm_radius: float
+    arm_direction: Array | None = None
+
+    @classmethod
+    def of(cls, frame: Frame, found: Segmentation) -> Self:
+        """The observation of a frame whose hand was found."""
+        window = found.window
+        depth = np.where(found.readings, frame.depth[window.slices], np.float32(0))
+        sight = found.centre / np.linalg.norm(found.centre)
+        return cls(
+            frame.index,
+            frame.timestamp,
+            frame.camera.crop(window.left, window.top, window.right - window.left, window.bottom - window.top),
+            (window.left, window.top),
+            np.ascontiguousarray(found.skin),
+            np.ascontiguousarray(depth),
+            found.centre + PALM_HALF_THICKNESS * sight,
+            found.palm_radius,
+            found.arm_direction,
+        )
+
+    @property
+    def points(self) -> Array:
+        """Points (N, 3) of the visible hand in metres, camera frame, row by row of the region."""
+        return self._cloud[0]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals (N, 3) of the points, towards the camera."""
+        return self._cloud[1]
+
+    @cached_property
+    def _cloud(self) -> tuple[Array, Array]:
+        return point_cloud(self.camera, self.depth)
+
+
+class Observer:
+    """Turns frames into observations; remembers where the hand was, as `segmentation.Segmenter` does.
+
+    `skin_model` is used where frames have colour; None uses depth alone. `wrist_margin` (metres) keeps that much of
+    the forearm beyond the wrist.
+    """
+
+    def __init__(self, skin_model: SkinModel | None = None, wrist_margin: float = 0.0) -> None:
+        self._segmenter = Segmenter(skin_model, wrist_margin)
+
+    @classmethod
+    def for_sequence(
+        cls, sequence: Sequence, skin_model: Path | None = None, use_colour: bool = True, wrist_margin: float = 0.0
+    ) -> Self:
+        """With skin colours, those of a file or the published ones, for a recording that has colour."""
+        first = next(iter(sequence), None)
+        if not use_colour or first is None or first.colour is None:
+            return cls(None, wrist_margin)
+        return cls(SkinModel.default() if skin_model is None else SkinModel.load(skin_model), wrist_margin)
+
+    def observe(self, frame: Frame, place: HandPlace | None = None) -> Observation | None:
+        """What is seen of the hand, or None without one. `place` is where a tracker is sure to find it."""
+        found = self._segmenter.segment(frame, place)
+        return None if found is None else Observation.of(frame, found)
+
+    def reset(self) -> None:
+        """Forget where the hand was."""
+        self._segmenter.reset()

@@ -1,0 +1,74 @@
+"""The point cloud of a depth map, with normals, made once a frame for everyone who needs it."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.geometry.camera import Camera
+
+Array = NDArray[np.float64]
+
+SPACING = 2
+"""Pixels between the nine samples that a normal is fitted to."""
+
+SAME_SURFACE = 0.015
+"""Metres in depth beyond which a neighbour belongs to another surface: a finger's breadth."""
+
+
+def point_cloud(camera: Camera, depth: NDArray[np.float32]) -> tuple[Array, Array]:
+    """Points (N, 3) in metres and unit normals (N, 3) towards the camera, row by row, of a depth map (h, w).
+
+    A plane's inverse depth is linear in the pixel, so each normal comes from a linear fit of the inverse depth to a
+    3x3 grid of samples about its pixel; samples on another surface or without a reading are left out, and where too
+    few remain, the normal is the line of sight's.
+    """
+    rows, columns = np.nonzero(depth)
+    points, normals = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+    _fit(depth, rows, columns, (camera.fx, camera.fy, camera.cx, camera.cy), points, normals)
+    return points, normals
+
+
+@numba.njit(cache=True, nogil=True)
+def _fit(
+    depth: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    intrinsics: tuple[float, float, float, float],
+    points: Array,
+    normals: Array,
+) -> None:
+    fx, fy, cx, cy = intrinsics
+    height, width = depth.shape
+    for n in range(rows.shape[0]):
+        v, u = rows[n], columns[n]
+        z = np.float64(depth[v, u])
+        x, y = (u - cx) / fx, (v - cy) / fy
+        points[n, 0], points[n, 1], points[n, 2] = x * z, y * z, z
+        count, su, sv, suu, suv, svv, sw, suw, svw = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(-SPACING, SPACING + 1, SPACING):
+            for i in range(-SPACING, SPACING + 1, SPACING):
+                if not (0 <= v + j < height and 0 <= u + i < width):
+                    continue
+                there = np.float64(depth[v + j, u + i])
+                if there == 0.0 or abs(there - z) > SAME_SURFACE:
+                    continue
+                w = 1.0 / there
+                count += 1
+                su, sv, sw = su + i, sv + j, sw + w
+                suu, suv, svv = suu + i * i, suv + i * j, svv + j * j
+                suw, svw = suw + i * w, svw + j * w
+        # Slopes of w about the samples' mean.
+        nx, ny, nz = x, y, 1.0
+        if count >= 4:
+            a, b, c = suu - su * su / count, suv - su * sv / count, svv - sv * sv / count
+            p, q = suw - su * sw / count, svw - sv * sw / count
+            determinant = a * c - b * b
+            if determinant > 1e-9:
+                wu, wv = (c * p - b * q) / determinant, (a * q - b * p) / determinant
+                # w = n.(x, y, 1) / d for the plane n.X = d.
+                nx, ny = wu * fx, wv * fy
+                nz = 1.0 / z - x * nx - y * ny
+        length = -math.sqrt(nx * nx + ny * ny + nz * nz)
+        normals[n, 0], normals[n, 1], normals[n, 2] = nx / length, ny / length, nz / length

@@ -1,0 +1,1 @@
+"""SIMD vectors inside numba kernels."""

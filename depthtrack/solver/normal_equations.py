@@ -1,0 +1,182 @@
+"""The squared distances between hand and observation, gathered in a 6 x 6 matrix for each body.
+
+While correspondences stand still, a body's residuals are a quadratic function of how it moved. That function is all
+the solver needs: its inner iterations cost the same for ten points as for ten thousand.
+
+A body's motion since the correspondences were found is a twist (v, w): v (m) is how far it carried the point
+`centre`, w (rad) how it turned. A residual n . (x - y) of a surface point x with direction n grows by
+n . v + ((x - centre) x n) . w.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.compiled_kinematics import Bodies
+from depthtrack.hand.kinematics import BODY_COUNT
+
+Array = NDArray[np.float64]
+
+
+ROW = 8
+"""Places of a row of the sums: six of a a^T, one of a e, and one to spare."""
+
+
+class Moments(NamedTuple):
+    """Sums over residuals e with gradients a (6,) by twist: `sums` (16, 6, ROW), in each row of a body six of a a^T
+    and one of a e; `e` (16,) of e^2 (m^2); `T` (16, 3, 4) where the bodies were, `centre` (3,) the point the twists
+    refer to."""
+
+    sums: Array
+    e: Array
+    T: Array
+    centre: Array
+
+    @staticmethod
+    def empty() -> "Moments":
+        """No residuals yet."""
+        n = BODY_COUNT
+        return Moments(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
+
+
+def clear(moments: Moments, bodies: Bodies) -> None:
+    """Forget all residuals; the bodies are where they are now."""
+    moments.sums.fill(0.0)
+    moments.e.fill(0.0)
+    moments.T[:] = bodies.T
+    moments.centre[:] = bodies.T[0, :, 3]
+
+
+@numba.njit(cache=True, nogil=True)
+def twist(moments: Moments, bodies: Bodies, b: int, out: Array) -> None:
+    """Twist (6,) of body b from where it was when the residuals were added, to first order in its turn."""
+    now, was, c = bodies.T[b], moments.T[b], moments.centre
+    R = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = now[i, 0] * was[j, 0] + now[i, 1] * was[j, 1] + now[i, 2] * was[j, 2]
+    for i in range(3):
+        moved = now[i, 3]
+        for j in range(3):
+            moved += R[i, j] * (c[j] - was[j, 3])
+        out[i] = moved - c[i]
+    out[3], out[4], out[5] = (R[2, 1] - R[1, 2]) / 2, (R[0, 2] - R[2, 0]) / 2, (R[1, 0] - R[0, 1]) / 2
+
+
+@numba.njit(cache=True, nogil=True)
+def energy(moments: Moments, bodies: Bodies) -> float:
+    """Half the sum of squared residuals, weighted, with the bodies where they are now (m^2)."""
+    total, s = 0.0, np.empty(6)
+    for b in range(moments.e.shape[0]):
+        twist(moments, bodies, b, s)
+        total += moments.e[b]
+        for j in range(6):
+            row = moments.sums[b, j]
+            Ms = row[0] * s[0] + row[1] * s[1] + row[2] * s[2] + row[3] * s[3] + row[4] * s[4] + row[5] * s[5]
+            total += s[j] * (2 * row[6] + Ms)
+    return 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True)
+def normal_equations(moments: Moments, bodies: Bodies, H: Array, gradient: Array) -> float:
+    """J^T J into `H` (26, 26) and J^T e into `gradient` (26,), with the bodies where they are now; returns `energy`.
+
+    A joint moves everything beyond it alike, so sums over bodies are carried from the fingertips inward and each joint
+    meets them once, as in Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
+    """
+    total = 0.0
+    n = moments.e.shape[0]
+    M, g, s = np.zeros((n, 6, 6)), np.zeros((n, 6)), np.empty(6)
+    for b in range(n):
+        twist(moments, bodies, b, s)
+        total += moments.e[b]
+        for j in range(6):
+            Ms = 0.0
+            for k in range(6):
+                M[b, j, k] = moments.sums[b, j, k]
+                Ms += M[b, j, k] * s[k]
+            total += s[j] * (2 * moments.sums[b, j, 6] + Ms)
+            g[b, j] = moments.sums[b, j, 6] + Ms
+        _shift(M[b], g[b], s[0], s[1], s[2])
+    for i in range(26):
+        for j in range(26):
+            H[i, j] = 0.0
+    c, palm = moments.centre, bodies.T[0]
+    columns, F = np.zeros((26, 6)), np.empty(6)
+    for j in range(3):
+        columns[j, j] = 1.0
+        columns[3 + j, 3 + j] = 1.0
+    # Turning about the palm carries the centre along.
+    px, py, pz = c[0] - palm[0, 3], c[1] - palm[1, 3], c[2] - palm[2, 3]
+    columns[3, 1], columns[3, 2] = -pz, py
+    columns[4, 0], columns[4, 2] = pz, -px
+    columns[5, 0], columns[5, 1] = -py, px
+    for finger in range(5):
+        for phalanx in range(2, -1, -1):
+            b = 1 + 3 * finger + phalanx
+            first = 4 * finger + (1 + phalanx if phalanx > 0 else 0)
+            for a in range(4 * finger + 1 + phalanx, first - 1, -1):
+                _hinge(bodies, a, c, columns[6 + a])
+                _apply(M[b], columns[6 + a], F)
+                gradient[6 + a] = _dot(columns[6 + a], g[b])
+                for j in range(6):
+                    H[6 + a, j] = _dot(columns[j], F)
+                # What this joint shares with those further out was entered by them.
+                for inner in range(4 * finger, a + 1):
+                    _hinge(bodies, inner, c, columns[6 + inner])
+                    H[6 + a, 6 + inner] = _dot(columns[6 + inner], F)
+            parent = b - 1 if phalanx > 0 else 0
+            for i in range(6):
+                g[parent, i] += g[b, i]
+                for j in range(6):
+                    M[parent, i, j] += M[b, i, j]
+    for i in range(6):
+        _apply(M[0], columns[i], F)
+        gradient[i] = _dot(columns[i], g[0])
+        for j in range(i + 1):
+            H[i, j] = _dot(columns[j], F)
+    for i in range(26):
+        for j in range(i):
+            H[j, i] = H[i, j]
+    return 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True)
+def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
+    """Refer a body's sums to the centre itself, from the point (dx, dy, dz) beyond it: v there is v + w x d."""
+    for i in range(6):
+        x, y, z = M[i, 0], M[i, 1], M[i, 2]
+        M[i, 3] += dy * z - dz * y
+        M[i, 4] += dz * x - dx * z
+        M[i, 5] += dx * y - dy * x
+    for i in range(6):
+        x, y, z = M[0, i], M[1, i], M[2, i]
+        M[3, i] += dy * z - dz * y
+        M[4, i] += dz * x - dx * z
+        M[5, i] += dx * y - dy * x
+    x, y, z = g[0], g[1], g[2]
+    g[3] += dy * z - dz * y
+    g[4] += dz * x - dx * z
+    g[5] += dx * y - dy * x
+
+
+@numba.njit(cache=True, nogil=True)
+def _hinge(bodies: Bodies, a: int, c: Array, out: Array) -> None:
+    """Twist (6,) at the centre of a unit turn of angle a."""
+    ux, uy, uz = bodies.axes[a, 0], bodies.axes[a, 1], bodies.axes[a, 2]
+    px, py, pz = c[0] - bodies.origins[a, 0], c[1] - bodies.origins[a, 1], c[2] - bodies.origins[a, 2]
+    out[0], out[1], out[2] = uy * pz - uz * py, uz * px - ux * pz, ux * py - uy * px
+    out[3], out[4], out[5] = ux, uy, uz
+
+
+@numba.njit(cache=True, nogil=True)
+def _apply(M: Array, s: Array, out: Array) -> None:
+    for i in range(6):
+        out[i] = M[i, 0] * s[0] + M[i, 1] * s[1] + M[i, 2] * s[2] + M[i, 3] * s[3] + M[i, 4] * s[4] + M[i, 5] * s[5]
+
+
+@numba.njit(cache=True, nogil=True)
+def _dot(a: Array, b: Array) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]

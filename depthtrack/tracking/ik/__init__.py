@@ -1,1 +1,0 @@
-"""Inverse kinematics from the observed surface to the hand's (Schroeder, Maycock, Ritter and Botsch 2014)."""

@@ -1,0 +1,1 @@
+"""Poses to start a search from."""

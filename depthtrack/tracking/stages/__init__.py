@@ -1,0 +1,1 @@
+"""The stages that trackers are made of."""

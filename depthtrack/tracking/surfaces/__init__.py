@@ -1,0 +1,1 @@
+"""Hand surfaces that observed points are matched to."""

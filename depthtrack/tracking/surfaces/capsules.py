@@ -1,0 +1,197 @@
+"""Closest points on a hand of tapered capsules (Schroeder et al. 2014, Sec. VI-C, has cylinders).
+
+A capsule is swept by balls along its bone, their radius changing on the way. All capsules are tried for all points, one
+capsule after the other, so that the compiler can take several points at a time.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.hand.compiled_kinematics import Bodies
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+from depthtrack.segmentation.observation import Observation
+from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+
+_HIDDEN = 0.006
+"""Metres behind the rendered hand at which a point counts as hidden: pixels are coarse, and surfaces slanted."""
+_RESOLUTION = 96
+"""Longest side of that rendering, pixels."""
+
+
+class Placed(NamedTuple):
+    """Capsules in the camera frame: `start` (K, 3) and unit `axis` (K, 3), and what `Capsules` says of the rest."""
+
+    start: Array
+    axis: Array
+
+
+class Distances(NamedTuple):
+    """`each` (K, N) metres from each point to the surface of each capsule; `least` (N,) of them, and `which` (N,)."""
+
+    each: Array32
+    least: Array32
+    which: NDArray[np.int32]
+
+    @staticmethod
+    def room(capsules: int, points: int) -> "Distances":
+        """Room for so many."""
+        each = np.empty((capsules, points), np.float32)
+        return Distances(each, np.empty(points, np.float32), np.empty(points, np.int32))
+
+
+class View(NamedTuple):
+    """The hand as rendered: `depth` (h, w) metres, 0 for none, and the lens (fx, fy, cx, cy)."""
+
+    depth: NDArray[np.float32]
+    lens: tuple[float, float, float, float]
+
+
+class CapsuleSurface:
+    """See the module, and `matching.Surface`."""
+
+    def __init__(self, shape: HandShape) -> None:
+        self._capsules = fitted_capsules(shape)
+        self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
+        self._scorer = RasterScorer(shape)
+
+    def observe(self, observation: Observation, cloud: Cloud, reach: float) -> None:
+        target = Target(observation.camera, observation.skin, observation.depth).reduced(_RESOLUTION)
+        self._scorer.observe(target)
+        c = target.camera
+        self._lens = (c.fx, c.fy, c.cx, c.cy)
+        self._reach = reach
+        self._distances = Distances.room(len(self._capsules.body), len(cloud.points))
+
+    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
+        view = View(self._scorer.render(pose), self._lens)
+        place_capsules(self._capsules, bodies, self._placed)
+        measure(cloud.points, self._capsules, self._placed, self._distances)
+        limits = (self._reach, agreement)
+        choose(cloud, self._capsules, self._placed, self._distances, view, limits, matches)
+
+
+@numba.njit(cache=True, nogil=True)
+def place_capsules(capsules: Capsules, bodies: Bodies, placed: Placed) -> None:
+    """Move the capsules to where their bodies are."""
+    for k in range(capsules.body.shape[0]):
+        T = bodies.T[capsules.body[k]]
+        for i in range(3):
+            placed.start[k, i], placed.axis[k, i] = T[i, 3], 0.0
+            for j in range(3):
+                placed.start[k, i] += T[i, j] * capsules.start[k, j]
+                placed.axis[k, i] += T[i, j] * capsules.axis[k, j]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -> None:
+    """Distances of points (N, 3) to all capsules; `out` may have room for more points."""
+    count = points.shape[0]
+    each, least, which = out
+    # Single precision, coordinate by coordinate: twice as many points at a time, and tenths of micrometres are left.
+    px, py, pz = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
+    for i in range(count):
+        px[i], py[i], pz[i] = points[i, 0], points[i, 1], points[i, 2]
+        least[i] = np.float32(1e9)
+    nothing = np.float32(0.0)
+    for k in range(capsules.body.shape[0]):
+        cx, cy, cz = np.float32(placed.start[k, 0]), np.float32(placed.start[k, 1]), np.float32(placed.start[k, 2])
+        ax, ay, az = np.float32(placed.axis[k, 0]), np.float32(placed.axis[k, 1]), np.float32(placed.axis[k, 2])
+        length, radius = np.float32(capsules.length[k]), np.float32(capsules.radius[k])
+        taper = np.float32(capsules.taper[k])
+        # The nearest of the balls that sweep the capsule lies where the cone's normal leads, not straight across.
+        lean = taper / np.float32(math.sqrt(1.0 - taper * taper))
+        distance, number = each[k], np.int32(k)
+        for i in range(count):
+            x, y, z = px[i] - cx, py[i] - cy, pz[i] - cz
+            along = x * ax + y * ay + z * az
+            square = max(x * x + y * y + z * z - along * along, nothing)
+            t = min(max(along - np.sqrt(square) * lean, nothing), length)
+            rest = along - t
+            d = abs(np.sqrt(rest * rest + square) - (radius - taper * t))
+            distance[i] = d
+            nearer = d < least[i]
+            least[i] = d if nearer else least[i]
+            which[i] = number if nearer else which[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def choose(
+    cloud: Cloud,
+    capsules: Capsules,
+    placed: Placed,
+    distances: Distances,
+    view: View,
+    limits: tuple[float, float],
+    matches: Matches,
+) -> None:
+    """The nearest capsule whose closest point is seen and faces as observed; its point and normal into `matches`.
+
+    `limits`: reach (m) and agreement (cosine) of `matching.Surface`.
+    """
+    x, n, normals = matches.x, matches.n, cloud.normals
+    reach, agreement = limits
+    for i in range(cloud.points.shape[0]):
+        matches.body[i] = -1
+        k, distance = distances.which[i], distances.least[i]
+        while distance < reach:
+            surface_point(cloud.points, i, capsules, placed, k, x, n)
+            same = n[i, 0] * normals[i, 0] + n[i, 1] * normals[i, 1] + n[i, 2] * normals[i, 2]
+            if same >= agreement and not _hidden(x, i, view):
+                matches.body[i] = capsules.body[k]
+                break
+            # The next one further out.
+            passed, distance = distance, reach
+            for j in range(capsules.body.shape[0]):
+                if passed < distances.each[j, i] < distance:
+                    k, distance = j, distances.each[j, i]
+
+
+@numba.njit(cache=True, nogil=True)
+def surface_point(points: Array, i: int, capsules: Capsules, placed: Placed, k: int, x: Array, n: Array) -> None:
+    """The point of capsule k closest to point i, and the outward normal there, into row i of `x` and `n`.
+
+    A point on the far side is replaced by its mirror image on the side that the camera sees.
+    """
+    taper = capsules.taper[k]
+    along = square = 0.0
+    for j in range(3):
+        along += (points[i, j] - placed.start[k, j]) * placed.axis[k, j]
+    for j in range(3):
+        square += (points[i, j] - placed.start[k, j] - along * placed.axis[k, j]) ** 2
+    t = along - math.sqrt(square) * taper / math.sqrt(1.0 - taper * taper)
+    t = min(max(t, 0.0), capsules.length[k])
+    radius = capsules.radius[k] - taper * t
+    scale = 1 / max(math.sqrt(square + (along - t) ** 2), 1e-12)
+    sight = square = 0.0
+    for j in range(3):
+        x[i, j] = placed.start[k, j] + t * placed.axis[k, j]
+        n[i, j] = (points[i, j] - x[i, j]) * scale
+        sight += n[i, j] * x[i, j]
+        square += x[i, j] * x[i, j]
+    if sight > 0:
+        for j in range(3):
+            n[i, j] -= 2 * sight / square * x[i, j]
+    for j in range(3):
+        x[i, j] += radius * n[i, j]
+
+
+@numba.njit(cache=True, nogil=True)
+def _hidden(x: Array, i: int, view: View) -> bool:
+    """Whether the rendered hand lies in front of a point."""
+    fx, fy, cx, cy = view.lens
+    z = x[i, 2]
+    u, v = round(x[i, 0] / z * fx + cx), round(x[i, 1] / z * fy + cy)
+    if 0 <= u < view.depth.shape[1] and 0 <= v < view.depth.shape[0]:
+        front = view.depth[v, u]
+        return front > 0 and z > front + _HIDDEN
+    return False

@@ -1,0 +1,112 @@
+"""A frame with everything known about it: what pictures and viewers show."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from depthtrack.geometry.camera import Camera
+from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
+from depthtrack.viewing.depth_colours import depth_range
+
+Pixel = TypeVar("Pixel", bound=np.generic)
+
+MaskEstimator = Callable[[Frame], NDArray[np.bool_] | None]
+"""Finds the hand's silhouette (h, w) in a frame, or None where it sees no hand. Called on frames in their order."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One frame, the hand's silhouette (h, w) in it, and the true keypoints (21, 3) in metres, camera frame.
+
+    `mask_is_true` tells a silhouette known to the recording from an estimated one.
+    """
+
+    frame: Frame
+    mask: NDArray[np.bool_] | None = None
+    mask_is_true: bool = False
+    keypoints: NDArray[np.float64] | None = None
+
+    @classmethod
+    def of(cls, sequence: Sequence, frame: Frame, estimate: MaskEstimator | None = None) -> Self:
+        """A frame of a recording; `estimate` is asked for a mask where the recording knows none.
+
+        Raises DamagedFrameError where the true mask is there and cannot be read.
+        """
+        true_mask = sequence.hand_mask(frame.index)
+        mask = true_mask if true_mask is not None or estimate is None else estimate(frame)
+        return cls(frame, mask, true_mask is not None, true_keypoints(sequence.ground_truth, frame.timestamp))
+
+    @property
+    def camera(self) -> Camera:
+        """Camera of the frame."""
+        return self.frame.camera
+
+    def hand_box(self) -> tuple[int, int, int, int] | None:
+        """(left, top, right, bottom) pixels, ends excluded, around the silhouette and the keypoints seen; or None."""
+        pixels = [np.empty((0, 2))]
+        if self.mask is not None:
+            pixels.append(np.argwhere(self.mask)[:, ::-1].astype(np.float64))
+        if self.keypoints is not None:
+            pixels.append(self.camera.project(self.keypoints))
+        found = np.concatenate(pixels)
+        found = found[np.isfinite(found).all(axis=1)]
+        if len(found) == 0:
+            return None
+        (left, top), (right, bottom) = np.floor(found.min(axis=0)), np.floor(found.max(axis=0)) + 1
+        return int(left), int(top), int(right), int(bottom)
+
+    def cropped(self, left: int, top: int, width: int, height: int) -> "Moment":
+        """The window whose first pixel is (left, top); what lies outside the image is black and without reading."""
+        frame = self.frame
+        window = (left, top, width, height)
+        return Moment(
+            Frame(
+                frame.index,
+                frame.timestamp,
+                _crop(frame.depth, *window),
+                None if frame.colour is None else _crop(frame.colour, *window),
+                self.camera.crop(*window),
+            ),
+            None if self.mask is None else _crop(self.mask, *window),
+            self.mask_is_true,
+            self.keypoints,
+        )
+
+
+def moments(
+    sequence: Sequence, indices: Iterable[int] | None = None, estimate: MaskEstimator | None = None
+) -> Iterator[Moment]:
+    """Moments of a recording, one at a time: of the frames `indices` in that order, or of all.
+
+    Damaged frames are refused or skipped as was chosen when the recording was opened.
+    """
+    for frame in sequence.frames(range(len(sequence)) if indices is None else indices):
+        yield Moment.of(sequence, frame, estimate)
+
+
+def true_keypoints(truth: GroundTruth | None, timestamp: float) -> NDArray[np.float64] | None:
+    """The 21 keypoints (21, 3) known at `timestamp`, metres."""
+    return None if truth is None else truth.keypoints_at(timestamp)
+
+
+def evenly_chosen(length: int, count: int) -> list[int]:
+    """At most `count` different indices below `length`, in order: the middles of as many equal parts."""
+    count = min(length, count)
+    return [int((part + 0.5) * length / count) for part in range(count)]
+
+
+def sequence_depth_range(sequence: Sequence) -> tuple[float, float]:
+    """Near and far, metres, of a few frames spread over a recording: one scale for all of its pictures."""
+    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
+
+
+def _crop(image: NDArray[Pixel], left: int, top: int, width: int, height: int) -> NDArray[Pixel]:
+    out = np.zeros((height, width, *image.shape[2:]), dtype=image.dtype)
+    x0, y0 = max(left, 0), max(top, 0)
+    x1, y1 = min(left + width, image.shape[1]), min(top + height, image.shape[0])
+    if x0 < x1 and y0 < y1:
+        out[y0 - top : y1 - top, x0 - left : x1 - left] = image[y0:y1, x0:x1]
+    return out

@@ -1,0 +1,194 @@
+"""Calibration: sizes recovered from a recording, gradients held to differences, and what cannot be measured refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
+from depthtrack.calibration.joint_optimisation import fit_jointly
+from depthtrack.calibration.parameters import (
+    COUNT,
+    LENGTHS,
+    SCALE,
+    hand_of,
+    measures,
+    motion_of,
+    prior_covariance,
+)
+from depthtrack.calibration.residuals import SkinModel, View, gather
+from depthtrack.calibration.views import choose_views, finger_area
+from depthtrack.cli import main
+from depthtrack.cli.calibrate import _text
+from depthtrack.errors import InputError
+from depthtrack.evaluation.metrics import endpoint_error
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.recording import SequenceWriter, open_sequence
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.solver.keypoints import KEYPOINT_BODIES
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.trackers.ik import IkTracker
+from depthtrack.viewing.calibration_picture import shown_views
+from tests.synthetic_observations import observe
+
+
+def _rendered(pose: np.ndarray) -> Observation:
+    """The true hand in a pose, as a perfect sensor and segmentation see it."""
+    camera = Camera(240, 240, 500, 500, 120, 120)
+    skin = Skin.of(TRUE_HAND)
+    vertices = skin.at(pose)
+    surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
+    depth = surface.depth.astype(np.float32)
+    return Observation(0, 0.0, camera, (0, 0), depth > 0, depth, pose[:3].copy(), palm_radius=0.04)
+
+
+def _empty_room(folder: Path) -> Path:
+    """Four frames of a wall."""
+    camera = Camera(64, 48, 60, 60, 31.5, 23.5, 0.001)
+    with SequenceWriter(folder, camera) as writer:
+        for i in range(4):
+            writer.append(0.1 * i, np.full(camera.shape, 1.5, np.float32))
+    return folder
+
+
+def _sizes() -> np.ndarray:
+    """A hand of scale 0.9 whose middle finger is a tenth longer."""
+    values = np.zeros(COUNT)
+    values[SCALE] = np.log(0.9)
+    values[LENGTHS][6:9] = np.log(1.1)
+    return values
+
+
+TRUE_HAND = hand_of(_sizes(), "right")
+MADE = Synthesiser(Synthesis(model="skin", hand=TRUE_HAND))
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return calibrate([observe(MADE, i) for i in range(5, 355, 80)])
+
+
+def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
+    hand = calibration.hand
+    assert hand.side == "right"
+    assert hand.scale == pytest.approx(0.9, rel=0.02)
+    found, true = hand.lengths.sum(axis=1) * hand.scale, TRUE_HAND.lengths.sum(axis=1) * TRUE_HAND.scale
+    np.testing.assert_allclose(found, true, atol=0.0025)
+    np.testing.assert_allclose(hand.radii * hand.scale, TRUE_HAND.radii * TRUE_HAND.scale, atol=0.001)
+    assert hand.palm_breadth * hand.scale == pytest.approx(TRUE_HAND.palm_breadth * 0.9, rel=0.04)
+    assert calibration.after_mm < 0.5 < calibration.before_mm
+
+
+def test_what_is_said_of_sureness_is_true(calibration: Calibration) -> None:
+    truth = {name: 1000 * metres for name, (metres, _) in measures(_sizes()).items()}
+    for name, found in calibration.measured.items():
+        assert 0 < found.confidence < 1
+        assert abs(found.mm - truth[name]) < 3 * found.sigma_mm, name
+
+
+def test_a_calibrated_hand_is_tracked_better(calibration: Calibration) -> None:
+    frames, errors = range(100, 125), {}
+    observations = [observe(MADE, i) for i in frames]
+    for name, hand in (("average", HandShape()), ("calibrated", calibration.hand)):
+        tracker = IkTracker(hand)
+        first = tracker.start(observations[0], MADE.poses[frames.start])
+        poses = [first.pose, *(tracker.track(o).pose for o in observations[1:])]
+        truth = HandModel(TRUE_HAND), MADE.poses[frames.start : frames.stop]
+        errors[name] = endpoint_error(HandModel(hand), np.array(poses), *truth).values.mean()
+    assert errors["calibrated"] < 2.5
+    assert errors["calibrated"] < errors["average"] / 2
+
+
+def test_the_file_can_be_read_as_a_hand(calibration: Calibration, tmp_path: Path) -> None:
+    (tmp_path / "hand.json").write_text(calibration.to_json())
+    assert HandShape.from_json(tmp_path / "hand.json") == calibration.hand
+
+
+def test_views_are_shown_in_the_order_of_the_recording(calibration: Calibration) -> None:
+    observations = calibration.observations[::-1]
+    shown = [observations[i].frame_index for i in shown_views(observations)]
+    assert len(shown) == 4
+    assert shown == sorted(shown)
+
+
+@pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])
+def test_a_side_that_fits_hardly_better_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
+    certain = {name: replace(m, confidence=0.9999) for name, m in calibration.measured.items()}
+    found = replace(calibration, side_margin=margin, measured=certain)
+    assert summary(found)["side_sure"] == sure
+    text = _text(found, Path("hand.json"), Path("hand.png"))
+    assert ("side not sure; give --side" in text) == (not sure)
+    assert "0.99" in text
+    assert "1.00\n" not in text
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_gradients_agree_with_finite_differences_on_the_bones(side: Side) -> None:
+    generator = np.random.default_rng(3)
+    values = 0.5 * generator.standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
+    pose = make_pose([0.02, 0, 0.5], [0.5, 0.5, -0.4, 0.6], POSTURES["relaxed"])
+
+    def joints(v: np.ndarray) -> np.ndarray:
+        return HandModel(hand_of(v, side)).endpoints(pose)
+
+    # A joint is fixed to the bone before it, whose length moves it.
+    J = motion_of(HandModel(hand_of(values, side)), pose, KEYPOINT_BODIES[1:], joints(values))
+    step = 1e-6 * np.eye(COUNT)
+    expected = np.stack([(joints(values + d) - joints(values - d)) / 2e-6 for d in step], axis=-1)
+    np.testing.assert_allclose(J, expected, atol=1e-8)
+
+
+def test_usual_proportions_leave_the_hand_as_it_is() -> None:
+    generator = np.random.default_rng(4)
+    values = generator.standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
+    before, after = hand_of(values, "left"), hand_of(with_usual_proportions(values), "left")
+    assert after.scale != pytest.approx(before.scale, rel=1e-3)
+    for name in ("lengths", "radii", "bases", "palm_breadth", "palm_length", "palm_thickness", "wrist_breadth"):
+        expected = np.asarray(getattr(before, name)) * before.scale
+        np.testing.assert_allclose(np.asarray(getattr(after, name)) * after.scale, expected, atol=1e-12)
+
+
+def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
+    """A fist tells less of the fingers' lengths than an open hand does, and both more than nothing."""
+    frames = {"fist": POSTURES["fist"], "open": POSTURES["open"]}
+    sigma = {}
+    for name, angles in frames.items():
+        pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], angles)
+        view = View(_rendered(pose))
+        fit = fit_jointly([view], pose[None], _sizes(), "right", rounds=1)
+        of_lengths = [g for measure, (_, g) in measures(_sizes()).items() if measure.endswith("_length")]
+        sigma[name] = sum(float(g @ fit.covariance @ g) for g in of_lengths)
+        sigma["nothing"] = sum(float(g @ prior_covariance() @ g) for g in of_lengths)
+    assert sigma["open"] < 0.9 * sigma["fist"]
+    assert sigma["fist"] < 0.5 * sigma["nothing"]
+
+
+def test_the_true_hand_in_its_true_pose_has_no_residuals() -> None:
+    observation = observe(MADE, 40)
+    true = gather(View(observation), SkinModel(TRUE_HAND), MADE.poses[40], 0.006)
+    average = gather(View(observation), SkinModel(HandShape()), MADE.poses[40], 0.006)
+    assert true.distance < 1e-4 < average.distance
+    assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
+
+
+def test_open_hands_are_chosen_before_fists() -> None:
+    open_hand, fist = (_rendered(make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES[name])) for name in ("open", "fist"))
+    assert finger_area(open_hand) > 4 * finger_area(fist)
+
+
+def test_recordings_without_a_hand_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    empty = _empty_room(tmp_path / "empty")
+    with pytest.raises(InputError, match="0 of 4 frames"):
+        choose_views(open_sequence(empty), Observer(), 4)
+    assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
+    assert "calibrating needs at least 3 frames" in capsys.readouterr().err
+    assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2
+    assert "is a folder: name a file in it" in capsys.readouterr().err
+    assert not (tmp_path / "hand.json").exists()

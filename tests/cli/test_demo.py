@@ -1,0 +1,94 @@
+"""The demo: from nothing to a report, and from a recording of one's own without any truth."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from depthtrack.cli import main
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording import open_sequence
+from depthtrack.recording.run_folder import read_configuration
+from depthtrack.segmentation.observation import Observation
+from tests.run_samples import synthesise
+
+
+def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "demo"
+    assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0
+    assert str(out / "report.html") in capsys.readouterr().out
+    rows = json.loads((out / "results.json").read_text())
+    assert {(row["recording"], row["tracker"]) for row in rows} == {
+        (recording, tracker) for recording in ("skin-hand", "primitive-hand") for tracker in ("pso", "ik")
+    }
+    assert all(0 < row["endpoint_error_mm"]["mean"] < 30 for row in rows)
+    # Each tracker has a home ground, and the page says so.
+    kinds = {open_sequence(folder).description["model"] for folder in (out / "recordings").iterdir()}
+    assert kinds == {"skin", "primitives"}
+    assert (out / "report.html").read_text().count("Home ground") == 2
+    # Given again, nothing is made again.
+    made = {path: path.stat().st_mtime_ns for path in (*out.glob("recordings/*/*"), *out.glob("runs/*/poses.csv"))}
+    assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0
+    assert made == {path: path.stat().st_mtime_ns for path in made}
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A recording as a camera gives it: depth and colour."""
+    folder = synthesise(tmp_path / "own", 3)
+    for name in ("hand_poses.csv", "joints.csv", "hand.json", "sequence.json"):
+        (folder / name).unlink()
+    for name in ("hand_mask", "exact_depth"):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    return folder
+
+
+def test_a_recording_of_ones_own_needs_no_truth(own: Path, tmp_path: Path) -> None:
+    assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1", "--no-calibrate"]) == 0
+    rows = json.loads((tmp_path / "demo" / "results.json").read_text())
+    assert [row["recording"] for row in rows] == ["own", "own"]
+    assert all("endpoint_error_mm" not in row and row["e3d_mm"]["median"] < 6 for row in rows)
+    assert "E3D" in (tmp_path / "demo" / "report.html").read_text()
+
+
+def test_the_hand_of_ones_own_recording_is_measured_first(
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That measuring is right is tested elsewhere; here, that it is asked for once, and used."""
+    asked: list[int] = []
+
+    def measured(observations: Sequence[Observation], **options: Any) -> SimpleNamespace:
+        asked.append(len(observations))
+        hand = HandShape(scale=1.07)
+        return SimpleNamespace(hand=hand, to_json=hand.to_json)
+
+    monkeypatch.setattr("depthtrack.calibration.calibrate.calibrate", measured)
+    monkeypatch.setattr("depthtrack.calibration.views.choose_views", lambda *_: [None] * 5)
+    for _ in range(2):
+        assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
+    assert asked == [5]
+    for run in (tmp_path / "demo" / "runs").iterdir():
+        assert read_configuration(run)["hand"]["scale"] == 1.07
+
+
+def test_a_hand_that_cannot_be_measured_is_taken_for_the_average(
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(*_: Any) -> None:
+        raise InputError("this recording shows no open hand")
+
+    monkeypatch.setattr("depthtrack.calibration.views.choose_views", refused)
+    assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
+    assert "shows no open hand" in capsys.readouterr().out
+    for run in (tmp_path / "demo" / "runs").iterdir():
+        assert read_configuration(run)["hand"]["scale"] == 1
+
+
+def test_a_demo_of_nothing_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", str(tmp_path / "nowhere"), "-o", str(tmp_path / "demo")]) == 2
+    assert "there is no recording" in capsys.readouterr().err

@@ -1,0 +1,142 @@
+"""`depthtrack track` and `evaluate` on a small synthetic recording, killed and resumed as a user might."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from depthtrack.cli import main
+from depthtrack.evaluation.replay import Replay
+from depthtrack.recording import open_sequence
+from depthtrack.recording.run_folder import Run
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+
+FRAMES = 14
+RESOLUTION = 64
+_QUICK = ("--resolution", str(RESOLUTION), "--generations", "12", "--threads", "1", "--start", "truth")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "everyday"
+    assert main(["synth", "everyday", str(folder), "--frames", str(FRAMES)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "whole"
+    assert main(["track", str(recording), "-o", str(folder), *_QUICK]) == 0
+    return folder
+
+
+def test_a_run_follows_the_hand(recording: Path, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", str(run), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["frames"] == FRAMES
+    assert report["lost_frames"] == 0
+    assert 0 < report["endpoint_error_mm"]["mean"] < 6
+    assert 0 < report["angle_error_deg"]["median"] < 8
+    assert report["endpoint_error_mm"]["p95"] <= report["endpoint_error_mm"]["max"]
+    assert report["ms_per_frame"]["median"] > 0
+    poses, truth = Run.load(run).poses, open_sequence(recording).ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    palm_mm = 1000 * np.linalg.norm(poses[:, :3] - truth.poses[:, :3], axis=1)
+    assert palm_mm.max() < 10
+
+
+def test_a_killed_run_resumes_to_the_same_poses(recording: Path, run: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "depthtrack", "track", str(recording), "-o", str(folder), *_QUICK]
+    # Slow enough to be killed in the middle: the first frames compile or load the kernels.
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and process.poll() is None:
+        if (folder / "poses.csv").exists() and len((folder / "poses.csv").read_text().splitlines()) > 3:
+            os.kill(process.pid, signal.SIGKILL)
+            break
+        time.sleep(0.002)
+    process.wait()
+    before = len(Run.load(folder).index)
+    assert before >= 2
+    assert main(["track", str(recording), "-o", str(folder), *_QUICK, "--resume"]) == 0
+    assert (folder / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+
+
+def test_a_run_is_replayed_exactly_as_the_tracker_saw_it(run: Path) -> None:
+    """The energies that the tracker wrote down come back bit for bit, which no other segmentation of a frame gives."""
+    replay = Replay.open(Run.load(run))
+    with RasterScorer(replay.hand) as scorer:
+        for seen in replay:
+            assert seen.observation is not None
+            assert seen.estimate.pose is not None
+            observed = Target(seen.observation.camera, seen.observation.skin, seen.observation.depth)
+            scorer.observe(observed.reduced(RESOLUTION))
+            assert scorer.score(seen.estimate.pose[None])[0] == seen.estimate.energy
+
+
+def test_text_names_the_metrics(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", str(run)]) == 0
+    text = capsys.readouterr().out
+    assert "endpoint_error_mm" in text
+    assert "ms_per_frame" in text
+
+
+def test_several_runs_give_a_list(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", str(run), str(run), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)) == 2
+
+
+def test_a_recording_without_true_poses_cannot_start_from_them(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import shutil
+
+    blind = tmp_path / "blind"
+    shutil.copytree(recording, blind)
+    (blind / "hand_poses.csv").unlink()
+    (blind / "joints.csv").unlink()
+    assert main(["track", str(blind), "-o", str(tmp_path / "run"), "--start", "truth"]) == 2
+    assert "--start auto" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_sizes_that_are_nobodys_are_told_of(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import shutil
+
+    unsized = tmp_path / "unsized"
+    shutil.copytree(recording, unsized)
+    (unsized / "hand.json").unlink()
+    short = (*_QUICK, "--frames", "1")
+    for path, more, told in ((unsized, (), True), (unsized, ("--hand", str(recording / "hand.json")), False)):
+        assert main(["track", str(path), "-o", str(tmp_path / f"run{told}"), *short, *more]) == 0
+        assert (f"measure this hand with  depthtrack calibrate {unsized}" in capsys.readouterr().out) == told
+    assert main(["track", str(recording), "-o", str(tmp_path / "sized"), *short]) == 0
+    assert "average" not in capsys.readouterr().out
+
+
+def test_mistakes_are_told_in_one_sentence(
+    recording: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments, expected in (
+        (["track", str(recording), "-o", str(run)], "--resume"),
+        (["track", str(recording), "-o", str(run), *_QUICK, "--resume", "--seed", "9"], "seed"),
+        (["track", str(tmp_path / "nothing"), "-o", str(tmp_path / "r")], "nothing"),
+        (["track", str(recording), "-o", str(tmp_path / "r"), "--frames", "-1"], "--frames must be at least 1"),
+        (["evaluate", str(tmp_path)], "holds no run"),
+        (["evaluate", str(run), "--sequence", str(tmp_path)], str(tmp_path)),
+    ):
+        assert main(arguments) == 2
+        message = capsys.readouterr().err
+        assert expected in message
+        assert "Traceback" not in message

@@ -1,0 +1,90 @@
+"""`depthtrack track --tracker ik`: its options, what the run tells of them, and resuming."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from depthtrack.cli import main
+from depthtrack.hand.pose import ANGLES
+from depthtrack.hand.synergies import Synergies, load_synergies, save_synergies
+from depthtrack.recording.run_folder import Run, read_configuration
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("made") / "everyday"
+    assert main(["synth", "everyday", str(folder), "--frames", "4", "--model", "skin"]) == 0
+    return str(folder)
+
+
+def track(recording: str, run: Path, *more: str) -> int:
+    return main(["track", recording, "-o", str(run), "--tracker", "ik", "--start", "truth", *more])
+
+
+def test_a_run_in_synergies_stays_among_them_and_tells_which(recording: str, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    assert (
+        track(recording, run, "--synergies", "leap-grasps", "--components", "4", "--rounds", "3", "--inner", "2") == 0
+    )
+    told = read_configuration(run)
+    assert (told["synergies"], told["components"], told["soft"]) == ("leap-grasps", 4, False)
+    assert (told["rounds"], told["inner"], told["residual"]) == (3, 2, None)
+    angles, synergies = Run.load(run).poses[:, ANGLES], load_synergies("leap-grasps").truncated(4)
+    np.testing.assert_allclose(synergies.angles(synergies.project(angles)), angles, atol=1e-6)
+
+
+def test_soft_synergies_leave_all_angles_free(recording: str, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    assert track(recording, run, "--synergies", "leap", "--components", "4", "--soft", "--residual", "plane") == 0
+    angles, synergies = Run.load(run).poses[:, ANGLES], load_synergies().truncated(4)
+    assert np.abs(synergies.angles(synergies.project(angles)) - angles).max() > 0.05
+
+
+def test_a_run_goes_on_only_with_the_synergies_that_it_began_with(
+    recording: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, file = tmp_path / "run", tmp_path / "mine.json"
+    save_synergies(load_synergies("leap-grasps"), file)
+    assert track(recording, run, "--synergies", str(file)) == 0
+    whole = (run / "poses.csv").read_bytes()
+    lines = whole.splitlines(keepends=True)
+    (run / "poses.csv").write_bytes(b"".join(lines[:3]))
+    assert track(recording, run, "--synergies", str(file), "--resume") == 0
+    assert (run / "poses.csv").read_bytes() == whole
+    assert track(recording, run, "--synergies", str(file), "--components", "5", "--resume") == 2
+    assert "components" in capsys.readouterr().err
+    postures = load_synergies().angles(np.random.default_rng(0).normal(size=(30, 20)))
+    save_synergies(Synergies.fit(postures), file)
+    assert track(recording, run, "--synergies", str(file), "--resume") == 2
+    assert "synergies_sha256" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("--particles", "8"), "--particles"),
+        (("--tracker", "pso", "--soft", "--rounds", "3"), "--rounds, --soft"),
+        (("--components", "3"), "say which synergies"),
+        (("--soft",), "say which synergies"),
+        (("--synergies", "magic"), "leap-grasps"),
+        (("--synergies", "leap", "--components", "21"), "1 to 20 components"),
+        (("--rounds", "0"), "rounds"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(
+    recording: str, tmp_path: Path, arguments: tuple[str, ...], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert track(recording, tmp_path / "run", *arguments) == 2
+    told = capsys.readouterr().err
+    assert complaint in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_configuration_can_be_read_by_people(recording: str, tmp_path: Path) -> None:
+    assert track(recording, tmp_path / "run") == 0
+    told = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert (told["tracker"], told["model"], told["rounds"], told["subsample"]) == ("ik", "skin", 5, 3)
+    assert "particles" not in told

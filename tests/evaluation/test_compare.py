@@ -1,0 +1,262 @@
+"""Comparisons: who takes part, equal time, runs that are kept and resumed, and results that say what the runs hold."""
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.cli import main
+from depthtrack.errors import InputError
+from depthtrack.evaluation.compare.budget import search, sized
+from depthtrack.evaluation.compare.comparison import Comparison, Progress, compare
+from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
+from depthtrack.evaluation.compare.running import Source
+from depthtrack.evaluation.compare.specs import Contender, read_contenders
+from depthtrack.evaluation.sweep.run import InThisProcess
+from depthtrack.recording.run_folder import Run
+from depthtrack.tracking.tracker import Estimate, Status
+from tests.evaluation.test_sweep import dask_scheduler, dask_workers
+
+FRAMES = 8
+QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "everyday"
+    assert main(["synth", "everyday", str(folder), "--frames", str(FRAMES)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def compared(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("compared")
+    arguments = ["compare", str(recording), "-o", str(folder), "--trackers", QUICK, "--repeats", "2", "--jobs", "1"]
+    assert main(arguments) == 0
+    return folder
+
+
+def test_contenders_are_read_as_people_write_them() -> None:
+    assert read_contenders(["pso,ik:variant=paper,rounds=3", "pso:particles=16,resolution=64"]) == [
+        Contender("PSO", "pso"),
+        Contender("IK variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
+        Contender("PSO particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
+    ]
+
+
+def test_contenders_are_read_from_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "trackers.toml"
+    file.write_text('["As in 2011"]\ntracker = "pso"\nvariant = "paper"\n\n[surface]\ntracker = "ik"\n')
+    first, second = read_contenders([str(file)])
+    assert (first.label, first.tracker, first.options) == ("As in 2011", "pso", {"variant": "paper"})
+    assert (second.label, second.options) == ("surface", {})
+    # The budget is among the options that a run tells, though nobody gave it.
+    assert first.complete_options.items() >= {"variant": "paper", "particles": 64, "generations": 25}.items()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "at least one"),
+        ("pso,kalman", "kalman"),
+        ("ik:colour=red", "colour"),
+        ("pso:particles=many", "particles"),
+        ("pso:variant=fast", "variant"),
+        ("pso:seed=3", "seed"),
+        ("rounds=3", "rounds=3"),
+        ("pso:particles", "particles"),
+        ("pso,pso", "two trackers"),
+        ("nowhere.toml", "nowhere.toml"),
+    ],
+)
+def test_contenders_that_make_no_sense_are_refused(text: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        read_contenders([text])
+
+
+def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "trackers.toml"
+    file.write_text("ik = " + "[" * 50_000)
+    with pytest.raises(InputError, match="cannot read the trackers"):
+        read_contenders([str(file)])
+
+
+@given(st.floats(0.5, 500), st.floats(0, 20), st.floats(0.1, 40))
+def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float) -> None:
+    """Whatever a tracker's costs, linear in its work: within a step of the work, or at the least work there is."""
+    defaults: dict[str, Any] = {"particles": 64, "generations": 25}
+
+    def cost(options: dict[str, Any]) -> float:
+        return always + each * options["particles"] * options["generations"] / 1600
+
+    budget = search(lambda size: sized("pso", defaults, size), cost, ms)
+    assert budget.ms == cost(budget.options)
+    least, most = cost(sized("pso", defaults, 1 / 32)), cost(sized("pso", defaults, 64))
+    reachable = min(max(ms, least), most)
+    assert budget.ms == pytest.approx(reachable, rel=0.15)
+
+
+def test_more_work_is_more_of_everything() -> None:
+    swarm: dict[str, Any] = {"particles": 64, "generations": 25}
+    assert sized("pso", swarm, 1) == swarm
+    assert sized("pso", swarm, 4) == {"particles": 128, "generations": 50}
+    surface: dict[str, Any] = {"rounds": 5, "subsample": 3}
+    assert sized("ik", surface, 1) == surface
+    work = [sized("ik", surface, size) for size in (0.1, 0.5, 1, 2, 4, 9, 30)]
+    points_times_rounds = [options["rounds"] / options["subsample"] for options in work]
+    assert points_times_rounds == sorted(points_times_rounds)
+    assert work[-1]["subsample"] == 1
+
+
+class Idle:
+    """A tracker that waits and hardly works."""
+
+    name, stages, expected = "idle", ("wait", "work"), None
+
+    def start(self, observation: Any, pose: Any = None) -> Estimate:
+        time.sleep(0.03)
+        return Estimate(None, math.nan, 0.0, Status.LOST, {"wait": 20.0, "work": 10.0})
+
+    track = start
+
+    def recall(self, estimates: Any) -> None: ...
+    def close(self) -> None: ...
+
+
+def test_waiting_costs_no_time() -> None:
+    """CPU time is told, in the shares of the tracker's own clock."""
+    stage_ms = TimedByProcessor(Idle()).track(None).stage_ms  # type: ignore[arg-type]
+    assert sum(stage_ms.values()) < 20
+    assert stage_ms["wait"] == pytest.approx(2 * stage_ms["work"])
+
+
+def test_runs_and_results(compared: Path) -> None:
+    runs = sorted((compared / "runs").iterdir())
+    assert len(runs) == 4
+    rows = json.loads((compared / "results.json").read_text())
+    assert [(row["tracker"], row["seed"]) for row in rows] == [("pso", 0), ("pso", 1), ("ik", 0), ("ik", 1)]
+    with (compared / "results.csv").open(newline="") as file:
+        flat = list(csv.DictReader(file))
+    for row, columns in zip(rows, flat, strict=True):
+        run = Run.load(Path(row["run"]))
+        assert len(run.index) == row["frames"] == FRAMES
+        assert run.configuration["seed"] == row["seed"]
+        assert run.configuration["clock"] == row["clock"] == "cpu"
+        assert float(columns["endpoint_error_mm_mean"]) == pytest.approx(row["endpoint_error_mm"]["mean"])
+        spent = sum(values for stage, values in run.stage_ms.items() if stage != "segment")
+        followed = np.array([status == "tracked" for status in run.status])
+        assert row["tracker_ms"]["mean"] == pytest.approx(np.mean(np.asarray(spent)[followed]), rel=1e-3)
+    # Options that were given, and those that were not, stand in the run: it can be made again.
+    assert Run.load(Path(rows[0]["run"])).configuration["particles"] == 12
+    assert Run.load(Path(rows[0]["run"])).configuration["renderer"] == "raster"
+
+
+def test_a_table_has_a_line_for_each_tracker(
+    recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["compare", str(recording), "-o", str(compared), "--trackers", QUICK, "--repeats", "2", "--jobs", "1"]
+    before = {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
+    assert main(arguments) == 0
+    head, pso, ik = capsys.readouterr().out.splitlines()[:3]
+    assert "error mean mm" in head
+    assert "PSO particles=12" in pso
+    assert "IK rounds=1" in ik
+    # Nothing was tracked again.
+    assert before == {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
+
+
+def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, tmp_path: Path) -> None:
+    """Killed in the middle of a run, then given again: the poses are those of a comparison left in peace."""
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "depthtrack", "compare", str(recording), "-o", str(folder), "--trackers", QUICK]
+    command += ["--repeats", "2", "--jobs", "1"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and process.poll() is None:
+        begun = list(folder.glob("runs/*/poses.csv"))
+        if begun and len(begun[0].read_text().splitlines()) > 3:
+            os.killpg(process.pid, signal.SIGKILL)
+            break
+        time.sleep(0.002)
+    process.wait()
+    assert len(list(folder.glob("runs/*/done.json"))) < 4
+    assert main(command[3:]) == 0
+    for run in (compared / "runs").iterdir():
+        assert (folder / "runs" / run.name / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+
+
+def test_a_dask_cluster_makes_the_same_runs(recording: Path, compared: Path, tmp_path: Path) -> None:
+    out, surface = tmp_path / "out", QUICK[QUICK.index("ik:") :]
+    arguments = ["compare", str(recording), "-o", str(out), "--trackers", surface, "--repeats", "2"]
+    with dask_scheduler(tmp_path) as (address, _), dask_workers(address, tmp_path):
+        assert main([*arguments, "--scheduler", address]) == 0
+    for run in (out / "runs").iterdir():
+        assert (run / "poses.csv").read_bytes() == (compared / "runs" / run.name / "poses.csv").read_bytes()
+    assert len(json.loads((out / "results.json").read_text())) == 2
+
+
+def test_other_options_need_another_folder(recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["compare", str(recording), "-o", str(compared), "--jobs", "1", "--trackers", QUICK, "--frames", "3"]
+    assert main(arguments) == 2
+    message = capsys.readouterr().err
+    assert "frames" in message
+    assert "another folder" in message
+
+
+def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -> None:
+    source = Source(str(recording), frames=6)
+    comparison = Comparison((source,), tuple(read_contenders(["pso:resolution=48,ik:subsample=6"])), equal_ms=6.0)
+    heard: list[Progress] = []
+    plans = compare(comparison, tmp_path, InThisProcess(), heard.append)
+    assert "6 ms" in heard[0].what
+    assert (heard[-1].frames, heard[-1].total) == (12, 12)
+    for plan in plans:
+        told = Run.load(Path(plan.folder)).configuration
+        assert told["budget"]["equal_ms"] == 6.0
+        assert told["budget"]["calibrated_ms"] > 0
+    assert Run.load(Path(plans[0].folder)).configuration["resolution"] == 48
+    assert Run.load(Path(plans[1].folder)).configuration["rounds"] == plans[1].options["rounds"]
+    # A second measurement would choose a little differently; the first one stands.
+    again = compare(comparison, tmp_path, InThisProcess())
+    assert again == plans
+
+
+def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other" / "everyday"
+    assert main(["synth", "everyday", str(other), "--frames", "3", "--seed", "4"]) == 0
+    contenders = tuple(read_contenders(["ik:rounds=1,subsample=6"]))
+    comparison = Comparison((Source(str(recording), frames=3), Source(str(other))), contenders)
+    first, second = compare(comparison, tmp_path / "out", InThisProcess())
+    assert first.folder != second.folder
+    assert Run.load(Path(second.folder)).configuration["sequence"] == str(other)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--repeats", "0"], "repeats"),
+        (["--equal-time", "0"], "equal time"),
+        (["--frames", "0"], "--frames"),
+        (["--jobs", "0"], "--jobs"),
+        (["--hand", "nobody.json"], "nobody.json"),
+        (["--camera", "a.json", "--camera-preset", "tum"], "give one"),
+    ],
+)
+def test_mistakes_are_told_in_one_sentence(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], told: str
+) -> None:
+    assert main(["compare", str(recording), "-o", str(tmp_path / "out"), "--trackers", "ik", *more]) == 2
+    message = capsys.readouterr().err
+    assert told in message
+    assert "Traceback" not in message

@@ -1,0 +1,257 @@
+"""Sweeps: every cell once, whatever becomes of the process, its workers, or the file that rows are written to."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.cli import main
+from depthtrack.errors import InputError, MissingExtraError
+from depthtrack.evaluation.sweep import cluster
+from depthtrack.evaluation.sweep.cluster import DaskWorkers
+from depthtrack.evaluation.sweep.local import PATIENCE, LocalWorkers
+from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
+from depthtrack.evaluation.sweep.run import InThisProcess, SweepError, Workers, run_sweep
+
+ROOT = Path(__file__).parents[2]
+
+
+def square(cell: Cell) -> Row:
+    """A measurement that says which process made it."""
+    return {"square": cell["x"] ** 2, "process": os.getpid()}
+
+
+def deadly_at_first(cell: Cell) -> Row:
+    """As `square`, but the cell that names a file kills its worker as long as that file is not there."""
+    time.sleep(0.02)
+    if cell["marker"] is not None and not Path(cell["marker"]).exists():
+        Path(cell["marker"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(cell)
+
+
+def always_deadly(cell: Cell) -> Row:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return {}
+
+
+def refusing(cell: Cell) -> Row:
+    """What a cell does that finds something missing; this error cannot travel between processes as it is."""
+    raise MissingExtraError(f"cell {cell['x']}", "sweep")
+
+
+def sweep(folder: Path, cells: list[Cell], workers: Workers, measure: Any = square) -> list[Row]:
+    with Journal(folder / "rows.jsonl", list(cells[0])) as journal:
+        return run_sweep(measure, cells, journal, workers)
+
+
+@contextmanager
+def dask_process(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A `dask` command in a process of its own, which finds this module."""
+    command = [sys.executable, "-m", "dask", *arguments]
+    process = subprocess.Popen(command, cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextmanager
+def dask_scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A Dask scheduler on loopback: its address and its process."""
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'depthtrack[sweep]'")
+    note = folder / "scheduler.json"
+    where = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", f"--scheduler-file={note}")
+    with dask_process("scheduler", *where) as process:
+        for _ in range(600):
+            if note.exists() and note.read_text().endswith("}"):
+                break
+            time.sleep(0.1)
+        yield json.loads(note.read_text())["address"], process
+
+
+def dask_workers(address: str, folder: Path) -> AbstractContextManager[Any]:
+    """Two worker processes of a scheduler."""
+    return dask_process(
+        "worker", address, "--nworkers=2", "--nthreads=1", "--no-dashboard", f"--local-directory={folder}"
+    )
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a scheduler with two worker processes."""
+    folder = tmp_path_factory.mktemp("dask")
+    with dask_scheduler(folder) as (address, _), dask_workers(address, folder):
+        yield address
+
+
+@pytest.fixture(params=["joblib", "dask"])
+def workers(request: pytest.FixtureRequest) -> Workers:
+    if request.param == "joblib":
+        return LocalWorkers(2)
+    return DaskWorkers(request.getfixturevalue("scheduler"))
+
+
+def test_every_cell_once_in_its_place(tmp_path: Path, workers: Workers) -> None:
+    cells: list[Cell] = [{"x": x} for x in range(12)]
+    rows = sweep(tmp_path, cells, workers)
+    assert [(row["x"], row["square"]) for row in rows] == [(x, x * x) for x in range(12)]
+    assert os.getpid() not in {row["process"] for row in rows}
+    assert all(row["seconds"] >= 0 for row in rows)
+    written = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
+    assert sorted(written, key=lambda row: row["x"]) == rows
+
+
+def test_a_killed_worker_loses_nothing(tmp_path: Path, workers: Workers) -> None:
+    cells: list[Cell] = [{"x": x, "marker": str(tmp_path / "died") if x == 5 else None} for x in range(12)]
+    rows = sweep(tmp_path, cells, workers, deadly_at_first)
+    assert (tmp_path / "died").exists()
+    assert [(row["x"], row["square"]) for row in rows] == [(x, x * x) for x in range(12)]
+    assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 12
+
+
+def test_a_worker_killed_from_outside_loses_nothing(tmp_path: Path, workers: Workers) -> None:
+    """The first worker to give a row is shot; others, or its successor, do what it would have done."""
+    shot: list[int] = []
+
+    def shoot(rows: Iterator[Row]) -> Iterator[Row]:
+        for row in rows:
+            if not shot:
+                shot.append(row["process"])
+                os.kill(row["process"], signal.SIGKILL)
+            yield row
+
+    cells: list[Cell] = [{"x": x, "marker": None} for x in range(30)]
+    with Journal(tmp_path / "rows.jsonl", ["x", "marker"]) as journal:
+        rows = run_sweep(deadly_at_first, cells, journal, workers, shoot)
+    assert [row["square"] for row in rows] == [x * x for x in range(30)]
+    assert {row["process"] for row in rows} - set(shot)
+
+
+def test_a_cell_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
+    with pytest.raises(SweepError, match=rf"killed {PATIENCE} times in a row.*--jobs"):
+        sweep(tmp_path, [{"x": 1}], LocalWorkers(2), always_deadly)
+
+
+def test_what_a_cell_finds_missing_is_told(tmp_path: Path, workers: Workers) -> None:
+    with pytest.raises(SweepError, match=r"cell 7 .* pip install 'depthtrack\[sweep\]'"):
+        sweep(tmp_path, [{"x": 7}], workers, refusing)
+
+
+def test_rows_that_are_there_are_not_measured_again(tmp_path: Path) -> None:
+    cells: list[Cell] = [{"x": x} for x in range(6)]
+    first = sweep(tmp_path, cells[:4], InThisProcess())
+    assert sweep(tmp_path, cells[:4], InThisProcess(), refusing) == first
+    assert [row["x"] for row in sweep(tmp_path, cells, InThisProcess())] == list(range(6))
+    assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 6
+
+
+@given(st.data())
+def test_a_sweep_goes_on_wherever_its_file_was_cut(data: st.DataObject) -> None:
+    cells: list[Cell] = [{"x": x, "word": "é\n" * x} for x in range(4)]
+    with TemporaryDirectory() as name:
+        path = Path(name) / "rows.jsonl"
+        whole = sweep(path.parent, cells, InThisProcess())
+        content = path.read_bytes()
+        kept = data.draw(st.integers(0, len(content)))
+        path.write_bytes(content[:kept])
+        measured: list[int] = []
+
+        def counted(cell: Cell) -> Row:
+            measured.append(cell["x"])
+            return square(cell)
+
+        again = sweep(path.parent, cells, InThisProcess(), counted)
+        assert [row | {"seconds": 0} for row in again] == [row | {"seconds": 0} for row in whole]
+        assert measured == list(range(content[:kept].count(b"\n"), 4))
+        assert path.read_bytes().count(b"\n") == 4
+
+
+@pytest.mark.parametrize("damage", ["not JSON", "[1, 2]", '{"x": 1', "\xff"])
+def test_a_damaged_file_is_refused(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "rows.jsonl"
+    path.write_bytes(b'{"x": 0}\n' + damage.encode("latin-1") + b"\n")
+    with pytest.raises(InputError, match=r"rows\.jsonl, line 2: expected a JSON object"):
+        Journal(path, ["x"])
+
+
+def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match=r"depthtrack\[sweep\]"):
+        DaskWorkers("tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:{port}", "nonsense://{port}"])
+def test_an_address_without_scheduler_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], address: str
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "PATIENCE", 0.2)
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        there = address.format(port=nobody.getsockname()[1])
+        assert main(["reproduce", "fig2b", "--quick", "-o", str(tmp_path), "--scheduler", there]) == 2
+    assert f"no Dask scheduler answers at '{there}'" in capsys.readouterr().err
+
+
+def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", 1)
+    with dask_scheduler(tmp_path) as (address, _), pytest.raises(InputError, match="has no workers"):
+        list(DaskWorkers(address).measure(square, [{"x": 1}]))
+
+
+def test_a_cell_that_kills_every_dask_worker_is_given_up() -> None:
+    distributed = pytest.importorskip("distributed")
+    import dask
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        distributed.LocalCluster(1, processes=True, threads_per_worker=1, dashboard_address=":0") as local,
+    ):
+        workers = DaskWorkers(local.scheduler_address)
+        with pytest.raises(SweepError, match="killed every worker that took it"):
+            list(workers.measure(always_deadly, [{"x": 1}]))
+
+
+def test_a_sweep_whose_scheduler_dies_keeps_its_rows(tmp_path: Path) -> None:
+    cells: list[Cell] = [{"x": x, "marker": None} for x in range(500)]
+    with dask_scheduler(tmp_path) as (address, process), dask_workers(address, tmp_path):
+
+        def shoot(rows: Iterator[Row]) -> Iterator[Row]:
+            for row in rows:
+                process.kill()
+                yield row
+
+        with (
+            Journal(tmp_path / "rows.jsonl", ["x", "marker"]) as journal,
+            pytest.raises(SweepError, match="went away: run the same command again"),
+        ):
+            run_sweep(deadly_at_first, cells, journal, DaskWorkers(address), shoot)
+        assert (tmp_path / "rows.jsonl").read_bytes().count(b"\n") >= 1
+    rows = sweep(tmp_path, cells[:40], InThisProcess(), deadly_at_first)
+    assert [row["square"] for row in rows] == [x * x for x in range(40)]
+
+
+def test_a_figure_made_on_a_cluster_is_the_one_made_here(
+    tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tiny = ["reproduce", "fig2b", "--quick", "--repetitions", "1", "--resolution", "32", "--frames", "2", "--json"]
+    tables = []
+    for where in (["--scheduler", scheduler], ["--jobs", "1"]):
+        assert main([*tiny, "-o", str(tmp_path / where[0]), *where]) == 0
+        (summary,) = json.loads(capsys.readouterr().out)
+        tables.append([{k: v for k, v in line.items() if k != "ms_per_frame"} for line in summary["table"]])
+    assert tables[0] == tables[1]

@@ -1,0 +1,44 @@
+"""The compiled kinematics of the IK solver, held to the plain ones of the hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.hand.compiled_kinematics import Bodies, Chain, step
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import make_pose, retract, tangent_between
+from depthtrack.hand.shape import HandShape, Side
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_pose(rng: np.random.Generator) -> np.ndarray:
+    return make_pose(rng.normal([0, 0, 0.5], 0.1), rng.normal(size=4), rng.uniform(LOWER, UPPER))
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@given(seed=SEEDS)
+def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) -> None:
+    shape, rng = HandShape(side=side, scale=1.2), np.random.default_rng(seed)
+    pose, model = random_pose(rng), HandModel(shape)
+    bodies, T = Bodies.at(Chain.of(shape), pose), model.transforms(pose)
+    np.testing.assert_allclose(bodies.T, T[:, :3], atol=1e-12)
+    # A point of each body moves with each angle as its hinge says.
+    points = np.einsum("bij,j->bi", T[:, :3, :3], rng.normal(0, 0.02, 3)) + T[:, :3, 3]
+    J = model.point_jacobian(pose, np.arange(16), points)[:, :, 6:]
+    for angle in range(20):
+        turned = np.cross(bodies.axes[angle], points - bodies.origins[angle])
+        moves = np.any(J[:, :, angle] != 0, axis=1)
+        np.testing.assert_allclose(J[moves, :, angle], turned[moves], atol=1e-12)
+
+
+@given(seed=SEEDS, size=st.sampled_from([0.0, 1e-12, 1e-3, 1.0, 4.0]))
+def test_a_step_is_a_retraction(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    pose, tangent, out = random_pose(rng), size * rng.normal(size=26), np.empty(27)
+    step(pose, tangent, out)
+    np.testing.assert_allclose(tangent_between(out, retract(pose, tangent)), np.zeros(26), atol=1e-9)
+    assert np.linalg.norm(out[3:7]) == pytest.approx(1)
+    assert out[3] >= 0

@@ -1,0 +1,285 @@
+"""OpenGL contexts as good citizens: shared, released, many scorers at once, threads, workers, and clear refusals."""
+
+import gc
+import multiprocessing
+import os
+import subprocess
+import sys
+import threading
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.opengl import context, opening, programs
+from depthtrack.rendering.opengl.context import OpenGLError
+from depthtrack.rendering.opengl.opening import open_context
+from depthtrack.rendering.opengl.renderer import release_renderers, shared_renderer
+from depthtrack.rendering.opengl.scorer import OpenGLScorer
+from depthtrack.rendering.target import Target
+from tests.opengl_views import energies_and_depth
+from tests.rendering.test_raster import random_poses
+
+CAMERA = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
+
+
+@pytest.fixture(autouse=True)
+def _egl() -> None:
+    try:
+        open_context("egl").close()
+    except OpenGLError as error:
+        pytest.skip(str(error))
+
+
+def scene(seed: int = 0) -> tuple[Target, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    depth = rng.uniform(0.3, 0.5, CAMERA.shape).astype(np.float32)
+    return Target(CAMERA, rng.random(CAMERA.shape) < 0.5, depth), random_poses(rng, 9, (0, 0, 0.4), 0.05)
+
+
+def resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def in_a_new_process(code: str, **environment: str) -> str:
+    """What a fresh interpreter prints last."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**kept, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+        check=True,
+    )
+    return done.stdout.strip().splitlines()[-1]
+
+
+def living_objects(gl: Any) -> int:
+    """Textures, framebuffers, buffers and programs that exist; Mesa counts names up from 1."""
+    names = range(1, 2000)
+    tests = gl.glIsTexture, gl.glIsFramebuffer, gl.glIsBuffer, gl.glIsProgram, gl.glIsVertexArray
+    return sum(bool(exists(name)) for exists in tests for name in names)
+
+
+def test_hundreds_of_scorers_leave_nothing_behind() -> None:
+    target, poses = scene()
+    counts, sizes = [], []
+    for turn in range(301):
+        with OpenGLScorer(HandShape(), sums="gpu" if turn % 2 else "cpu") as scorer:
+            scorer.observe(target)
+            scorer.score(poses)
+        if turn in (50, 300):
+            with shared_renderer("egl").context as gl:
+                counts.append(living_objects(gl))
+            sizes.append(resident_mb())
+    assert counts[0] == counts[1] > 0
+    assert sizes[1] - sizes[0] < 8
+
+
+def test_a_scorer_forgotten_without_close_gives_its_texture_back() -> None:
+    scorer = OpenGLScorer(HandShape(), sums="gpu")
+    scorer.observe(scene()[0])
+    shared, (texture,) = shared_renderer("egl"), scorer._textures
+    with shared.context as gl:
+        assert gl.glIsTexture(texture)
+    del scorer
+    gc.collect()
+    with shared.context as gl:
+        assert not gl.glIsTexture(texture)
+
+
+def test_a_closed_scorer_says_so() -> None:
+    scorer = OpenGLScorer(HandShape())
+    scorer.observe(scene()[0])
+    scorer.close()
+    scorer.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        scorer.score(scene()[1])
+
+
+def test_scorers_live_together() -> None:
+    """Different hands, sizes and ways to sum, used in turn, score as each does alone."""
+    (target, poses), (other, _) = scene(0), scene(1)
+    small = other.window(10, 5, 30, 33)
+    alone = []
+    for shape, seen, sums in ((HandShape(), target, "cpu"), (HandShape(side="left", scale=1.2), small, "gpu")):
+        with OpenGLScorer(shape, sums=sums) as scorer:  # type: ignore[arg-type]
+            scorer.observe(seen)
+            alone.append(scorer.score(poses))
+    first, second = OpenGLScorer(HandShape()), OpenGLScorer(HandShape(side="left", scale=1.2), sums="gpu")
+    with first, second:
+        first.observe(target)
+        second.observe(small)
+        for _ in range(3):
+            np.testing.assert_array_equal(first.score(poses), alone[0])
+            np.testing.assert_array_equal(second.score(poses), alone[1])
+    assert np.abs(alone[0] - alone[1]).min() > 0.1
+
+
+def test_threads_take_turns_and_score_alike() -> None:
+    target, poses = scene()
+    results: dict[int, np.ndarray] = {}
+
+    def work(index: int) -> None:
+        with OpenGLScorer(HandShape(), sums="gpu" if index % 2 else "cpu") as scorer:
+            scorer.observe(target)
+            results[index] = np.stack([scorer.score(poses) for _ in range(10)])
+
+    threads = [threading.Thread(target=work, args=(index,)) for index in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(results) == 4
+    for index, energies in results.items():
+        np.testing.assert_array_equal(energies, np.broadcast_to(results[index % 2][0], energies.shape))
+
+
+def test_nothing_stays_current_outside_a_call() -> None:
+    """Another user of EGL in this process finds its own context as it left it."""
+    from OpenGL import EGL  # the module under test has bound PyOpenGL to EGL
+
+    assert not EGL.eglGetCurrentContext()
+    outer = open_context("egl")
+    with outer as gl:
+        name = int(gl.glGenTextures(1))
+        gl.glBindTexture(gl.GL_TEXTURE_2D, name)
+        target, poses = scene()
+        with OpenGLScorer(HandShape()) as scorer:
+            scorer.observe(target)
+            scorer.score(poses)
+        assert int(gl.glGetIntegerv(gl.GL_TEXTURE_BINDING_2D)) == name
+    outer.close()
+    assert not EGL.eglGetCurrentContext()
+
+
+def test_released_contexts_are_refused_and_new_ones_work() -> None:
+    target, poses = scene()
+    scorer = OpenGLScorer(HandShape())
+    scorer.observe(target)
+    before = scorer.score(poses)
+    release_renderers()
+    with pytest.raises(OpenGLError, match="released"):
+        scorer.score(poses)
+    scorer.close()
+    with OpenGLScorer(HandShape()) as fresh:
+        fresh.observe(target)
+        np.testing.assert_array_equal(fresh.score(poses), before)
+
+
+def test_spawned_workers_score_alike() -> None:
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        workers = list(pool.map(energies_and_depth, ["egl", "egl"], [4, 4]))
+    for energies, depth in workers:
+        np.testing.assert_array_equal(energies, energies_and_depth("egl", 4)[0])
+        np.testing.assert_array_equal(depth, energies_and_depth("egl", 4)[1])
+
+
+def test_a_forked_child_is_told_rather_than_left_to_hang() -> None:
+    code = """
+import os
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.opengl.scorer import OpenGLScorer
+from tests.rendering.test_opengl_contexts import scene
+scorer = OpenGLScorer(HandShape())
+target, poses = scene()
+scorer.observe(target)
+scorer.score(poses)
+read, write = os.pipe()
+if os.fork() == 0:
+    said = []
+    for action in (lambda: scorer.score(poses), lambda: OpenGLScorer(HandShape())):
+        try:
+            action()
+        except Exception as error:
+            said.append(str(error))
+    scorer.close()
+    os.write(write, " | ".join(said).encode())
+    os._exit(0)
+os.wait()
+print(os.read(read, 4096).decode())
+"""
+    said = in_a_new_process(code).split(" | ")
+    assert len(said) == 2
+    assert all("fork" in words and "spawn" in words for words in said)
+
+
+def test_a_second_platform_in_one_process_is_refused() -> None:
+    with pytest.raises(OpenGLError, match="already uses OpenGL through egl"):
+        OpenGLScorer(HandShape(), platform="osmesa")
+
+
+def test_a_contradicting_variable_is_refused_and_ours_is_not_left_behind() -> None:
+    code = """
+from depthtrack.errors import DepthtrackError
+from depthtrack.rendering.opengl.opening import open_context
+try:
+    open_context("egl")
+except DepthtrackError as error:
+    print(error)
+"""
+    assert "PYOPENGL_PLATFORM=glx contradicts the egl backend" in in_a_new_process(code, PYOPENGL_PLATFORM="glx")
+    assert "PYOPENGL_PLATFORM" not in os.environ
+
+
+@pytest.mark.parametrize(
+    ("platform", "package"), [("egl", "libegl1 libgl1-mesa-dri libopengl0"), ("osmesa", "libosmesa6")]
+)
+def test_a_missing_library_names_its_package(
+    platform: context.Platform, package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(opening, "_loads", lambda name: False)
+    monkeypatch.setattr(opening, "_refuse_contradictions", lambda platform: None)
+    with pytest.raises(OpenGLError, match=f"apt-get install {package}"):
+        open_context(platform)
+
+
+def test_devices_are_chosen_by_kind_or_number() -> None:
+    with OpenGLScorer(HandShape(), device="software") as scorer:
+        assert scorer.software
+    if OpenGLScorer(HandShape()).software:
+        with pytest.raises(OpenGLError, match=r"finds no GPU; tried .*llvmpipe"):
+            OpenGLScorer(HandShape(), device="gpu")
+    else:
+        assert not OpenGLScorer(HandShape(), device="gpu").software
+    with pytest.raises(OpenGLError, match=r"no device 99: choose one of"):
+        OpenGLScorer(HandShape(), device=99)
+    with pytest.raises(OpenGLError, match="in software only"):
+        OpenGLScorer(HandShape(), platform="osmesa", device="gpu")
+
+
+def test_options_that_make_no_sense_are_refused() -> None:
+    with pytest.raises(InputError, match="'egl' or 'osmesa', found 'glx'"):
+        OpenGLScorer(HandShape(), platform="glx")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="'gpu' or 'cpu', found 'tpu'"):
+        OpenGLScorer(HandShape(), sums="tpu")  # type: ignore[arg-type]
+
+
+def test_a_shader_the_driver_refuses_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cover.vert").write_text("#version 330 core\nvoid main() { nonsense; }\n")
+    monkeypatch.setattr(programs, "resource_folder", lambda name: tmp_path)
+    with shared_renderer("egl").context as gl, pytest.raises(OpenGLError, match=r"shaders/cover\.vert.*nonsense"):
+        programs.Program(gl, "cover.vert", "compare.frag")
+
+
+def test_nothing_imports_opengl_before_it_is_asked_for() -> None:
+    code = """
+import sys
+import depthtrack.rendering.backends, depthtrack.rendering.opengl.scorer, depthtrack.rendering.doctor
+print(sorted(name for name in sys.modules if name.split(".")[0] == "OpenGL"))
+"""
+    assert in_a_new_process(code) == "[]"
+
+
+def test_a_driver_s_error_is_told_by_name() -> None:
+    shared = shared_renderer("egl")
+    with pytest.raises(OpenGLError, match="failed with OpenGL error 1280"), shared.context as gl:
+        gl.glEnable(0xBAD)
+    with shared.context as gl:
+        assert gl.glGetError() == 0

@@ -1,0 +1,238 @@
+"""The rasteriser against the float64 oracle: silhouettes, depth and energies, in ordinary views and absurd ones."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+
+OBJECTIVE = Objective()
+KINECT = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
+
+
+def random_shape(rng: np.random.Generator) -> HandShape:
+    default = HandShape()
+    return default.with_(
+        side="left" if rng.random() < 0.5 else "right",
+        scale=rng.uniform(0.7, 1.3),
+        lengths=default.lengths * rng.uniform(0.85, 1.15, (5, 3)),
+        radii=default.radii * rng.uniform(0.85, 1.15, (5, 4)),
+        palm_breadth=default.palm_breadth * rng.uniform(0.9, 1.1),
+        palm_thickness=default.palm_thickness * rng.uniform(0.8, 1.2),
+    )
+
+
+def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, float, float], spread: float) -> np.ndarray:
+    return make_pose(
+        np.asarray(centre) + rng.uniform(-spread, spread, (count, 3)),
+        rng.normal(size=(count, 4)),
+        rng.uniform(LOWER, UPPER, (count, 20)),
+    )
+
+
+def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
+    """An imperfect observation of a pose: holes in the depth, and skin labels that are wrong here and there."""
+    empty = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    oracle = OracleScorer(shape)
+    oracle.observe(empty)
+    depth = oracle.render(pose)
+    skin = (depth > 0) ^ (rng.random(camera.shape) < 0.02)
+    return Target(camera, skin, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
+
+
+def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
+    """A square window of the Kinect's image, `side` pixels wide, centred on the hand."""
+    uv = KINECT.project(HandModel(shape).keypoints(pose)).mean(axis=0)
+    return KINECT.crop(int(uv[0]) - side // 2, int(uv[1]) - side // 2, side, side)
+
+
+def agree(shape: HandShape, target: Target, poses: np.ndarray, objective: Objective = OBJECTIVE) -> None:
+    """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3 but for pixels whose
+    match hangs on the last bit of a depth."""
+    fast, oracle = RasterScorer(shape, objective), OracleScorer(shape, objective)
+    fast.observe(target)
+    oracle.observe(target)
+    terms, expected = fast.terms(poses), oracle.terms(poses)
+    np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
+    np.testing.assert_allclose(fast.score(poses), terms.energy, rtol=1e-12)
+    for i, pose in enumerate(poses):
+        ours, theirs = fast.render(pose), oracle.render(pose)
+        drawn, truth = ours > 0, theirs > 0
+        assert np.count_nonzero(drawn != truth) <= 1e-3 * np.count_nonzero(truth)
+        assert np.abs(ours - theirs)[drawn & truth].max(initial=0) < 1e-4
+        # One pixel that changes sides moves the skin term by about 2 lambda over the union's size.
+        difference = np.abs(theirs - target.depth)
+        undecided = np.count_nonzero(truth & (np.abs(difference - objective.match_depth) < 5e-6))
+        undecided += np.count_nonzero(drawn != truth)
+        pixel = (2 * objective.skin_weight + objective.clamp_depth / objective.depth_unit) / (
+            1 + np.count_nonzero(target.skin | truth)
+        )
+        assert abs(terms.energy[i] - expected.energy[i]) < 1e-3 + undecided * pixel
+
+
+@given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
+@settings(max_examples=20)
+def test_agrees_with_the_oracle_in_a_window_on_the_hand(seed: int, reduced: int | None) -> None:
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
+    agree(shape, target if reduced is None else target.reduced(reduced), poses)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=10)
+def test_agrees_with_the_oracle_through_any_camera(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    width, height = (int(n) for n in rng.integers(1, 200, 2))
+    focal = rng.uniform(0.5, 2) * max(width, height)
+    camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *rng.uniform(-0.5, 1.5, 2) * [width, height])
+    shape, poses = random_shape(rng), random_poses(rng, 4, (0, 0, rng.uniform(0.3, 2.5)), 0.2)
+    agree(shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "centre", "spread"),
+    [
+        ("behind", (0, 0, -0.6), 0.05),
+        ("around the lens", (0, 0, 0.0), 0.08),
+        ("1 cm from the lens", (0, 0, 0.01), 0.005),
+        ("reaching past the lens", (0, 0, 0.1), 0.05),
+        ("at the border", (0.24, 0.18, 0.5), 0.03),
+        ("outside", (3.0, 0, 0.5), 0.1),
+    ],
+)
+@pytest.mark.parametrize("seed", range(4))
+def test_agrees_with_the_oracle_where_views_are_absurd(
+    name: str, centre: tuple[float, float, float], spread: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    camera = KINECT.resized(0.25)
+    shape, poses = random_shape(rng), random_poses(rng, 6, centre, spread)
+    target = target_of(shape, random_poses(rng, 1, (0, 0, 0.4), 0)[0], camera, rng)
+    if name in ("behind", "outside"):
+        fast = RasterScorer(shape)
+        fast.observe(target)
+        assert not any(fast.render(pose).any() for pose in poses)
+    agree(shape, target, poses)
+
+
+def test_regions_beyond_the_image_observe_nothing_there() -> None:
+    """A window that hangs over the image's edge scores like the same window of a larger, empty-edged image."""
+    rng = np.random.default_rng(7)
+    shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
+    full = target_of(shape, poses[0], KINECT, rng)
+    window = full.window(500, 380, 300, 300)
+    assert not window.depth[100:].any()
+    assert not window.skin[:, 140:].any()
+    agree(shape, window, poses)
+
+
+def test_the_best_pose_is_the_observed_one() -> None:
+    rng = np.random.default_rng(3)
+    shape, poses = HandShape(), random_poses(rng, 20, (0, 0, 0.5), 0.02)
+    camera = window_on(shape, poses[4], 224)
+    oracle = OracleScorer(shape)
+    oracle.observe(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    depth = oracle.render(poses[4])
+    scorer = RasterScorer(shape)
+    scorer.observe(Target(camera, depth > 0, depth))
+    terms = scorer.terms(poses)
+    assert terms.energy.argmin() == 4
+    assert terms.depth[4] < 0.01  # what remains is the float32 of the rendered depth
+    assert terms.skin[4] == 0
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_the_same_bits_for_any_number_of_threads(threads: int) -> None:
+    rng = np.random.default_rng(11)
+    shape, poses = HandShape(), random_poses(rng, 301, (0, 0, 0.5), 0.1)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 96), rng)
+    with RasterScorer(shape) as one, RasterScorer(shape, threads=threads) as many:
+        one.observe(target)
+        many.observe(target)
+        np.testing.assert_array_equal(one.score(poses), many.score(poses))
+        np.testing.assert_array_equal(one.score(poses[:1]), many.score(poses[:1]))
+        assert one.score(poses[:0]).shape == (0,)
+
+
+def test_scores_do_not_depend_on_what_was_scored_before() -> None:
+    """The buffer is left clean, whatever was drawn and however the region changes."""
+    rng = np.random.default_rng(5)
+    shape, poses = HandShape(), random_poses(rng, 40, (0, 0, 0.4), 0.3)
+    small = target_of(shape, poses[0], window_on(shape, poses[0], 70), rng)
+    large = target_of(shape, poses[0], KINECT.resized(0.5), rng)
+    used = RasterScorer(shape)
+    for target in (large, small, large):
+        fresh = RasterScorer(shape)
+        used.observe(target)
+        fresh.observe(target)
+        np.testing.assert_array_equal([used.score(p[None])[0] for p in poses], fresh.score(poses))
+
+
+def test_many_scorers_leave_no_threads_behind() -> None:
+    import threading
+
+    before = threading.active_count()
+    for _ in range(50):
+        RasterScorer(HandShape(), threads=3).close()
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("poses", [np.zeros(27), np.zeros((2, 26)), np.full((1, 27), np.nan)])
+def test_poses_of_the_wrong_form_are_refused(poses: np.ndarray) -> None:
+    scorer = RasterScorer(HandShape())
+    scorer.observe(
+        target_of(
+            HandShape(),
+            random_poses(np.random.default_rng(0), 1, (0, 0, 0.5), 0)[0],
+            KINECT.resized(0.1),
+            np.random.default_rng(0),
+        )
+    )
+    with pytest.raises(ValueError, match="poses must be"):
+        scorer.score(poses)
+
+
+def test_scoring_before_observing_is_an_error() -> None:
+    with pytest.raises(RuntimeError, match="observe"):
+        RasterScorer(HandShape()).score(np.zeros((1, 27)))
+
+
+def test_absurd_thread_counts_are_refused() -> None:
+    with pytest.raises(InputError, match="threads"):
+        RasterScorer(HandShape(), threads=0)
+
+
+@given(seed=st.integers(0, 2**32 - 1), side=st.integers(1, 300))
+def test_reduced_targets_keep_the_view(seed: int, side: int) -> None:
+    """Every sample of a reduced target is what the full one holds where its pixel looks."""
+    rng = np.random.default_rng(seed)
+    width, height = (int(n) for n in rng.integers(2, 120, 2))
+    camera = Camera(width, height, 150.0, 140.0, 30.0, 40.0)
+    depth = rng.uniform(0.1, 1, camera.shape).astype(np.float32)
+    full = Target(camera, depth > 0.5, depth)
+    reduced = full.reduced(side)
+    assume(reduced is not full)
+    assert max(reduced.camera.shape) <= side
+    v, u = (int(n) for n in rng.integers(0, reduced.camera.shape))
+    looks_at = camera.project(reduced.camera.unproject([u, v], 1.0))
+    nearest = np.clip(np.rint(looks_at).astype(int), 0, [camera.width - 1, camera.height - 1])
+    around = depth[max(nearest[1] - 1, 0) : nearest[1] + 2, max(nearest[0] - 1, 0) : nearest[0] + 2]
+    assert reduced.depth[v, u] in around
+
+
+def test_a_hand_that_nobody_sees_scores_the_same_everywhere() -> None:
+    camera = KINECT.resized(0.1)
+    nothing = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    pose = random_poses(np.random.default_rng(0), 1, (0, 0, -1), 0)
+    agree(HandShape(), nothing, pose)

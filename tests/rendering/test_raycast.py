@@ -1,0 +1,137 @@
+"""The float64 renderers, against independent geometry: closed forms, trimesh, and each other."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.primitives import CYLINDER, PRIMITIVE_COUNT, SPHERE, Primitives, cone, ellipsoid
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.triangles import rasterise
+from tests.hand.test_kinematics import random_pose
+
+CAMERA = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
+
+
+def directions(camera: Camera) -> np.ndarray:
+    v, u = np.mgrid[: camera.height, : camera.width]
+    return np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(camera.shape)], axis=-1)
+
+
+def placed(kind: int, T: np.ndarray) -> np.ndarray:
+    return raycast(CAMERA, np.array([kind]), T[None], np.array([3])).depth
+
+
+def test_the_hand_has_the_papers_37_primitives() -> None:
+    names = Primitives.of(HandShape()).names
+    kinds = Primitives.of(HandShape()).kinds
+    assert len(names) == PRIMITIVE_COUNT
+    assert sum("cone" in name for name in names) == 4 * 3 + 2
+    assert sum("sphere" in name for name in names) == 4 * 4 + 3
+    assert sum(kinds == CYLINDER) == 4 * 3 + 2 + 1
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_sphere_depth_equals_the_closed_form(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centre, radius = rng.uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.8]), rng.uniform(0.01, 0.2)
+    T = ellipsoid((centre[0], centre[1], centre[2]), (radius, radius, radius))
+    d = directions(CAMERA)
+    a, b, c = (d * d).sum(-1), d @ centre, centre @ centre - radius**2
+    D = b * b - a * c
+    expected = np.where(D >= 0, (b - np.sqrt(np.maximum(D, 0))) / a, 0)
+    np.testing.assert_allclose(placed(SPHERE, T), expected, atol=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=25)
+def test_cone_hits_lie_on_the_cone(seed: int) -> None:
+    """Every hit lies on the frustum's wall, and rays that miss stay outside it over its whole length."""
+    rng = np.random.default_rng(seed)
+    length, r0, r1 = rng.uniform(0.05, 0.3), rng.uniform(0.01, 0.06), rng.uniform(0.01, 0.06)
+    T = np.eye(4)
+    T[:3, :3] = trimesh.transformations.random_rotation_matrix(rng.uniform(size=3))[:3, :3]
+    T[:3, 3] = rng.uniform([-0.1, -0.1, 0.5], [0.1, 0.1, 0.7])
+    depth = placed(CYLINDER, T @ cone((0, 0, 0), length, r0, r1))
+    hits = directions(CAMERA)[depth > 0] * depth[depth > 0][:, None]
+    local = (hits - T[:3, 3]) @ T[:3, :3]
+    along = local[:, 1]
+    assert np.all((along >= -1e-9) & (along <= length + 1e-9))
+    np.testing.assert_allclose(np.hypot(local[:, 0], local[:, 2]), r0 + (r1 - r0) * along / length, atol=1e-9)
+    # Missed rays: sampled densely, none enters the solid through its wall.
+    missed = directions(CAMERA)[depth == 0]
+    samples = (missed[:, None] * np.linspace(0.2, 1.2, 400)[:, None] - T[:3, 3]) @ T[:3, :3]
+    y = samples[..., 1]
+    inside = (np.hypot(samples[..., 0], samples[..., 2]) < r0 + (r1 - r0) * y / length) & (y > 0) & (y < length)
+    crosses_wall = (inside[:, 1:] & ~inside[:, :-1]) & (np.minimum(y[:, 1:], y[:, :-1]) > 0.003)
+    crosses_wall &= np.maximum(y[:, 1:], y[:, :-1]) < length - 0.003
+    assert not crosses_wall.any()
+
+
+@given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.7, 1.4))
+@settings(max_examples=10)
+def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: int, scale: float) -> None:
+    """Finely tessellated primitives in our z-buffer come within the tessellation's error of the exact surface."""
+    shape = HandShape(scale=scale)
+    primitives, pose = Primitives.of(shape), random_pose(seed)
+    pose[:3] = [0, 0, 0.3]
+    T = primitives.placed(HandModel(shape).transforms(pose))
+    exact = raycast(CAMERA, primitives.kinds, T, primitives.bodies)
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    tube = trimesh.creation.cylinder(radius=1, segment=[[0, 0, 0], [0, 0, 1]], sections=96, cap=False)
+    surface = None
+    for kind, matrix in zip(primitives.kinds, T, strict=True):
+        mesh = ball if kind == SPHERE else tube
+        points = np.c_[mesh.vertices, np.ones(len(mesh.vertices))] @ matrix.T
+        vertices, labels = points[:, :3] / points[:, 3:], np.zeros(len(mesh.faces), np.int64)
+        surface = rasterise(CAMERA, vertices, mesh.faces, vertices, labels, onto=surface)
+    assert surface is not None
+    both = (exact.depth > 0) & (surface.depth > 0)
+    assert both.sum() > 60
+    assert np.mean((exact.depth > 0) != (surface.depth > 0)) < 0.01
+    assert np.median(np.abs(exact.depth - surface.depth)[both]) < 2e-4
+
+
+def test_normals_are_unit_and_face_the_camera() -> None:
+    shape = HandShape()
+    primitives = Primitives.of(shape)
+    surface = raycast(
+        CAMERA, primitives.kinds, primitives.placed(HandModel(shape).transforms(random_pose(3))), primitives.bodies
+    )
+    seen = surface.depth > 0
+    np.testing.assert_allclose(np.linalg.norm(surface.normal[seen], axis=-1), 1, atol=1e-9)
+    assert np.all((surface.normal * directions(CAMERA)).sum(-1)[seen] <= 1e-9)
+    assert set(np.unique(surface.label)) <= set(range(-1, 16))
+
+
+@pytest.mark.parametrize("z", [-0.5, 0.0, 0.01])
+def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
+    shape, pose = HandShape(), random_pose(5)
+    pose[:3] = [0, 0, z]
+    primitives = Primitives.of(shape)
+    depth = raycast(
+        CAMERA, primitives.kinds, primitives.placed(HandModel(shape).transforms(pose)), primitives.bodies
+    ).depth
+    assert np.all(np.isfinite(depth))
+    assert np.all((depth == 0) | (depth >= NEAR))
+    assert (depth > 0).any() == (z > -0.3)
+
+
+def test_a_primitive_around_the_lens_shows_nothing() -> None:
+    assert not placed(SPHERE, ellipsoid((0, 0, 0), (0.3, 0.3, 0.3))).any()
+    assert placed(SPHERE, ellipsoid((0, 0, 0.4), (0.3, 0.3, 0.3))).any()
+
+
+def test_drawing_onto_a_surface_keeps_what_is_nearer() -> None:
+    near, far = ellipsoid((0, 0, 0.4), (0.02, 0.02, 0.02)), ellipsoid((0, 0, 0.8), (0.2, 0.2, 0.2))
+    first = raycast(CAMERA, np.array([SPHERE]), near[None], np.array([1]))
+    both = raycast(CAMERA, np.array([SPHERE]), far[None], np.array([2]), onto=first)
+    swapped = raycast(CAMERA, np.array([SPHERE, SPHERE]), np.stack([far, near]), np.array([2, 1]))
+    np.testing.assert_array_equal(both.depth, swapped.depth)
+    np.testing.assert_array_equal(both.label, swapped.label)
+    assert both.label[24, 31] == 1

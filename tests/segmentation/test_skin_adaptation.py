@@ -1,0 +1,121 @@
+"""Skin colour on images: the table of colours against the plain conversion, and adaptation to the light."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.geometry.rectangle import Window
+from depthtrack.segmentation.skin_colour import (
+    BINS,
+    BRIGHTEST,
+    DARKEST,
+    OFFLINE_WEIGHT,
+    WINDOW,
+    AdaptiveSkin,
+    SkinModel,
+    chroma_distribution,
+    count_colours,
+)
+from depthtrack.segmentation.skin_colour import _bin_of_colour as bin_of_colour
+from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
+
+
+def plain_bin(r: int, g: int, b: int) -> int:
+    """Flat bin of the colour in the middle of the cube of 8 levels that holds (r, g, b); -1 without luminance."""
+    red, green, blue = (8 * (level // 8) + 3.5 for level in (r, g, b))
+    y = 0.299 * red + 0.587 * green + 0.114 * blue
+    u = 128 - 0.168736 * red - 0.331264 * green + 0.5 * blue
+    v = 128 + 0.5 * red - 0.418688 * green - 0.081312 * blue
+    if not DARKEST <= y <= BRIGHTEST:
+        return -1
+    return int(u * BINS / 256 + 1e-9) * BINS + int(v * BINS / 256 + 1e-9)
+
+
+@given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255))
+def test_colours_fall_into_their_bins(r: int, g: int, b: int) -> None:
+    assert bin_of_colour()[(r >> 3) << 10 | (g >> 3) << 5 | b >> 3] == plain_bin(r, g, b)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_counting_equals_a_plain_loop(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    image = rng.integers(0, 256, (9, 12, 3), dtype=np.uint8)
+    window, step = Window(2, 1, 11, 8), 2
+    skin = rng.integers(0, 2, (7, 9)).astype(np.uint8)
+    hand = rng.random((7, 9)) < 0.5
+    expected = np.zeros((2, BINS * BINS))
+    for v in range(0, 7, step):
+        for u in range(0, 9, step):
+            chroma = plain_bin(*map(int, image[v + 1, u + 2]))
+            if chroma >= 0 and bool(skin[v, u]) == hand[v, u]:
+                expected[int(hand[v, u]), chroma] += 1
+    counts = np.zeros_like(expected)
+    count_colours(image, tuple(window), skin, hand, step, bin_of_colour(), counts)
+    np.testing.assert_array_equal(counts, expected)
+
+
+def test_mixtures_keep_their_mean_and_spread_in_chroma() -> None:
+    """Against samples drawn from the mixture itself, of a Gaussian well inside the colour cube."""
+    mixture = Mixture(np.array([[150.0, 110.0, 90.0]]), np.array([[300.0, 100.0, 200.0]]), np.array([1.0]))
+    rgb = np.random.default_rng(1).normal(mixture.means, np.sqrt(mixture.variances), (200_000, 3))
+    u = 128 - 0.168736 * rgb[:, 0] - 0.331264 * rgb[:, 1] + 0.5 * rgb[:, 2]
+    v = 128 + 0.5 * rgb[:, 0] - 0.418688 * rgb[:, 1] - 0.081312 * rgb[:, 2]
+    drawn, _, _ = np.histogram2d(u, v, bins=BINS, range=[[0, 256], [0, 256]])
+    np.testing.assert_allclose(chroma_distribution(mixture), drawn / drawn.sum(), atol=2e-3)
+
+
+def test_published_mixtures_are_whole() -> None:
+    for mixture in (SKIN, OTHER):
+        assert mixture.means.shape == mixture.variances.shape == (16, 3)
+        assert mixture.weights.sum() == pytest.approx(1)
+        assert mixture.variances.min() > 0
+    # Skin is redder than green and greener than blue in every one of its Gaussians.
+    assert np.all(np.diff(SKIN.means, axis=1) < 0)
+
+
+def seen(colour: tuple[int, int, int], is_skin: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """An image of one colour, found to be skin of a hand, or neither."""
+    image = np.full((20, 30, 3), colour, np.uint8)
+    return image, np.full((20, 30), is_skin, np.uint8), np.full((20, 30), is_skin)
+
+
+def test_adaptation_is_the_published_blend() -> None:
+    skin, window, colour = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20), (120, 110, 130)
+    u, v = divmod(plain_bin(*colour), BINS)
+    before = skin.posterior()
+    image, found, hand = seen(colour, is_skin=True)
+    skin.learn(image, window, found, hand)
+    after = skin.posterior()
+    assert after[u, v] == pytest.approx(OFFLINE_WEIGHT * before[u, v] + 1 - OFFLINE_WEIGHT)
+    # What was not seen is known as well as before.
+    after[u, v] = before[u, v]
+    np.testing.assert_allclose(after, before)
+
+
+def test_adaptation_forgets_after_its_window() -> None:
+    skin, window, colour = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20), (205, 150, 125)
+    u, v = divmod(plain_bin(*colour), BINS)
+    before = skin.posterior()[u, v]
+    image, nothing, nowhere = seen(colour, is_skin=False)
+    skin.learn(image, window, nothing, nowhere)
+    assert skin.posterior()[u, v] == pytest.approx(OFFLINE_WEIGHT * before)
+    for _ in range(WINDOW):
+        skin.learn(np.zeros((20, 30, 3), np.uint8), window, nothing, nowhere)
+    assert skin.posterior()[u, v] == pytest.approx(before)
+    skin.learn(image, window, nothing, nowhere)
+    skin.forget()
+    assert skin.posterior()[u, v] == pytest.approx(before)
+
+
+def test_what_is_skin_elsewhere_teaches_nothing() -> None:
+    """A face, or the arm: skin that is not the hand's."""
+    skin, window = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20)
+    before = skin.posterior()
+    skin.learn(
+        np.full((20, 30, 3), (205, 150, 125), np.uint8),
+        window,
+        np.ones((20, 30), np.uint8),
+        np.zeros((20, 30), np.bool_),
+    )
+    np.testing.assert_allclose(skin.posterior(), before, atol=1e-15)

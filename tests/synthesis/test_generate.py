@@ -1,0 +1,344 @@
+"""Synthetic recordings: exact ground truth, the same bytes for the same options, and everything that can be chosen."""
+
+import json
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from depthtrack.cli import main
+from depthtrack.errors import InputError
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ORIENTATION, rotation_matrix
+from depthtrack.hand.primitives import Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.recording.sequences.tum import FolderSequence
+from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.synthesis.forearm import LARGEST_BEND, Forearm
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame, write_recording
+from depthtrack.synthesis.painting import SkinTone
+from depthtrack.synthesis.randomness import Stream, generator
+from depthtrack.synthesis.viewpoint import VIEWPOINT_COUNT, Viewpoint
+
+
+def _made(**options: Any) -> Synthesiser:
+    return Synthesiser(Synthesis(**options))
+
+
+def _bytes(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_the_same_options_give_the_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
+    options: dict[str, Any] = {"motion": "random", "sensor": "kinect1", "background": "room", "frames": 5, "seed": 4}
+    for name, threads, seed in (("one", 1, 4), ("three", 3, 4), ("other", 1, 5)):
+        write_recording(_made(**options | {"seed": seed}), tmp_path / name, threads=threads)
+    one, three, other = (_bytes(tmp_path / name) for name in ("one", "three", "other"))
+    assert len(one) > 5 * 4
+    assert one == three
+    assert all(one[name] != other[name] for name in one if name.startswith(("depth/", "rgb/", "hand_poses")))
+
+
+def test_any_frame_can_be_made_by_itself() -> None:
+    options: dict[str, Any] = {"sensor": "realsense", "background": "wall", "depth_noise": 0.002, "skin_flips": 0.05}
+    in_order = list(_made(**options, frames=4).frames(threads=2))
+    alone = _made(**options)[3]
+    for name in ("depth", "colour", "mask", "skin", "exact_depth", "pose", "joints"):
+        np.testing.assert_array_equal(getattr(in_order[3], name), getattr(alone, name))
+
+
+@pytest.mark.parametrize("model", ["primitives", "skin"])
+def test_ground_truth_is_that_of_the_hand_alone_wherever_nothing_hides_it(model: Any) -> None:
+    made = _made(model=model, background="room", seed=2)
+    frame, camera, shape = made[300], made.sensor.camera, HandShape()
+    transforms = HandModel(shape).transforms(frame.pose)
+    if model == "primitives":
+        hand = Primitives.of(shape)
+        alone = raycast(camera, hand.kinds, hand.placed(transforms), hand.bodies)
+    else:
+        skin = Skin.of(shape)
+        vertices = skin.vertices(transforms)
+        alone = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
+    # What the mask leaves out of the hand lies behind something else: the forearm.
+    hidden = (alone.depth > 0) & ~frame.mask
+    assert np.all(frame.exact_depth[hidden] < alone.depth[hidden])
+    assert hidden.sum() < 0.1 * frame.mask.sum()
+    # What it adds is where the forearm lies over the hand's end, right before the wrist.
+    bare = frame.mask & (frame.exact_depth == alone.depth)
+    assert bare.sum() > 0.9 * frame.mask.sum()
+    beyond, _ = _beyond_wrist(made, frame)
+    added = frame.mask & ~bare
+    assert beyond[added].max() < 0
+    assert beyond[added].min() > -0.02
+    np.testing.assert_allclose(frame.joints, HandModel(shape).keypoints(frame.pose), atol=1e-12)
+    np.testing.assert_array_equal(frame.depth, frame.exact_depth)
+
+
+def _beyond_wrist(made: Synthesiser, frame: SyntheticFrame) -> tuple[Any, Any]:
+    """Metres (h, w) from the wrist's plane towards the forearm, and (h, w) where skin lies near the wrist."""
+    v, u = np.mgrid[: made.sensor.camera.height, : made.sensor.camera.width]
+    points = made.sensor.camera.unproject(np.stack([u, v], axis=-1), frame.exact_depth) - frame.joints[0]
+    towards_fingers = rotation_matrix(frame.pose[ORIENTATION])[:, 1]
+    return -points @ towards_fingers, frame.skin & (np.linalg.norm(points, axis=-1) < 0.05)
+
+
+@pytest.mark.parametrize("model", ["primitives", "skin"])
+@pytest.mark.parametrize("index", [0, 100, 258, 340])
+def test_every_kind_of_hand_ends_at_the_plane_of_the_wrist(model: Any, index: int) -> None:
+    made = _made(model=model, background="room", seed=2)
+    frame = made[index]
+    beyond, near = _beyond_wrist(made, frame)
+    assert frame.mask[near & (beyond < 0)].all()
+    # The skin's end bulges through the plane by a millimetre.
+    assert not frame.mask[near & (beyond > 0.002)].any()
+
+
+@pytest.mark.parametrize("model", ["primitives", "skin"])
+def test_fingers_of_an_open_hand_project_into_its_mask(model: Any) -> None:
+    made = _made(model=model, background="wall")
+    for index in (0, 30, 60):
+        frame = made[index]
+        near = cv2.dilate(frame.mask.astype(np.uint8), np.ones((7, 7), np.uint8))
+        u, v = np.rint(made.sensor.camera.project(frame.joints[1:])).astype(int).T
+        assert near[v, u].all()
+
+
+def test_without_background_the_hand_is_all_there_is() -> None:
+    frame = _made()[0]
+    np.testing.assert_array_equal(frame.depth > 0, frame.mask)
+    np.testing.assert_array_equal(frame.skin, frame.mask)
+    assert np.all(frame.colour[~frame.mask] == 0)
+    assert np.all(frame.colour[frame.mask].max(axis=-1) > 30)
+
+
+def test_a_left_hand_gives_the_mirror_image() -> None:
+    right = _made(forearm=True, motion="grasp")[50]
+    left = _made(forearm=True, motion="grasp", hand=HandShape(side="left"))[50]
+    np.testing.assert_allclose(left.joints, right.joints * [-1, 1, 1], atol=1e-9)
+    same = left.mask == right.mask[:, ::-1]
+    assert np.sum(~same) <= 5  # pixels on an edge between two surfaces may fall either way
+    both = same & left.mask
+    apart = np.abs(left.exact_depth - right.exact_depth[:, ::-1])[both]
+    assert np.quantile(apart, 0.9) < 1e-6
+    # The mask's last stretch is the forearm's, whose facets are cut the same way on both sides.
+    assert np.quantile(apart, 0.999) < 5e-4
+
+
+def test_viewpoints_lie_apart_on_a_hemisphere_and_look_at_the_hand() -> None:
+    views = [Viewpoint(n, 0.8) for n in range(VIEWPOINT_COUNT)]
+    assert len(views) == 8
+    positions = []
+    for view in views:
+        T = view.transform
+        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+        np.testing.assert_allclose(view.see_points(np.zeros(3)), [0, 0, 0.8], atol=1e-12)
+        positions.append(-T[:3, :3].T @ T[:3, 3])
+    assert np.all(np.array(positions)[:, 2] < 0)  # all on the front's side
+    assert min(np.linalg.norm(a - b) for a, b in combinations(positions, 2)) > 2 * 0.8 * np.sin(np.radians(15))
+    np.testing.assert_allclose(views[0].transform[:3, :3], np.eye(3), atol=1e-12)
+
+
+def test_every_viewpoint_sees_the_same_hand_at_the_same_distance() -> None:
+    frames = [_made(viewpoint=n, distance=0.7)[100] for n in range(VIEWPOINT_COUNT)]
+    sizes = [np.linalg.norm(f.joints[:, None] - f.joints[None], axis=-1) for f in frames]
+    for frame, size in zip(frames, sizes, strict=True):
+        np.testing.assert_allclose(size, sizes[0], atol=1e-12)
+        assert np.linalg.norm(frame.pose[:3]) == pytest.approx(0.7, abs=0.05)
+        assert frame.mask.sum() > 2000
+
+
+def test_distance_and_scale_change_the_size_of_the_hand_in_the_picture() -> None:
+    area = {d: _made(distance=d)[0].mask.sum() for d in (0.5, 1.0, 2.5)}
+    assert area[0.5] / area[1.0] == pytest.approx(4, rel=0.1)
+    assert area[0.5] / area[2.5] == pytest.approx(25, rel=0.1)
+    assert _made(hand=HandShape(scale=0.8))[0].mask.sum() / area[0.5] == pytest.approx(0.64, rel=0.1)
+
+
+@pytest.mark.parametrize("model", ["primitives", "skin"])
+@pytest.mark.parametrize("motion", ["everyday", "grasp", "random"])
+def test_the_forearm_is_skin_but_not_hand_and_holds_on_to_it(model: Any, motion: str) -> None:
+    made = _made(motion=motion, model=model, forearm=True, seed=1)
+    for index in range(0, len(made), 75):
+        frame = made[index]
+        forearm = frame.skin & ~frame.mask
+        assert forearm.sum() > 0.2 * frame.mask.sum()
+        pieces, _ = cv2.connectedComponents(frame.skin.astype(np.uint8))
+        assert pieces == 2  # background and one arm
+        # Where the hand ends and the forearm begins, there is no step in depth to speak of.
+        beside = forearm & (cv2.dilate(frame.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+        assert beside.any()
+
+
+def test_the_wrist_bends_towards_the_elbow_but_not_beyond_its_range() -> None:
+    arm, palm = Forearm(HandShape()), np.eye(4)
+    straight, slightly, far = ([0, -0.3, 0.0], [0, -0.3, 0.05], [0, 0.0, 0.3])
+    assert np.linalg.norm(arm.bend(palm, np.array(straight))) == pytest.approx(0, abs=1e-9)
+    np.testing.assert_allclose(arm.bend(palm, np.array(slightly)), [np.arctan2(-0.05, 0.254), 0, 0], atol=0.01)
+    assert np.linalg.norm(arm.bend(palm, np.array(far))) < LARGEST_BEND
+    frame = arm.frame(palm, arm.bend(palm, np.array(far)))
+    np.testing.assert_allclose(frame[:3, :3] @ arm.shape.wrist + frame[:3, 3], arm.shape.wrist, atol=1e-12)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_forearm_is_a_closed_tube_with_its_normals_outward(side: Any) -> None:
+    arm = Forearm(HandShape(side=side, scale=1.1))
+    vertices, normals = arm.mesh(np.eye(4), np.array([0.4, 0.1, -0.2]))
+    faces = np.sort(arm.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert np.all(np.unique(faces, axis=0, return_counts=True)[1] == 2)
+    a, b, c = (vertices[arm.faces[:, k]] for k in range(3))
+    of_faces = np.cross(b - a, c - a)
+    assert np.einsum("ij,ij->", a, of_faces) / 6 > 5e-4  # its volume, half a litre and more: faces look outward
+    agree = np.einsum("fkj,fj->fk", normals[arm.faces], of_faces)
+    assert np.mean(agree > 0) > 0.99
+
+
+def test_a_room_is_cluttered_and_lies_well_behind_the_hand() -> None:
+    frame = _made(background="room", distance=0.5, seed=6)[10]
+    arm = frame.skin & (frame.exact_depth < 1)
+    face = frame.skin & ~arm
+    behind = frame.exact_depth[~arm]
+    assert behind.min() > 0.5 + 0.8
+    assert behind.max() == pytest.approx(3.0)
+    assert len(np.unique(np.round(behind, 1))) > 8
+    # The bystander's skin looks like skin, and is smaller than the hand.
+    assert 500 < face.sum() < frame.mask.sum()
+    hue = cv2.cvtColor(frame.colour, cv2.COLOR_RGB2HSV)[..., 0]
+    assert abs(float(np.median(hue[face])) - float(np.median(hue[frame.mask]))) < 8
+
+
+def test_skin_varies_between_people_and_over_the_hand() -> None:
+    tones = np.array([SkinTone.sample(generator(seed, 0, Stream.SKIN)).back for seed in range(200)])
+    luminance = tones @ [0.2126, 0.7152, 0.0722]
+    assert luminance.min() < 0.13
+    assert luminance.max() > 0.35
+    assert np.all(tones[:, 0] > tones[:, 1])
+    assert np.all(tones[:, 1] > tones[:, 2])
+    frame = _made(sensor="ideal", seed=1)[0]
+    assert np.all(frame.colour[frame.mask].std(axis=0) > 3)
+    assert np.all(SkinTone.sample(generator(9, 0, Stream.SKIN)).palm >= tones[9] - 0.02)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_skin_flips_change_that_share_of_labels_and_their_colours(share: float) -> None:
+    clean, flipped = _made(background="wall")[40], _made(background="wall", skin_flips=share)[40]
+    changed = clean.skin ^ flipped.skin
+    assert changed.mean() == pytest.approx(share, abs=0.005)
+    assert changed[clean.skin].mean() == pytest.approx(share, abs=0.02)
+    np.testing.assert_array_equal(np.any(clean.colour != flipped.colour, axis=-1), changed)
+    np.testing.assert_array_equal(clean.mask, flipped.mask)
+    redness = flipped.colour[..., 0].astype(int) - flipped.colour[..., 2]
+    assert np.mean(redness[flipped.skin & changed] > 10) > 0.99
+    assert np.mean(redness[~flipped.skin & changed] < 10) > 0.99
+
+
+def test_depth_noise_is_added_to_what_the_sensor_reads() -> None:
+    clean, noisy = _made()[40], _made(depth_noise=0.01)[40]
+    error = (noisy.depth - clean.depth)[clean.mask]
+    assert error.std() == pytest.approx(0.01, rel=0.05)
+    np.testing.assert_array_equal(clean.exact_depth, noisy.exact_depth)
+
+
+@pytest.mark.parametrize("sensor", ["ideal", "kinect1", "kinect2", "realsense"])
+def test_every_sensor_sees_the_hand_at_its_usual_distance(sensor: Any) -> None:
+    made = _made(sensor=sensor, background="wall")
+    for index in range(0, 360, 90):
+        frame = made[index]
+        assert np.mean(frame.depth[frame.mask] > 0) > 0.75
+        error = np.abs(frame.depth - frame.exact_depth)[frame.mask & (frame.depth > 0)]
+        assert np.median(error) < 0.002
+
+
+def test_frames_and_rate_choose_how_much_of_the_motion_is_sampled() -> None:
+    assert len(_made()) == 360
+    assert len(_made(rate=60)) == 720
+    assert len(_made(frames=7)) == 7
+    assert len(_made(motion="random")) == 360
+    assert len(_made(motion="random", frames=500)) == 500
+    np.testing.assert_allclose(_made(rate=60).poses[::2], _made().poses, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"frames": 361}, "1 to 360 frames"),
+        ({"frames": 0}, "1 to 360 frames"),
+        ({"motion": "random", "frames": 10**9}, "1 to 108000 frames"),
+        ({"distance": 5.0}, "between 0.2 and 3 m"),
+        ({"distance": float("nan")}, "between 0.2 and 3 m"),
+        ({"viewpoint": 8}, "0 to 7"),
+        ({"background": "forest"}, "none, wall, room"),
+        ({"model": "robot"}, "primitives, skin"),
+        ({"depth_noise": -0.001}, "depth noise"),
+        ({"skin_flips": 1.5}, "skin flips"),
+        ({"rate": 0.0}, "frame rate"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(options: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        _made(**options)
+
+
+def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "grasped"
+    arguments = ["synth", "grasp", str(out), "--frames", "3", "--sensor", "kinect2", "--background", "room"]
+    assert main([*arguments, "--side", "left", "--scale", "0.9", "--viewpoint", "2", "--seed", "8"]) == 0
+    assert "depthtrack view" in capsys.readouterr().out
+    sequence = FolderSequence(out)
+    truth = sequence.ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    assert truth.joints is not None
+    assert truth.hand == HandShape(side="left", scale=0.9)
+    made = _made(
+        motion="grasp", sensor="kinect2", background="room", hand=truth.hand, viewpoint=2, seed=8, frames=3
+    )  # fmt: skip
+    for index, frame in enumerate(sequence):
+        expected = made[index]
+        np.testing.assert_allclose(frame.depth, expected.depth, atol=0.51 * sequence.camera.depth_scale)
+        np.testing.assert_array_equal(sequence.hand_mask(index), expected.mask)
+        exact = sequence.exact_depth(index)
+        assert exact is not None
+        np.testing.assert_allclose(exact[expected.mask], expected.exact_depth[expected.mask], atol=3e-5)
+        assert frame.colour is not None
+        assert np.abs(frame.colour.astype(int) - expected.colour).mean() < 4  # JPEG
+        row = truth.at(frame.timestamp)
+        assert row == index
+        np.testing.assert_allclose(truth.poses[index], expected.pose, atol=1e-12)
+        np.testing.assert_allclose(truth.joints[index], expected.joints, atol=1e-12)
+    told = json.loads((out / "sequence.json").read_text())
+    assert (told["motion"], told["sensor"], told["seed"], told["distance"]) == ("grasp", "kinect2", 8, 0.65)
+    assert told["forearm"] is True
+    assert main(["synth", "grasp", str(out), "--frames", "1"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert main(["synth", "grasp", str(out), "--frames", "1", "--overwrite"]) == 0
+    assert len(FolderSequence(out)) == 1
+
+
+def test_flipped_labels_and_their_colours_survive_the_file(tmp_path: Path) -> None:
+    made = _made(frames=1, skin_flips=0.1)
+    write_recording(made, tmp_path / "flipped")
+    sequence = FolderSequence(tmp_path / "flipped")
+    colour = sequence[0].colour
+    assert colour is not None
+    np.testing.assert_array_equal(colour, made[0].colour)
+    np.testing.assert_array_equal(sequence.skin_mask(0), made[0].skin)
+    np.testing.assert_array_equal(sequence.hand_mask(0), made[0].mask)
+
+
+def test_the_command_says_what_it_needs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synth", "list"]) == 0
+    assert "everyday" in capsys.readouterr().out
+    assert main(["synth", "everyday"]) == 2
+    assert "say where to write" in capsys.readouterr().err
+    assert main(["synth", "nonsense", str(tmp_path / "x")]) == 2
+    assert "choose one of everyday" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()

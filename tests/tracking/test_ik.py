@@ -1,0 +1,130 @@
+"""The IK tracker: accuracy on the skin and on the cylinder model, start by itself, and the same bits when resumed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from depthtrack.errors import InputError
+from depthtrack.evaluation.metrics import angle_error, endpoint_error
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import ANGLES
+from depthtrack.hand.synergies import Synergies
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.stages.coarse_to_fine import FLAT_LADDER, Ladder, SingleFrameFitter
+from depthtrack.tracking.state import LostBelow
+from depthtrack.tracking.surfaces.registry import Model
+from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
+from tests.synthetic_observations import observe
+
+MADE = Synthesiser(Synthesis(model="skin"))
+MODEL = HandModel(MADE.options.hand)
+
+
+def follow(tracker: IkTracker, frames: range) -> list[Estimate]:
+    first, *rest = frames
+    return [tracker.start(observe(MADE, first), MADE.poses[first])] + [tracker.track(observe(MADE, i)) for i in rest]
+
+
+@pytest.mark.parametrize(("model", "highest_mm", "highest_deg"), [("skin", 2.0, 2.0), ("cylinders", 5.0, 6.0)])
+def test_follows_everyday_motion_rendered_from_the_skin(model: Model, highest_mm: float, highest_deg: float) -> None:
+    """Five ICP iterations on a third of the points, as Schroeder et al. 2014 measure."""
+    frames = range(100, 140)
+    estimates = follow(IkTracker(MADE.options.hand, IkOptions(model=model)), frames)
+    poses, truth = np.array([estimate.pose for estimate in estimates]), MADE.poses[frames.start : frames.stop]
+    assert endpoint_error(MODEL, poses, MODEL, truth).values.mean() < highest_mm
+    assert angle_error(poses, truth).values.mean() < highest_deg
+    assert {estimate.status for estimate in estimates[1:]} == {Status.TRACKED}
+
+
+@pytest.mark.parametrize("frame", [10, 150, 270])
+def test_starts_by_itself(frame: int) -> None:
+    estimate = IkTracker(MADE.options.hand).track(observe(MADE, frame))
+    assert estimate.status is Status.STARTED
+    assert estimate.pose is not None
+    assert endpoint_error(MODEL, estimate.pose[None], MODEL, MADE.poses[[frame]]).values[0] < 10
+
+
+def test_finds_the_hand_again_after_a_cut() -> None:
+    """From its palm to its back."""
+    tracker = IkTracker(MADE.options.hand)
+    tracker.start(observe(MADE, 30), MADE.poses[30])
+    after = [tracker.track(observe(MADE, frame)) for frame in (92, 93, 94)]
+    assert after[-1].pose is not None
+    assert endpoint_error(MODEL, after[-1].pose[None], MODEL, MADE.poses[[94]]).values[0] < 10
+    assert Status.STARTED in {estimate.status for estimate in after}
+
+
+def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
+    made = Synthesiser(Synthesis(model="skin", sensor="kinect1"))
+    tracker = IkTracker(made.options.hand)
+    tracker.start(observe(made, 74), made.poses[74])
+    assert {tracker.track(observe(made, frame)).status for frame in range(75, 86)} == {Status.TRACKED}
+
+
+@pytest.mark.parametrize("model", ["skin", "cylinders"])
+@pytest.mark.parametrize("readings", [0, 1, 5])
+def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(model: Model, readings: int) -> None:
+    seen, tracker = observe(MADE, 0), IkTracker(MADE.options.hand, IkOptions(model=model))
+    depth = np.zeros_like(seen.depth)
+    some = np.flatnonzero(seen.depth)[:readings]
+    depth.flat[some] = seen.depth.flat[some]
+    tracker.start(seen, MADE.poses[0])
+    assert tracker.track(replace(seen, depth=depth)).status is Status.LOST
+    assert tracker.track(observe(MADE, 1)).status is Status.STARTED
+
+
+def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
+    """A grasp seen from behind: with synergies of other grasps, drawn to or alone, angles err by half or less."""
+    made = Synthesiser(Synthesis(motion="grasp", model="skin"))
+    synergies = _synergies_of("other-grasps")
+    synergies = synergies.truncated(synergies.components_for(0.99))
+    frames = range(160, 280, 2)
+
+    def mean_error(options: IkOptions) -> float:
+        tracker = IkTracker(made.options.hand, replace(options, lost=LostBelow(0.0, np.inf)))
+        poses = [tracker.start(observe(made, frames[0]), made.poses[frames[0]]).pose]
+        poses += [tracker.track(observe(made, frame)).pose for frame in frames[1:]]
+        return float(angle_error(np.array(poses), made.poses[frames]).values.mean())
+
+    free = mean_error(IkOptions())
+    assert mean_error(IkOptions(synergies=synergies)) < 0.7 * free
+    assert mean_error(IkOptions(synergies=synergies, soft=True)) < 0.6 * free
+
+
+def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
+    made = Synthesiser(Synthesis(motion="signs", model="skin"))
+    synergies, frames = _synergies_of("signs"), [16, 108, 330]
+
+    def errors(ladder: Ladder) -> np.ndarray:
+        fitter = SingleFrameFitter(made.options.hand, synergies, ladder)
+        poses = [fitter.estimate(observe(made, frame), made.poses[frame]) for frame in frames]
+        return angle_error(np.array(poses), made.poses[frames]).values
+
+    assert errors(Ladder()).max() < 1
+    assert errors(FLAT_LADDER).mean() > 3
+
+
+def _synergies_of(motion: str) -> Synergies:
+    return Synergies.fit(Synthesiser(Synthesis(motion=motion)).poses[:, ANGLES])
+
+
+def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
+    whole = follow(IkTracker(MADE.options.hand), range(0, 8))
+    resumed = IkTracker(MADE.options.hand)
+    resumed.recall(whole[:5])
+    for index in range(5, 8):
+        np.testing.assert_array_equal(resumed.track(observe(MADE, index)).pose, whole[index].pose)
+
+
+def test_trackers_are_made_by_name() -> None:
+    assert create_tracker("ik", MADE.options.hand, subsample=5).name == "ik"
+    assert create_tracker("pso", MADE.options.hand, particles=8).name == "pso"
+    with pytest.raises(InputError, match="choose one of pso, ik"):
+        create_tracker("magic", MADE.options.hand)
+    with pytest.raises(InputError, match="point, plane, symmetric"):
+        create_tracker("ik", MADE.options.hand, residual="magic")
+    with pytest.raises(InputError, match="particles"):
+        create_tracker("ik", MADE.options.hand, particles=8)

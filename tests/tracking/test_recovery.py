@@ -1,0 +1,209 @@
+"""Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import pytest
+
+from depthtrack.evaluation.metrics import endpoint_error
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.pose import ANGLES, POSITION, rotation_matrix
+from depthtrack.hand.postures import POSTURES
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+from depthtrack.solver.swarm import SwarmOptions
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
+from depthtrack.tracking.proposals.local import close_by, one_finger_further, other_finger
+from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, refine
+from depthtrack.tracking.state import LostBelow, TrackMemory
+from depthtrack.tracking.tracker import Status
+from depthtrack.tracking.trackers.pso import PsoOptions
+from tests.synthetic_observations import observe
+
+MADE = Synthesiser(Synthesis(model="skin"))
+MODEL = HandModel(MADE.options.hand)
+
+
+def _shifted(pose: np.ndarray) -> np.ndarray:
+    """The palm one finger further, the middle finger folded: each other finger where the next one was."""
+    wrong = pose.copy()
+    towards_thumb = rotation_matrix(pose[3:7])[:, 0] * MADE.options.hand.mirror
+    wrong[POSITION] += 0.02 * towards_thumb
+    wrong[ANGLES] = POSTURES["open"]
+    wrong[ANGLES][8:12] = POSTURES["fist"][8:12]
+    return wrong
+
+
+def test_another_place_is_found_where_a_swarm_stays() -> None:
+    """From one finger further, in a single frame: a swarm of the same spread does not get there."""
+    frame, wrong = 11, _shifted(MADE.poses[11])
+    o = observe(MADE, frame)
+    with RasterScorer(MADE.options.hand) as scorer:
+        scorer.observe(Target(o.camera, o.skin, o.depth).reduced(96))
+        swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
+        stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
+        options = SearchOptions(apart=0.1)
+        generator = np.random.default_rng(5)
+        found, _ = find_candidates(scorer, close_by(wrong, generator, options.hypotheses), generator, options)
+    errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, MADE.poses[[frame, frame]]).values
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_poses_close_by_are_possible_and_close() -> None:
+    poses = close_by(MADE.poses[20], np.random.default_rng(1), 500)
+    angles = poses[:, ANGLES]
+    assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
+    assert np.linalg.norm(poses[:, POSITION] - MADE.poses[20, POSITION], axis=1).max() < 0.12
+    # Some keep the fingers, as far as they are varied, and others change them all.
+    change = np.abs(angles - MADE.poses[20, ANGLES]).max(axis=1)
+    assert change.min() < 0.4
+    assert np.median(change) > 0.6
+
+
+def test_orientations_that_no_wrist_allows_are_left_out() -> None:
+    arm, angles = np.array([0.0, 0.6, 0.8]), typical_angles(np.random.default_rng(3), 400)
+    poses = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2), arm)
+    towards_wrist = -rotation_matrix(poses[:, 3:7])[:, :, 1]
+    assert (towards_wrist @ arm > 0.15).all()
+    free = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2))
+    assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
+
+
+def test_a_finger_that_is_elsewhere_is_found() -> None:
+    """Each finger in turn is bent or stretched; moved alone, it is found again, and no other one moves."""
+    frame = 11
+    o, truth = observe(MADE, frame), MADE.poses[frame]
+    with RasterScorer(MADE.options.hand) as scorer:
+        scorer.observe(Target(o.camera, o.skin, o.depth))
+        for finger in range(1, 5):
+            wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
+            straight = truth[angles][1:].sum() < np.radians(90)
+            wrong[angles] = POSTURES["fist" if straight else "open"][4 * finger : 4 * finger + 4]
+            found, energy = other_finger(scorer, wrong, finger, np.random.default_rng(finger))
+            assert energy == scorer.score(found[None])[0]
+            before, after = endpoint_error(MODEL, np.stack([wrong, found]), MODEL, np.stack([truth, truth])).values
+            assert after < 0.4 * before
+            assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))
+
+
+def test_one_finger_further_undoes_a_shift() -> None:
+    """A hand one finger beside its place, either way: three of its four fingers are where they should be again."""
+    truth = MADE.poses[11].copy()
+    truth[ANGLES] = POSTURES["open"]
+    for way in (0, 1):
+        shifted = one_finger_further(MODEL, truth)[way]
+        assert not np.allclose(shifted, truth)
+        back = one_finger_further(MODEL, shifted)[1 - way]
+        there, here = (MODEL.endpoints(pose).reshape(5, 4, 3) for pose in (truth, back))
+        distances = np.linalg.norm(there - here, axis=-1)[1:, 3]
+        assert np.sort(distances)[2] < 0.015
+        assert np.linalg.norm(there - MODEL.endpoints(shifted).reshape(5, 4, 3), axis=-1)[1:, 3].min() > 0.015
+
+
+@pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
+def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int, remembered: bool) -> None:
+    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
+    memory.settle(pose, 5.0, 0.9, Status.TRACKED, {})
+    for _ in range(frames):
+        lost = memory.settle(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
+        assert lost.status is Status.LOST
+        assert memory.pose is None
+    assert (memory.recent is pose) == remembered
+
+
+def test_a_pose_of_unusual_energy_does_not_guide() -> None:
+    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
+    for _ in range(5):
+        memory.settle(pose, 16.0, 0.8, Status.TRACKED, {})
+        assert memory.expected is not None
+    memory.settle(pose, 22.0, 0.8, Status.TRACKED, {})
+    assert memory.pose is not None
+    assert memory.expected is None
+    memory.settle(pose, 18.0, 0.55, Status.TRACKED, {})
+    assert memory.pose is not None
+    assert memory.expected is None
+
+
+class _Levels:
+    """Stands for a scorer: a lower energy the nearer an angle is to what it is told."""
+
+    def __init__(self, angle: float) -> None:
+        self.angle, self.seen = angle, list[np.ndarray]()
+
+    def score(self, poses: np.ndarray) -> np.ndarray:
+        self.seen.append(poses.copy())
+        return np.abs(poses[:, 13] - self.angle)
+
+
+def test_each_of_the_best_postures_of_a_finger_leads_on() -> None:
+    scorer = _Levels(0.7)
+    other_finger(scorer, MADE.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
+    first, second = scorer.seen[0], scorer.seen[1]
+    kept = first[np.argsort(scorer.score(first), kind="stable")[:8]]
+    assert np.array_equal(second[:8], kept)
+    nearest = np.argmin(np.abs(second[8:, None, 13] - kept[None, :, 13]), axis=1)
+    assert len(second) == 96
+    assert np.all(np.abs(second[:, 13] - np.tile(kept[:, 13], 12)) < 1.0)
+    assert len(set(nearest.tolist())) >= 4
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_a_start_does_not_depend_on_what_was_tracked_before(name: str) -> None:
+    with (
+        closing(create_tracker(name, MADE.options.hand)) as fresh,
+        closing(create_tracker(name, MADE.options.hand)) as used,
+    ):
+        used.start(observe(MADE, 30), MADE.poses[30])
+        first, second = (tracker.start(observe(MADE, 120)) for tracker in (fresh, used))
+    assert first.pose is not None
+    assert first.pose.tolist() == second.pose.tolist()  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str) -> None:
+    """One frame shows a few crumbs far apart, as no hand does: it is lost, and found again beside where it was."""
+    frames = [observe(MADE, index) for index in (20, 21, 22, 23)]
+    crumbs = np.zeros_like(frames[1].skin)
+    crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
+    frames[1] = replace(frames[1], skin=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
+    with (
+        closing(create_tracker(name, MADE.options.hand)) as whole,
+        closing(create_tracker(name, MADE.options.hand)) as cut,
+    ):
+        estimates = [whole.start(frames[0], MADE.poses[20]), *(whole.track(frame) for frame in frames[1:])]
+        assert [estimate.status for estimate in estimates[1:3]] == ["lost", "started"]
+        cut.recall(estimates[:2])
+        again = [cut.track(frame) for frame in frames[2:]]
+    poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
+    assert np.array_equal(poses, poses_again)
+    assert endpoint_error(MODEL, poses, MODEL, MADE.poses[[22, 23]]).values.max() < 10
+
+
+@pytest.mark.parametrize("name", ["ik", "pso"])
+def test_the_papers_have_no_second_thoughts(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hand jumps by as much as makes every other variant think again."""
+    module = {"ik": "fit_recovery", "pso": "swarm_recovery"}[name]
+    thoughts = import_module(f"depthtrack.tracking.stages.{module}").SecondThoughts
+    thought = list[str]()
+    for method in ("close_by", "finger_by_finger"):
+        monkeypatch.setattr(thoughts, method, _noted(method, getattr(thoughts, method), thought))
+    for variant in ("paper", "default"):
+        with closing(create_tracker(name, MADE.options.hand, variant=variant)) as tracker:
+            tracker.start(observe(MADE, 20), MADE.poses[20])
+            tracker.track(observe(MADE, 130))
+        assert bool(thought) == (variant == "default")
+
+
+def _noted(method: str, original: Callable[..., Any], thought: list[str]) -> Callable[..., Any]:
+    def noted(*given: Any) -> Any:
+        thought.append(method)
+        return original(*given)
+
+    return noted

@@ -1,0 +1,162 @@
+"""Posing the skin and finding its closest seen points, held to slow searches through all vertices."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.hand.compiled_kinematics import Bodies, Chain
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.solver import closest_points as closest
+from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.tracking.surfaces import skin as mesh
+from depthtrack.tracking.surfaces.skin import Cells, MeshModel, Posed, Seen
+from tests.hand.test_compiled_kinematics import random_pose
+
+SHAPE = HandShape()
+SKIN = Skin.of(SHAPE)
+MODEL = MeshModel.of(SKIN, 0.004)
+TOLERANCE = 0.008
+
+
+def posed_hand(pose: np.ndarray, model: MeshModel = MODEL) -> Posed:
+    posed = Posed(np.empty_like(model.rest), np.empty_like(model.rest))
+    mesh.skin_vertices(model, Bodies.at(Chain.of(SHAPE), pose), posed)
+    return posed
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def cloud_near(posed: Posed, rng: np.random.Generator, count: int = 60, spread: float = 0.01) -> Cloud:
+    """Points about the vertices that face the camera, with normals about theirs."""
+    facing = np.flatnonzero(np.einsum("vi,vi->v", posed.x, posed.n) < 0)
+    pick = rng.choice(facing, count)
+    normals = unit(posed.n[pick] + rng.normal(0, 0.3, (count, 3)))
+    return Cloud(posed.x[pick] + rng.normal(0, spread, (count, 3)), normals)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_vertices_and_normals_are_blended_as_skinning_says(seed: int) -> None:
+    pose = random_pose(np.random.default_rng(seed))
+    posed = posed_hand(pose)
+    weights = np.zeros((len(MODEL.rest), 16))
+    np.put_along_axis(weights, MODEL.bodies, MODEL.weights, axis=1)
+    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
+    moved = HandModel(SHAPE).transforms(pose)[:, :3] @ SKIN.T_body_rest
+    blended = np.einsum("vb,bij->vij", weights, moved)
+    expected = np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.rest) + blended[:, :, 3]
+    np.testing.assert_allclose(posed.x, expected, atol=1e-12)
+    np.testing.assert_allclose(posed.n, unit(np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.normals)), atol=1e-9)
+
+
+def test_four_bodies_a_vertex_are_as_good_as_all() -> None:
+    pose = random_pose(np.random.default_rng(1))
+    posed = posed_hand(pose, MeshModel.of(SKIN))
+    assert np.abs(posed.x - SKIN.at(pose)).max() < 2e-4
+
+
+def test_spread_points_are_apart_and_leave_no_gaps() -> None:
+    points = np.random.default_rng(0).uniform(size=(400, 3))
+    picked = mesh.spread(points, 0.2)
+    distance = np.linalg.norm(points[:, None] - points[picked], axis=-1)
+    between = distance[picked] + np.eye(len(picked))
+    assert between.min() > 0.2
+    assert distance.min(axis=1).max() <= 0.2
+
+
+def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
+    """Vertices by cell."""
+    in_cell: dict[int, list[int]] = {}
+    for v, (x, n) in enumerate(zip(posed.x, posed.n, strict=True)):
+        column, row = ((x[:2] / x[2] - [cells.u, cells.v]) // cells.size).astype(int)
+        if x @ n < 0 and 0 <= column < cells.columns and 0 <= row < cells.rows:
+            in_cell.setdefault(row * cells.columns + column, []).append(v)
+    nearest = {cell: posed.x[vertices, 2].min() for cell, vertices in in_cell.items()}
+    return {
+        cell: [v for v in vertices if posed.x[v, 2] <= nearest[cell] + TOLERANCE] for cell, vertices in in_cell.items()
+    }
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_seen_vertices_are_sorted_by_cell(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    posed = posed_hand(random_pose(rng))
+    cells = mesh.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
+    seen = mesh.sort_seen(MODEL, posed, cells, TOLERANCE)
+    expected = _seen_slowly(posed, cells)
+    assert seen.first[-1] == len(seen.vertex) == sum(map(len, expected.values()))
+    for cell in range(cells.rows * cells.columns):
+        assert seen.vertex[seen.first[cell] : seen.first[cell + 1]].tolist() == expected.get(cell, [])
+    there = seen.table[:, : len(seen.vertex)]
+    np.testing.assert_allclose(there[:3].T + seen.origin, posed.x[seen.vertex], atol=1e-7)
+    np.testing.assert_allclose(there[3:].T, posed.n[seen.vertex], atol=1e-6)
+    assert np.all(seen.table[:, len(seen.vertex) :] == closest.FAR)
+
+
+def test_what_another_finger_hides_is_not_seen() -> None:
+    """A flat hand seen from its side: its outer fingers hide the middle one."""
+    flat = make_pose([0, 0, 0.5], [np.sqrt(0.5), 0, np.sqrt(0.5), 0], np.zeros(20))
+    posed = posed_hand(flat)
+    cells = mesh.cells_over(posed.x, 0.004, 0.01)
+    seen = mesh.sort_seen(MODEL, posed, cells, TOLERANCE)
+    facing = np.einsum("vi,vi->v", posed.x, posed.n) < 0
+    middle = np.isin(MODEL.bodies[:, 0], [7, 8, 9])
+    assert middle[seen.vertex].sum() < 0.5 * (facing & middle).sum()
+    assert len(seen.vertex) < 0.75 * facing.sum()
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    reach=st.sampled_from([0.005, 0.04]),
+    agreement=st.sampled_from([-1.1, 0.3, 0.9]),
+    cell=st.sampled_from([0.002, 0.004, 0.02]),
+)
+def test_matches_are_the_closest_seen_vertices_that_agree(
+    seed: int, reach: float, agreement: float, cell: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    posed = posed_hand(random_pose(rng))
+    cloud = cloud_near(posed, rng, spread=0.5 * reach)
+    cells = mesh.cells_over(cloud.points, cell, reach)
+    seen, matches = mesh.sort_seen(MODEL, posed, cells, TOLERANCE), Matches.room(len(cloud.points))
+    closest.closest_vertices(cloud, seen, cells, reach, agreement, matches.body)
+    found, vertex = matches.body >= 0, seen.vertex[matches.body]
+    mesh.take_up(MODEL, posed, seen, matches)
+    np.testing.assert_array_equal(matches.body >= 0, found)
+    np.testing.assert_array_equal(matches.body[found], MODEL.bodies[vertex[found], 0])
+    np.testing.assert_array_equal(matches.x[found], posed.x[vertex[found]])
+    np.testing.assert_array_equal(matches.n[found], posed.n[vertex[found]])
+
+    distance = np.linalg.norm(cloud.points[:, None] - posed.x[seen.vertex], axis=-1)
+    same = cloud.normals @ posed.n[seen.vertex].T
+    # Single precision may see equal distances, and normals at the edge of agreement, either way.
+    least, most = (np.where(same < agreement + slack, np.inf, distance).min(axis=1) for slack in (-1e-6, 1e-6))
+    np.testing.assert_array_equal(found[least == most], (least < reach)[least == most])
+    at = _index(seen, vertex)
+    chosen = np.where(found, distance[np.arange(len(found)), at], reach)
+    assert np.all(chosen >= np.minimum(least, reach) - 1e-6)
+    assert np.all(chosen <= np.minimum(most, reach) + 1e-6)
+    assert np.all(same[found, at[found]] >= agreement - 1e-6)
+
+
+def _index(seen: Seen, vertex: np.ndarray) -> np.ndarray:
+    """Where vertices stand among the seen ones; anywhere for others."""
+    return np.asarray(np.argmax(seen.vertex == vertex[:, None], axis=1))
+
+
+@pytest.mark.parametrize("depth", [0.2, 0.5, 2.5])
+def test_cells_cover_the_cloud_and_its_surroundings(depth: float) -> None:
+    points = np.random.default_rng(0).uniform([-0.1, -0.1, depth], [0.1, 0.1, depth + 0.05], (50, 3))
+    cells = mesh.cells_over(points, 0.004, 0.04)
+    uv = points[:, :2] / points[:, 2:]
+    margin = 0.04 / points[:, 2].mean()
+    assert np.all(uv.min(axis=0) - margin >= np.array([cells.u, cells.v]) - 1e-12)
+    assert np.all(
+        uv.max(axis=0) + margin <= np.array([cells.u, cells.v]) + cells.size * np.array([cells.columns, cells.rows])
+    )
+    assert cells.size * points[:, 2].mean() == pytest.approx(0.004)
