@@ -18,7 +18,7 @@ def main(count: int = 1000, renderer: str = "raster") -> np.ndarray:
     spread = np.repeat([0.02, 0.2, 0.3], [3, 3, 20]) * np.linspace(0, 1, count)[:, None]
     poses = retract(frame.pose, rng.standard_normal((count, 26)) * spread)
     with create_scorer(renderer, HandShape()) as scorer:
-        scorer.observe(Target(made.sensor.camera, frame.skin, frame.depth.astype(np.float32)))
+        scorer.set_target(Target(made.sensor.camera, frame.skin, frame.depth.astype(np.float32)))
         energies = scorer.score(poses)
     for part in np.array_split(energies, 5):
         print(f"{len(part)} hypotheses: energy {part.min():.1f} to {part.max():.1f}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from depthtrack.evaluation.compare.comparison import Comparison, compare
 from depthtrack.evaluation.compare.results import as_table, lines_of
 from depthtrack.evaluation.compare.running import Source
-from depthtrack.evaluation.compare.specs import Contender
+from depthtrack.evaluation.compare.specs import TrackerSpec
 from depthtrack.evaluation.evaluate import evaluate_run
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.report.build import write_report
@@ -24,8 +24,8 @@ def main(folder: str, frames: int = 90, distances: tuple[float, ...] = (0.5, 1.0
         made = Synthesiser(Synthesis("grasp", distance=distance, sensor="kinect1", model="skin", frames=frames))
         write_recording(made, path, overwrite=True)
         sources.append(Source(str(path)))
-    contenders = (Contender("PSO", "pso"), Contender("IK", "ik"))
-    runs = compare(Comparison(tuple(sources), contenders), Path(folder), LocalWorkers(jobs))
+    specs = (TrackerSpec("PSO", "pso"), TrackerSpec("IK", "ik"))
+    runs = compare(Comparison(tuple(sources), specs), Path(folder), LocalWorkers(jobs))
     evaluations = [evaluate_run(Path(run.folder)) for run in runs]
     print(as_table(lines_of(evaluations)))
     write_report(evaluations, Path(folder) / "report.html")

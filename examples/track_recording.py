@@ -6,7 +6,7 @@ from contextlib import closing
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.segmentation.observation import Observer
+from depthtrack.segmentation.observation import Segmenter
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Status
 
@@ -16,10 +16,10 @@ def main(path: str, tracker_name: str = "ik") -> int:
     recording = open_sequence(path)
     truth = recording.ground_truth
     hand = truth.hand if truth is not None and truth.hand is not None else HandShape()
-    model, observer, tip, trusted = HandModel(hand), Observer.for_sequence(recording), "index_tip", 0
+    model, segmenter, tip, trusted = HandModel(hand), Segmenter.for_sequence(recording), "index_tip", 0
     with closing(create_tracker(tracker_name, hand)) as tracker:
         for frame in recording:
-            observation = observer.observe(frame)
+            observation = segmenter.segment(frame)
             if observation is None:
                 continue
             estimate = tracker.track(observation)

@@ -29,16 +29,16 @@ def agree(platform: Platform, shape: HandShape, target: Target, poses: np.ndarra
     The energies are compared where no match hangs on the last bits of a depth: such readings are taken out first.
     """
     oracle = OracleScorer(shape, objective)
-    oracle.observe(target)
+    oracle.set_target(target)
     true = np.stack([oracle.render(pose) for pose in poses])
     margin = np.abs(np.abs(true - target.depth) - objective.match_depth)
     undecided = ((margin < 1e-5) & (true > 0)).any(axis=0)
     target = Target(target.camera, target.skin, np.where(undecided, 0, target.depth))
-    oracle.observe(target)
+    oracle.set_target(target)
     expected = oracle.terms(poses)
     for sums in BOTH_SUMS:
         with OpenGLScorer(shape, objective, platform, sums) as scorer:
-            scorer.observe(target)
+            scorer.set_target(target)
             terms, drawn = scorer.terms(poses), np.stack([scorer.render(pose) for pose in poses])
         both, wrong = (drawn > 0) & (true > 0), (drawn > 0) != (true > 0)
         assert np.count_nonzero(wrong) <= 1e-3 * np.count_nonzero(true)
@@ -77,7 +77,7 @@ def absurd(platform: Platform, name: str, seed: int) -> None:
     agree(platform, shape, target, poses, OBJECTIVE)
     if name in ("behind", "outside"):
         with OpenGLScorer(shape, platform=platform) as scorer:
-            scorer.observe(target)
+            scorer.set_target(target)
             assert not any(scorer.render(pose).any() for pose in poses)
 
 
@@ -96,5 +96,5 @@ def energies_and_depth(platform: Platform, seed: int) -> tuple[np.ndarray, np.nd
     shape, poses = random_shape(rng), random_poses(rng, 20, (0, 0, 0.5), 0.02)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng).reduced(64)
     with OpenGLScorer(shape, platform=platform) as scorer:
-        scorer.observe(target)
+        scorer.set_target(target)
         return scorer.score(poses), scorer.render(poses[1])

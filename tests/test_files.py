@@ -12,7 +12,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.recording.run_folder import read_configuration, read_rows
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.motion_file import read_table
 
 
@@ -45,7 +45,7 @@ def test_files_larger_than_memory_are_refused_unread(tmp_path: Path, read: Calla
         read(path)
 
 
-@pytest.mark.parametrize("read", [Synergies.from_json, SkinModel.load, read_table])
+@pytest.mark.parametrize("read", [Synergies.from_json, SkinColourModel.load, read_table])
 def test_readers_of_small_files_refuse_large_and_endless_ones(read: Callable[[Path], object], tmp_path: Path) -> None:
     with (tmp_path / "large").open("wb") as file:
         file.truncate(1 << 23)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
-from depthtrack.calibration.residuals import View
+from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.rendering.raster import RasterScorer
@@ -121,7 +121,7 @@ def calibrate(
     begun = {}
     for n, tried in enumerate(sides):
         tell(f"a {tried} hand of what size?", 0.4 * n / len(sides))
-        begun[tried] = _begin(searcher, tried)
+        begun[tried] = _initialise(searcher, tried)
     chosen = min(sides, key=lambda s: begun[s][1].energies.mean())
     values, found = begun[chosen]
     if np.median(found.agreements) < _HAND_LIKE:
@@ -161,7 +161,7 @@ class _Searcher:
 
     def __init__(self, observations: list[Observation], seed: int, threads: int) -> None:
         self.observations, self._seed, self._threads = observations, seed, threads
-        self.views = [View(o) for o in observations]
+        self.views = [CalibrationView(o) for o in observations]
 
     def find(self, shape: HandShape, count: int | None = None, attempts: int = 1) -> Found:
         """In the first `count` views, or in all."""
@@ -176,7 +176,7 @@ class _Searcher:
         out = []
         with RasterScorer(shape, threads=self._threads) as scorer:
             for o in self.observations[:count]:
-                scorer.observe(_target(o))
+                scorer.set_target(_target(o))
                 generator = frame_generator(self._seed, o.frame_index)
                 angles = typical_angles(generator, _WIDE.hypotheses)
                 poses = hypotheses(o.centre, angles, generator, o.arm_direction)
@@ -186,7 +186,7 @@ class _Searcher:
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
         """Of a hand in a pose (27,), in one view."""
         with RasterScorer(shape) as scorer:
-            scorer.observe(_target(self.observations[view]))
+            scorer.set_target(_target(self.observations[view]))
             return float(scorer.score(pose[None])[0])
 
     def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
@@ -194,7 +194,7 @@ class _Searcher:
         poses, energies, agreements = [], [], []
         with RasterScorer(shape, threads=self._threads) as scorer:
             for n, o in enumerate(observations):
-                scorer.observe(_target(o))
+                scorer.set_target(_target(o))
                 generator = frame_generator(self._seed, o.frame_index)
                 pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
                 tried = np.stack([pose] if known is None else [pose, known[n]])
@@ -210,7 +210,7 @@ def _target(o: Observation) -> Target:
     return Target(o.camera, o.skin, o.depth).reduced(_RESOLUTION)
 
 
-def _begin(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
+def _initialise(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
     """Sizes (35,) that a few open hands tell, and the poses of such a hand in all views.
 
     A hand of wrong sizes explains a view best in a wrong pose, one finger taken for the next. So each likely pose gets

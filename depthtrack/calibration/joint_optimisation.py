@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.calibration.parameters import COUNT, hand_of, prior_covariance
-from depthtrack.calibration.residuals import Evidence, SkinModel, View, gather
+from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
 from depthtrack.hand.shape import Side
@@ -43,7 +43,7 @@ class JointFit:
 
 
 def fit_jointly(
-    views: Sequence[View],
+    views: Sequence[CalibrationView],
     poses: Array,
     values: Array,
     side: Side,
@@ -53,17 +53,17 @@ def fit_jointly(
 ) -> JointFit:
     """Sizes and poses that explain all views best, from `poses` (V, 27) and `values` (35,); only `free` sizes move.
 
-    `exact` makes the skin anew in every round (see `SkinModel`), and begins where most is known already.
+    `exact` makes the skin anew in every round (see `PosedSkin`), and begins where most is known already.
     """
-    softness = (_SOFTNESS[1], _SOFTNESS[1]) if exact else _SOFTNESS
+    kernel_scale = (_SOFTNESS[1], _SOFTNESS[1]) if exact else _SOFTNESS
     poses, values = within_limits(poses), values.copy()
     prior = np.linalg.inv(prior_covariance())
     held = np.ones(COUNT, dtype=np.bool_)
     held[free] = False
     for k in range(rounds):
-        skin = SkinModel(hand_of(values, side), exact)
-        s = softness[0] * (softness[1] / softness[0]) ** (k / max(rounds - 1, 1))
-        evidence = [gather(view, skin, pose, s) for view, pose in zip(views, poses, strict=True)]
+        skin = PosedSkin(hand_of(values, side), exact)
+        s = kernel_scale[0] * (kernel_scale[1] / kernel_scale[0]) ** (k / max(rounds - 1, 1))
+        evidence = [linearise(view, skin, pose, s) for view, pose in zip(views, poses, strict=True)]
         information, gradient, steps = _eliminate(views, evidence, poses)
         change = _solve(information + prior, -(gradient + prior @ values), held)
         change *= min(1.0, _LARGEST / max(np.abs(change).max(), 1e-12))
@@ -75,7 +75,7 @@ def fit_jointly(
 
 
 def _eliminate(
-    views: Sequence[View], evidence: Sequence[Evidence], poses: Array
+    views: Sequence[CalibrationView], evidence: Sequence[Evidence], poses: Array
 ) -> tuple[Array, Array, list[tuple[Array, Array]]]:
     """Information (35, 35) and gradient (35,) of the sizes, the poses following them; and for each view how its pose
     moves: by itself (26,), and (26, 35) with the sizes."""

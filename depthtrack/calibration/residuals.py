@@ -35,7 +35,7 @@ PATCH = 0.010
 """Metres: errors of sensor and model are alike within a patch of this side, which counts as one measurement."""
 
 
-class View:
+class CalibrationView:
     """One frame's observation, prepared for many fits."""
 
     def __init__(self, observation: Observation) -> None:
@@ -53,7 +53,7 @@ class View:
         """Independent measurements that the view amounts to."""
 
 
-class SkinModel:
+class PosedSkin:
     """The skin of a hand of some sizes, as cameras see it.
 
     While sizes are sought, it is the average hand's skin stretched along and across its bones, which takes no time;
@@ -66,7 +66,7 @@ class SkinModel:
         self._stretch = np.tile(np.eye(4), (BODY_COUNT, 1, 1)) if exact else _stretches(shape, average)
         self.wrist = shape.wrist[1] + _WRIST_ROOM
 
-    def seen(self, view: View, pose: Array) -> Surface:
+    def seen(self, view: CalibrationView, pose: Array) -> Surface:
         """The skin in a pose (27,) through the view's camera."""
         skin = self._skin
         vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)
@@ -101,9 +101,9 @@ class _Residuals:
     distances: Array
 
 
-def gather(view: View, skin: SkinModel, pose: Array, softness: float) -> Evidence:
+def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale: float) -> Evidence:
     """The evidence of a view for a pose (27,); residuals are weighted as Geman and McClure's estimator does, by 1/4 at
-    a distance of `softness` (m)."""
+    a distance of `kernel_scale` (m)."""
     surface = skin.seen(view, pose)
     row, column = np.nonzero(surface.depth)
     if len(row) == 0:
@@ -116,7 +116,7 @@ def gather(view: View, skin: SkinModel, pose: Array, softness: float) -> Evidenc
     parts = [on_surface, _outline_residuals(view, skin, pose, bodies, x, places)]
     a = np.concatenate([_gradients(skin.model, pose, part) for part in parts])
     errors, distances = (np.concatenate([getattr(part, name) for part in parts]) for name in ("errors", "distances"))
-    weights = 1 / (1 + (distances / softness) ** 2) ** 2
+    weights = 1 / (1 + (distances / kernel_scale) ** 2) ** 2
     found = on_surface.distances
     return Evidence(
         (a * weights[:, None]).T @ a,
@@ -140,7 +140,9 @@ def _stretches(shape: HandShape, average: HandShape) -> Array:
     return S
 
 
-def _surface_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, x: Array, normals: Array) -> _Residuals:
+def _surface_residuals(
+    view: CalibrationView, skin: PosedSkin, pose: Array, bodies: Index, x: Array, normals: Array
+) -> _Residuals:
     """From the nearest seen skin to each point, along the mean of both normals (Rusinkiewicz 2019)."""
     distance, nearest = map(np.asarray, cKDTree(x).query(view.points, distance_upper_bound=_REACH))
     found = np.flatnonzero(np.isfinite(distance))
@@ -153,7 +155,9 @@ def _surface_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, 
     return _Residuals(bodies[k], x[k], directions, errors, distance[found])
 
 
-def _outline_residuals(view: View, skin: SkinModel, pose: Array, bodies: Index, x: Array, places: Index) -> _Residuals:
+def _outline_residuals(
+    view: CalibrationView, skin: PosedSkin, pose: Array, bodies: Index, x: Array, places: Index
+) -> _Residuals:
     """From the outline of the seen skin to that of the silhouette, across both; `places` (h, w) index `x`, -1 for no
     skin."""
     inner = binary_erosion(places >= 0, border_value=1)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.surface_grid import disc
 
 _LOOKED_AT = 240
@@ -20,7 +20,7 @@ _FEWEST = 3
 
 
 def choose_views(
-    sequence: Sequence, observer: Observer, count: int, progress: Callable[[int, int], None] | None = None
+    sequence: Sequence, segmenter: Segmenter, count: int, progress: Callable[[int, int], None] | None = None
 ) -> list[Observation]:
     """At most `count` observations, the most open hands first: half for their fingers, half spread over time.
 
@@ -30,7 +30,7 @@ def choose_views(
     seen: list[Observation] = []
     openness: list[float] = []
     for number, frame in enumerate(sequence.frames(looked_at.tolist())):
-        observation = observer.observe(frame)
+        observation = segmenter.segment(frame)
         if observation is not None:
             seen.append(observation)
             openness.append(finger_area(observation))

@@ -49,7 +49,7 @@ class Command:
         from depthtrack.calibration.calibrate import VIEWS, calibrate, summary
         from depthtrack.calibration.views import choose_views
         from depthtrack.resources import usable_cores
-        from depthtrack.segmentation.observation import Observer
+        from depthtrack.segmentation.observation import Segmenter
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
 
@@ -60,7 +60,7 @@ class Command:
             if path.is_dir():
                 raise InputError(f"{path} is a folder: name a file in it")
         sequence = self.recording.open()
-        observer = Observer.for_sequence(sequence, self.skin_model)
+        segmenter = Segmenter.for_sequence(sequence, self.skin_model)
         with tqdm(total=100, unit="%", bar_format="{desc}: {percentage:3.0f}% |{bar}|", disable=None) as bar:
 
             def tell(what: str, share: float) -> None:
@@ -68,7 +68,7 @@ class Command:
                 bar.update(round(100 * share) - bar.n)
 
             tell("looking for telling frames", 0.0)
-            observations = choose_views(sequence, observer, VIEWS)
+            observations = choose_views(sequence, segmenter, VIEWS)
             calibration = calibrate(
                 observations,
                 None if self.side == "auto" else self.side,

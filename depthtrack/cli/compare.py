@@ -55,11 +55,11 @@ class Command:
 
     def _comparison(self) -> "Comparison":
         from depthtrack.evaluation.compare.comparison import Comparison
-        from depthtrack.evaluation.compare.specs import read_contenders
+        from depthtrack.evaluation.compare.specs import read_specs
 
         return Comparison(
             sources=tuple(map(self.recordings.source, self.sequences)),
-            contenders=tuple(read_contenders(self.trackers)),
+            specs=tuple(read_specs(self.trackers)),
             repeats=self.repeats,
             seed=self.seed,
             equal_ms=self.equal_time,

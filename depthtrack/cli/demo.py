@@ -44,7 +44,7 @@ class Command:
         from depthtrack.cli.comparing import compare_and_report
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.compare.comparison import Comparison
-        from depthtrack.evaluation.compare.specs import read_contenders
+        from depthtrack.evaluation.compare.specs import read_specs
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
         check_output_folder(self.out)
@@ -52,7 +52,7 @@ class Command:
         workers = chosen_workers(self.jobs)
         sources = self._synthesised() if self.path is None else (self._own(self.path),)
         print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
-        comparison = Comparison(sources, tuple(read_contenders(["pso,ik"])))
+        comparison = Comparison(sources, tuple(read_specs(["pso,ik"])))
         compare_and_report(comparison, self.out, workers)
         print(f"made in {perf_counter() - begun:.0f} s; open it in a browser")
         if self.open:
@@ -115,7 +115,7 @@ def _measure_hand(source: "Source", file: Path) -> bool:
             bar.update(round(100 * share) - bar.n)
 
         try:
-            views = choose_views(sequence, source.observer(sequence), VIEWS)
+            views = choose_views(sequence, source.segmenter(sequence), VIEWS)
             found = calibrate(views, threads=usable_cores(), source=f"measured on {sequence.name}", progress=tell)
         except InputError as error:
             print(f"its sizes cannot be told, so the average adult's are used: {error}")

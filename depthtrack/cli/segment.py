@@ -47,7 +47,7 @@ class Command:
 
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
-        from depthtrack.segmentation.observation import Observer
+        from depthtrack.segmentation.observation import Segmenter
         from depthtrack.tracking.configuration import chosen_hand
 
         if self.hand is not None and self.tracker is None:
@@ -55,14 +55,14 @@ class Command:
         if not -50 <= self.wrist_margin <= 200:
             raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
         sequence = self.recording.open()
-        observer = Observer.for_sequence(
+        segmenter = Segmenter.for_sequence(
             sequence, self.skin_model, use_colour=not self.depth_only, wrist_margin=self.wrist_margin / 1000
         )
         folder = self.out or Path(f"{sequence.name}-segmented")
         check_output_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with self._tracker(sequence) as tracker:
-            results = segment_sequence(sequence, observer, tracker, chosen_hand(sequence, self.hand))
+            results = segment_sequence(sequence, segmenter, tracker, chosen_hand(sequence, self.hand))
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
         print(dumps(report, indent=2) if self.json else _text(report))
@@ -85,7 +85,7 @@ class Command:
 
         from tqdm import tqdm
 
-        from depthtrack.viewing.annotated_frame import Moment, evenly_chosen, sequence_depth_range
+        from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, sequence_depth_range
         from depthtrack.viewing.contact_sheet import contact_sheet, describe, frame_rate, save_picture
         from depthtrack.viewing.panels import panel
         from depthtrack.viewing.video import VideoWriter
@@ -100,7 +100,7 @@ class Command:
         ):
             rows: csv.DictWriter[str] | None = None
             for result in results:
-                moment = Moment(result.frame, result.mask)
+                moment = AnnotatedFrame(result.frame, result.mask)
                 video.write(panel(moment, ("depth", "mask"), 360, near, far))
                 if result.frame.index in chosen:
                     shown.append(moment)

@@ -56,7 +56,7 @@ class Command:
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.hand.kinematics import HandModel
         from depthtrack.recording.run_folder import RunWriter
-        from depthtrack.segmentation.observation import Observer
+        from depthtrack.segmentation.observation import Segmenter
         from depthtrack.tracking.configuration import chosen_hand, run_configuration
         from depthtrack.tracking.pipeline import track_sequence
         from depthtrack.tracking.registry import create_tracker
@@ -80,7 +80,7 @@ class Command:
             threads=options.get("threads"),
         )
         start_pose = self._start_pose(sequence)
-        observer = Observer.for_sequence(sequence, self.skin_model)
+        segmenter = Segmenter.for_sequence(sequence, self.skin_model)
         count = len(sequence) if self.frames is None else min(self.frames, len(sequence))
         with (
             closing(create_tracker(self.tracker, hand, **options)) as tracker,
@@ -88,7 +88,7 @@ class Command:
             tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
         ):
             bar.set_postfix_str("the first use compiles kernels")
-            for row in track_sequence(sequence, observer, tracker, HandModel(hand), run, start_pose, count):
+            for row in track_sequence(sequence, segmenter, tracker, HandModel(hand), run, start_pose, count):
                 bar.update()
                 bar.set_postfix_str(row.status)
         lost = sum(row.status in ("lost", "absent") for row in run.rows)

@@ -26,9 +26,9 @@ class Command:
         from tqdm import tqdm
 
         from depthtrack.segmentation.labelled_images import from_folders, from_recording
-        from depthtrack.segmentation.skin_colour import SkinModel
+        from depthtrack.segmentation.skin_colour import SkinColourModel
 
         labelled = from_recording(self.images) if self.masks is None else from_folders(self.images, self.masks)
-        model = SkinModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))
+        model = SkinColourModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))
         model.save(self.out)
         print(f"{self.out}: {100 * model.prior:.1f} % of the pixels were skin; use it with --skin-model {self.out}")

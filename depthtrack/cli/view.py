@@ -13,7 +13,7 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.recording import Sequence
-    from depthtrack.viewing.annotated_frame import MaskEstimator, Moment
+    from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator
     from depthtrack.viewing.rerun_viewer import RerunViewer
 
 MOST_MOMENTS = 200
@@ -139,7 +139,7 @@ class Command:
                 writer.write(panel(moment, layers, 360, near, far))
         print(f"wrote the video {path}: {writer.frame_count} frames")
 
-    def _all_moments(self, sequence: "Sequence") -> "Iterator[Moment]":
+    def _all_moments(self, sequence: "Sequence") -> "Iterator[AnnotatedFrame]":
         """Every frame, with a progress bar where people watch."""
         from tqdm import tqdm
 
@@ -154,7 +154,7 @@ class Command:
             disable=None,
         )
 
-    def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[Moment]":
+    def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
         from depthtrack.viewing.annotated_frame import evenly_chosen, moments
 
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
@@ -177,6 +177,6 @@ def _viewer(sequence: "Sequence", near: float, far: float) -> "RerunViewer":
     return RerunViewer(sequence.name, sequence.camera, near, far)
 
 
-def _write_rrd(viewer: "RerunViewer", path: Path, moments: "Iterable[Moment]") -> None:
+def _write_rrd(viewer: "RerunViewer", path: Path, moments: "Iterable[AnnotatedFrame]") -> None:
     count = viewer.save(path, moments)
     print(f"wrote {path}: {count} frames; open it with  rerun {path}")

@@ -22,14 +22,14 @@ from depthtrack.evaluation.metrics import (
     joint_errors,
     stage_times,
 )
-from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.evaluation.residuals import run_residuals
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
 
 Array = NDArray[np.float64]
-Progress = Callable[[Iterable[Replayed]], Iterable[Replayed]]
+Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
 """Wraps the frames as they are looked at again: a progress bar."""
 
 
@@ -103,7 +103,7 @@ def evaluate(replay: Replay, residuals: bool = True, progress: Progress | None =
     points, truth_metrics = _against_truth(run, model, replay.sequence.ground_truth)
     metrics = [*truth_metrics]
     if residuals:
-        replayed: Iterable[Replayed] = replay if progress is None else progress(replay)
+        replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
         metrics += run_residuals(replayed, replay.surface(), len(run.index)).metrics()
     metrics.append(jitter(model.endpoints(run.poses), run.timestamps))
     return Evaluation(

@@ -16,9 +16,9 @@ from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.hand_surface import ModelSurface
-from depthtrack.segmentation.observation import Observation, Observer
-from depthtrack.tracking.pipeline import hand_place
-from depthtrack.tracking.state import LostBelow, TrackMemory
+from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.tracking.pipeline import roi_prior
+from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.tracker import Estimate, Status
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ _LONGEST_PATH = 1024
 
 
 @dataclass(frozen=True)
-class Replayed:
+class ReplayedFrame:
     """One frame of a run: `row` in the run, the recording's `frame`, the hand observed in it (None without one), and
     the tracker's `estimate`."""
 
@@ -67,21 +67,21 @@ class Replay:
     def __len__(self) -> int:
         return len(self.run.index)
 
-    def at(self, row: int) -> Replayed:
+    def at(self, row: int) -> ReplayedFrame:
         """One frame, without looking for the hand in it, which takes all frames before. Raises DamagedFrameError."""
-        return Replayed(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
+        return ReplayedFrame(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
 
-    def __iter__(self) -> Iterator[Replayed]:
+    def __iter__(self) -> Iterator[ReplayedFrame]:
         """Every frame that is still readable, observed with the run's own settings and guided by its own poses."""
-        run, model, memory = self.run, HandModel(self.hand), TrackMemory(LostBelow())
-        observer = Observer.for_sequence(self.sequence, _path(run, "skin_model"))
+        run, model, memory = self.run, HandModel(self.hand), TrackState(TrackingThresholds())
+        segmenter = Segmenter.for_sequence(self.sequence, _path(run, "skin_model"))
         row_of = {int(index): row for row, index in enumerate(run.index)}
         for frame in self.sequence.frames(map(int, run.index)):
             row = row_of[frame.index]
-            observation = observer.observe(frame, hand_place(model, memory.expected))
+            observation = segmenter.segment(frame, roi_prior(model, memory.predicted_pose))
             estimate = estimate_of(run, row)
-            memory.remember(estimate)
-            yield Replayed(row, frame, observation, estimate)
+            memory.update(estimate)
+            yield ReplayedFrame(row, frame, observation, estimate)
 
 
 def estimate_of(run: Run, row: int) -> Estimate:

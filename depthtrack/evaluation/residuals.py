@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
-from depthtrack.evaluation.replay import Replayed
+from depthtrack.evaluation.replay import ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.hand_surface import ModelSurface
 from depthtrack.segmentation.observation import Observation
@@ -18,7 +18,7 @@ _FINEST = 0.001
 _MOST_FINER = 5
 
 
-def run_residuals(replayed: Iterable[Replayed], surface: ModelSurface, rows: int) -> Residuals:
+def run_residuals(replayed: Iterable[ReplayedFrame], surface: ModelSurface, rows: int) -> Residuals:
     """E3D, E2D and the silhouettes' overlap of a run of so many `rows`."""
     values = np.full((3, rows), np.nan)
     for moment in replayed:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.segmentation.observation import Observation, Observer
-from depthtrack.tracking.pipeline import follow, hand_place
+from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.tracking.pipeline import follow, roi_prior
 from depthtrack.tracking.tracker import Tracker
 
 
@@ -44,7 +44,7 @@ class SegmentedFrame:
 
 
 def segment_sequence(
-    sequence: Sequence, observer: Observer, tracker: Tracker | None = None, hand: HandShape | None = None
+    sequence: Sequence, segmenter: Segmenter, tracker: Tracker | None = None, hand: HandShape | None = None
 ) -> Iterator[SegmentedFrame]:
     """Observe every frame of a recording, in order.
 
@@ -53,9 +53,9 @@ def segment_sequence(
     """
     model = HandModel(hand or HandShape())
     for frame in sequence:
-        place = None if tracker is None else hand_place(model, tracker.expected)
+        place = None if tracker is None else roi_prior(model, tracker.predicted_pose)
         begun = time.perf_counter()
-        observation = observer.observe(frame, place)
+        observation = segmenter.segment(frame, place)
         if observation is not None:
             observation.points  # noqa: B018 (the cloud belongs to the observation's cost)
         ms = 1e3 * (time.perf_counter() - begun)

@@ -31,7 +31,7 @@ class Chain(NamedTuple):
         return Chain(base, np.ascontiguousarray(model.lengths), shape.mirror)
 
 
-class Bodies(NamedTuple):
+class BodyPoses(NamedTuple):
     """A posed hand, camera frame: `T` (16, 3, 4) T_camera_body; `axes` and `origins` (20, 3) of the angles' hinges."""
 
     T: Array
@@ -39,20 +39,20 @@ class Bodies(NamedTuple):
     origins: Array
 
     @staticmethod
-    def empty() -> "Bodies":
-        """Room for `place`."""
-        return Bodies(np.zeros((BODY_COUNT, 3, 4)), np.zeros((20, 3)), np.zeros((20, 3)))
+    def empty() -> "BodyPoses":
+        """Room for `forward_kinematics`."""
+        return BodyPoses(np.zeros((BODY_COUNT, 3, 4)), np.zeros((20, 3)), np.zeros((20, 3)))
 
     @staticmethod
-    def at(chain: Chain, pose: Array) -> "Bodies":
+    def at(chain: Chain, pose: Array) -> "BodyPoses":
         """The hand in a pose (27,)."""
-        bodies = Bodies.empty()
-        place(chain, np.ascontiguousarray(pose, dtype=np.float64), bodies)
+        bodies = BodyPoses.empty()
+        forward_kinematics(chain, np.ascontiguousarray(pose, dtype=np.float64), bodies)
         return bodies
 
 
 @numba.njit(cache=True, nogil=True)
-def place(chain: Chain, pose: Array, bodies: Bodies) -> None:
+def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
     """Move the bodies to `pose` (27,): Eq. (1) of Schroeder et al. 2014."""
     T, axes, origins = bodies.T, bodies.axes, bodies.origins
     _rotation(pose[3], pose[4], pose[5], pose[6], T[0])
@@ -101,7 +101,7 @@ def _rotation(w: float, x: float, y: float, z: float, out: Array) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def step(pose: Array, tangent: Array, out: Array) -> None:
+def retract(pose: Array, tangent: Array, out: Array) -> None:
     """`pose.retract`: the pose (27,) reached by a tangent step (26,), written to `out` (27,)."""
     for i in range(3):
         out[i] = pose[i] + tangent[i]

@@ -101,7 +101,7 @@ class HandModel:
         T = self.transforms(pose)
         return np.concatenate([self._wrist(T)[..., None, :], self._endpoints(T)], axis=-2)
 
-    def place(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
+    def transform_points(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
         """Camera-frame positions (..., N, 3) of points (N, 3) fixed to `bodies` (N,)."""
         T = self.transforms(pose)[..., np.asarray(bodies), :, :]
         return np.einsum("...nij,nj->...ni", T[..., :3, :3], np.asarray(local_points)) + T[..., :3, 3]

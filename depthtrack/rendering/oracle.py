@@ -21,7 +21,7 @@ class OracleScorer(ScorerBase):
         self._model, self._primitives = HandModel(shape), Primitives.of(shape)
         self._objective = objective or Objective()
 
-    def observe(self, target: Target) -> None:
+    def set_target(self, target: Target) -> None:
         self._target = target
 
     def score(self, poses: ArrayLike) -> NDArray[np.float64]:

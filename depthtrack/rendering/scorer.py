@@ -23,10 +23,10 @@ class Scorer(Protocol):
 
     @property
     def target(self) -> Target:
-        """The observation last set by `observe`. Raises RuntimeError before that."""
+        """The observation last set by `set_target`. Raises RuntimeError before that."""
         ...
 
-    def observe(self, target: Target) -> None:
+    def set_target(self, target: Target) -> None:
         """Set what the next calls score against; its camera is the one hypotheses are seen with."""
         ...
 
@@ -71,9 +71,9 @@ class ScorerBase:
 
     @property
     def target(self) -> Target:
-        """The observation set by `observe`. Raises RuntimeError before that."""
+        """The observation set by `set_target`. Raises RuntimeError before that."""
         if self._target is None:
-            raise RuntimeError("call observe(target) before scoring or rendering")
+            raise RuntimeError("call set_target(target) before scoring or rendering")
         return self._target
 
 

@@ -66,7 +66,7 @@ def scene() -> tuple[HandShape, Target, NDArray[np.float64]]:
     camera = PRESETS["kinect1"].crop(210, 135, 220, 220).resized(SIDE / 220)
     blank = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
     with OracleScorer(shape) as oracle:
-        oracle.observe(blank)
+        oracle.set_target(blank)
         depth = oracle.render(truth)
     return shape, Target(camera, depth > 0, depth), poses
 
@@ -75,8 +75,8 @@ def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
     """Hold a backend to the oracle on `scene`, and time it for about so long. Raises what `create_scorer` raises."""
     shape, target, poses = scene()
     with create_scorer(name, shape, **options) as scorer, OracleScorer(shape) as oracle:
-        scorer.observe(target)
-        oracle.observe(target)
+        scorer.set_target(target)
+        oracle.set_target(target)
         energies = np.abs(scorer.score(poses) - oracle.score(poses))
         drawn = np.stack([scorer.render(pose) for pose in poses])
         true = np.stack([oracle.render(pose) for pose in poses])

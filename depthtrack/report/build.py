@@ -19,8 +19,8 @@ from depthtrack.report.film import Film, as_webp, film_of
 from depthtrack.report.narrative import ERRORS, Verdict, error_name, judged_by, standings, verdict, where
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.plots import TIMELINE_FROM, TIMELINE_TO, finger_bars, share_curves, stage_bars, timeline
-from depthtrack.report.provenance import Fact, at_home, facts_of_recording, facts_of_tracker, fairness
-from depthtrack.report.series import Shown, worst_frames
+from depthtrack.report.provenance import Fact, bias_warning, facts_of_recording, facts_of_tracker, matched_model
+from depthtrack.report.series import TrackerSeries, worst_frames
 from depthtrack.report.table import table_head, table_rows
 
 FILM_BYTES, ALL_FILMS_BYTES = 5_000_000, 30_000_000
@@ -59,10 +59,10 @@ class Section:
     """What the page shows of one recording."""
 
     name: str
-    shown: list[Shown]
+    shown: list[TrackerSeries]
     facts: list[Fact]
-    fairness: str
-    at_home: tuple[str, ...]
+    bias_warning: str
+    matched_model: tuple[str, ...]
     timeline: Plot
     plots: list[Plot]
     film: Film
@@ -81,8 +81,8 @@ def write_report(
     # In the order of their folders' names, so that the page is the same whoever asks for it.
     lines = lines_of(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
     numbers = {label: number for number, label in enumerate(dict.fromkeys(line.label for line in lines))}
-    shown = [Shown(line, numbers[line.label]) for line in lines]
-    recordings: dict[str, list[Shown]] = {}
+    shown = [TrackerSeries(line, numbers[line.label]) for line in lines]
+    recordings: dict[str, list[TrackerSeries]] = {}
     for each in shown:
         recordings.setdefault(each.line.source, []).append(each)
     detailed = list(recordings.values())[:MOST_DETAILED]
@@ -116,7 +116,7 @@ def check_reportable(evaluations: Sequence[Evaluation]) -> None:
             raise InputError(f"{evaluation.run.folder} holds no frame yet: track it first, or leave it out")
 
 
-def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
+def _section(shown: list[TrackerSeries], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
     lines = [each.line for each in shown]
     metric = judged_by(lines)
     painter = SideBySide(shown, metric, sequence=sequence)
@@ -127,8 +127,8 @@ def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progres
         lines[0].recording,
         shown,
         facts_of_recording(painter.sequence, lines[0]),
-        fairness(painter.sequence.description, lines),
-        at_home(painter.sequence.description, lines),
+        bias_warning(painter.sequence.description, lines),
+        matched_model(painter.sequence.description, lines),
         _timeline(shown, metric),
         _plots(shown, metric),
         film,
@@ -137,13 +137,13 @@ def _section(shown: list[Shown], most_bytes: int, sequence: Path | None, progres
     )
 
 
-def _timeline(shown: list[Shown], metric: str) -> Plot:
+def _timeline(shown: list[TrackerSeries], metric: str) -> Plot:
     svg, remark = timeline(shown, metric, "mm")
     title = "Distance to the sensor's points over time" if metric == "e3d_mm" else "Error over time"
     return Plot(title, ERRORS[metric].replace("median ", "").replace("mean ", ""), Markup(svg), remark)
 
 
-def _plots(shown: list[Shown], metric: str) -> list[Plot]:
+def _plots(shown: list[TrackerSeries], metric: str) -> list[Plot]:
     found = []
     if (svg := share_curves(shown)) is not None:
         judged = "E3D" if metric == "e3d_mm" else "largest error"
@@ -160,7 +160,7 @@ def _plots(shown: list[Shown], metric: str) -> list[Plot]:
     return found
 
 
-def _worst(shown: list[Shown], metric: str, painter: SideBySide) -> list[Worst]:
+def _worst(shown: list[TrackerSeries], metric: str, painter: SideBySide) -> list[Worst]:
     found = []
     for each in shown:
         evaluation = each.line.evaluations[0]
@@ -184,7 +184,7 @@ def _worst(shown: list[Shown], metric: str, painter: SideBySide) -> list[Worst]:
 def _verdict(lines: Sequence[Line], sections: Sequence[Section]) -> Verdict:
     """`sections` of all recordings, if they are known."""
     budgets = {(e.run.configuration.get("budget") or {}).get("equal_ms") for line in lines for e in line.evaluations}
-    homes = {section.at_home for section in sections}
+    homes = {section.matched_model for section in sections}
     return verdict(
         lines, next(iter(budgets)) if len(budgets) == 1 else None, next(iter(homes)) if len(homes) == 1 else ()
     )

@@ -75,9 +75,9 @@ def standings(lines: Sequence[Line]) -> list[Standing]:
     return sorted(found, key=lambda standing: standing.error)
 
 
-def verdict(lines: Sequence[Line], equal_ms: float | None = None, at_home: Sequence[str] = ()) -> Verdict:
-    """What the comparison says; `equal_ms` where all trackers were given the same time a frame, `at_home` the trackers
-    whose very model every recording's hand was drawn from."""
+def verdict(lines: Sequence[Line], equal_ms: float | None = None, matched_model: Sequence[str] = ()) -> Verdict:
+    """What the comparison says; `equal_ms` where all trackers were given the same time a frame, `matched_model` the
+    trackers whose very model every recording's hand was drawn from."""
     found = standings(lines)
     first = found[0]
     if not np.isfinite(first.error):
@@ -88,18 +88,17 @@ def verdict(lines: Sequence[Line], equal_ms: float | None = None, at_home: Seque
         return Verdict(f"{first.label} follows the hand to {_mm(first.error)}", (told, _losses(found)))
     winners = _winners(lines)
     headline, told = _split(lines, winners) if len(set(winners.values())) > 1 else _clear(lines, found)
-    headline = _at_home(headline, first.label, at_home) if at_home else headline
+    headline = _matched_model(headline, first.label, matched_model) if matched_model else headline
     sentences = (told, _elsewhere(lines), _speeds(found, equal_ms), _losses(found))
     return Verdict(headline, tuple(filter(None, sentences)))
 
 
-def _at_home(headline: str, first: str, at_home: Sequence[str]) -> str:
+def _matched_model(headline: str, first: str, matched_model: Sequence[str]) -> str:
     """The headline of a comparison on the home ground of some trackers; `first` is the closest."""
     if not headline.startswith(f"{first} follows"):
-        return f"{headline}, on the home ground of {listed(at_home)}"
-    return (
-        f"On {'its home ground' if list(at_home) == [first] else f'the home ground of {listed(at_home)}'}, {headline}"
-    )
+        return f"{headline}, on the home ground of {listed(matched_model)}"
+    ground = "its home ground" if list(matched_model) == [first] else f"the home ground of {listed(matched_model)}"
+    return f"On {ground}, {headline}"
 
 
 def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:

@@ -16,8 +16,8 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.surface import Surface
 from depthtrack.report.colours import tracker_colour
-from depthtrack.report.series import Shown
-from depthtrack.viewing.annotated_frame import Moment, true_keypoints
+from depthtrack.report.series import TrackerSeries
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
@@ -39,7 +39,7 @@ _MOST_BESIDE = 3
 class _Panel:
     """A tracker's run, where to find a frame in it, and the figure that its frames are told by."""
 
-    shown: Shown
+    shown: TrackerSeries
     replay: Replay
     row_of: dict[int, int]
     values: Array
@@ -49,7 +49,9 @@ class _Panel:
 class SideBySide:
     """Paints frames of one recording with the first run of every tracker, all through the same window."""
 
-    def __init__(self, shown: Sequence[Shown], metric: str, height: int = 300, sequence: Path | None = None) -> None:
+    def __init__(
+        self, shown: Sequence[TrackerSeries], metric: str, height: int = 300, sequence: Path | None = None
+    ) -> None:
         """`metric` is written under each picture. Raises InputError where the recording cannot be opened any more."""
         self._height = height
         self._panels = [_panel(each, metric, sequence) for each in shown]
@@ -76,7 +78,7 @@ class SideBySide:
         told = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
         remark = "  ·  ".join(filter(None, (told, status if status not in ("tracked", "started") else "")))
         colour = tracker_colour(panel.shown.number).rgb
-        close = Moment(frame).cropped(*self._windows[frame.index])
+        close = AnnotatedFrame(frame).cropped(*self._windows[frame.index])
         image = paint(close, "colour", self._height, *self._range)
         pose = None if row is None else panel.replay.run.poses[row]
         if pose is not None and np.isfinite(pose).all():
@@ -87,7 +89,7 @@ class SideBySide:
             image = draw_skeleton(image, camera, self._surfaces[k].model.keypoints(pose))
         return captioned(image, panel.shown.label, remark, colour)
 
-    def _with_truth(self, image: Image, close: Moment) -> Image:
+    def _with_truth(self, image: Image, close: AnnotatedFrame) -> Image:
         """The image with the true skeleton in thin white lines, which the tracker's covers where it is right."""
         truth = true_keypoints(self.sequence.ground_truth, close.frame.timestamp)
         if truth is None:
@@ -124,7 +126,7 @@ class SideBySide:
         return out
 
 
-def _panel(shown: Shown, metric: str, sequence: Path | None) -> _Panel:
+def _panel(shown: TrackerSeries, metric: str, sequence: Path | None) -> _Panel:
     evaluation: Evaluation = shown.line.evaluations[0]
     replay = Replay.open(evaluation.run, sequence)
     found = figures_of(evaluation).get(metric)

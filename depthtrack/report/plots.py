@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from depthtrack.evaluation.metrics.success import LIMIT_MM
 from depthtrack.hand.pose import FINGERS
 from depthtrack.report.colours import FAINT, GRID, INK, PAPER, stand_in, with_variables
-from depthtrack.report.series import Shown, finger_errors, over_time, shares, stage_medians, top_of_scale
+from depthtrack.report.series import TrackerSeries, finger_errors, over_time, shares, stage_medians, top_of_scale
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -49,7 +49,7 @@ TIMELINE_FROM, TIMELINE_TO = 0.052, 0.992
 """Where in the width of a plot over time its first and last second lie."""
 
 
-def timeline(shown: Sequence[Shown], metric: str, unit: str, small: bool = False) -> tuple[str, str]:
+def timeline(shown: Sequence[TrackerSeries], metric: str, unit: str, small: bool = False) -> tuple[str, str]:
     """A metric of each tracker over time, and a remark on how it is drawn."""
     with rc_context(_STYLE):
         figure, axes = _figure(_THIRD, left=0.13) if small else _figure(_WIDE, TIMELINE_FROM, TIMELINE_TO, 0.19)
@@ -79,7 +79,7 @@ def timeline(shown: Sequence[Shown], metric: str, unit: str, small: bool = False
         return _svg(figure, f"{metric} over time"), "; ".join(remarks)
 
 
-def share_curves(shown: Sequence[Shown]) -> str | None:
+def share_curves(shown: Sequence[TrackerSeries]) -> str | None:
     """The share of frames under each threshold; None where nothing can be judged."""
     curves = [(each, curve) for each in shown if (curve := shares(each.line)) is not None]
     if not curves:
@@ -95,7 +95,7 @@ def share_curves(shown: Sequence[Shown]) -> str | None:
         return _svg(figure, "share of frames under a threshold")
 
 
-def finger_bars(shown: Sequence[Shown]) -> str | None:
+def finger_bars(shown: Sequence[TrackerSeries]) -> str | None:
     """Mean error of each finger, with a mark at its 95th percentile; None without a truth."""
     errors = [(each, found) for each in shown if (found := finger_errors(each.line))]
     if not errors:
@@ -115,7 +115,7 @@ def finger_bars(shown: Sequence[Shown]) -> str | None:
         return _svg(figure, "error of each finger")
 
 
-def stage_bars(shown: Sequence[Shown]) -> str | None:
+def stage_bars(shown: Sequence[TrackerSeries]) -> str | None:
     """What a frame's time goes to: a bar a tracker, its stages one after another; None where no times were kept."""
     stages = [(each, found) for each in shown if (found := stage_medians(each.line))]
     if not stages:
@@ -137,7 +137,7 @@ def stage_bars(shown: Sequence[Shown]) -> str | None:
         return _svg(figure, "time per stage")
 
 
-def _mark_losses(axes: Axes, each: Shown) -> None:
+def _mark_losses(axes: Axes, each: TrackerSeries) -> None:
     """A tick at the bottom for every frame that was lost, in any run."""
     for evaluation in each.line.evaluations:
         lost = np.nonzero(evaluation.losses.lost)[0]

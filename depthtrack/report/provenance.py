@@ -58,9 +58,9 @@ def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
     return [(name, text) for name, text in facts if text]
 
 
-def fairness(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
+def bias_warning(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
     """A warning where a synthetic hand was drawn from the very model that some trackers fit, and others do not."""
-    favoured = at_home(description, lines)
+    favoured = matched_model(description, lines)
     others = [label for label in dict.fromkeys(line.label for line in lines) if label not in favoured]
     if not favoured:
         return ""
@@ -70,7 +70,7 @@ def fairness(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
     return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
 
 
-def at_home(description: Mapping[str, Any], lines: Sequence[Line]) -> tuple[str, ...]:
+def matched_model(description: Mapping[str, Any], lines: Sequence[Line]) -> tuple[str, ...]:
     """The trackers whose very model a synthetic hand was drawn from, where others fit another; else none."""
     drawn = description.get("model")
     if drawn not in ("skin", "primitives"):

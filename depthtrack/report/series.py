@@ -18,7 +18,7 @@ E3D_LIMIT_MM = 15.0
 
 
 @dataclass(frozen=True)
-class Shown:
+class TrackerSeries:
     """A tracker on a recording, as the page shows it: `number` chooses its colour, on all recordings the same."""
 
     line: Line

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from depthtrack.evaluation.compare.results import Column, Line, shown_columns
-from depthtrack.report.series import Shown
+from depthtrack.report.series import TrackerSeries
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class TableCell:
 class TableRow:
     """A tracker on a recording; `first` of its recording, which has `of` rows."""
 
-    shown: Shown
+    shown: TrackerSeries
     cells: list[TableCell]
     first: bool
     of: int
@@ -30,7 +30,7 @@ def table_head(lines: Sequence[Line]) -> list[tuple[str, str]]:
     return [(column.heading, column.unit) for column in shown_columns(lines)]
 
 
-def table_rows(shown: Sequence[Shown]) -> list[TableRow]:
+def table_rows(shown: Sequence[TrackerSeries]) -> list[TableRow]:
     """All rows, recordings together, in order."""
     columns = shown_columns([each.line for each in shown])
     rows = []

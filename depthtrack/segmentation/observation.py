@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.point_cloud import point_cloud
-from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, HandPlace
-from depthtrack.segmentation.segmenter import Segmentation, Segmenter
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior
+from depthtrack.segmentation.segmenter import HandLocator, Segmentation
+from depthtrack.segmentation.skin_colour import SkinColourModel
 
 Array = NDArray[np.float64]
 
@@ -71,15 +71,15 @@ class Observation:
         return point_cloud(self.camera, self.depth)
 
 
-class Observer:
-    """Turns frames into observations; remembers where the hand was, as `segmentation.Segmenter` does.
+class Segmenter:
+    """Turns frames into observations; remembers where the hand was, as `segmentation.HandLocator` does.
 
     `skin_model` is used where frames have colour; None uses depth alone. `wrist_margin` (metres) keeps that much of
     the forearm beyond the wrist.
     """
 
-    def __init__(self, skin_model: SkinModel | None = None, wrist_margin: float = 0.0) -> None:
-        self._segmenter = Segmenter(skin_model, wrist_margin)
+    def __init__(self, skin_model: SkinColourModel | None = None, wrist_margin: float = 0.0) -> None:
+        self._segmenter = HandLocator(skin_model, wrist_margin)
 
     @classmethod
     def for_sequence(
@@ -89,11 +89,11 @@ class Observer:
         first = next(iter(sequence), None)
         if not use_colour or first is None or first.colour is None:
             return cls(None, wrist_margin)
-        return cls(SkinModel.default() if skin_model is None else SkinModel.load(skin_model), wrist_margin)
+        return cls(SkinColourModel.default() if skin_model is None else SkinColourModel.load(skin_model), wrist_margin)
 
-    def observe(self, frame: Frame, place: HandPlace | None = None) -> Observation | None:
+    def segment(self, frame: Frame, place: RoiPrior | None = None) -> Observation | None:
         """What is seen of the hand, or None without one. `place` is where a tracker is sure to find it."""
-        found = self._segmenter.segment(frame, place)
+        found = self._segmenter.locate(frame, place)
         return None if found is None else Observation.of(frame, found)
 
     def reset(self) -> None:

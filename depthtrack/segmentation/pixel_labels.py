@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from depthtrack.geometry.rectangle import Window
 from depthtrack.segmentation.grid import MAX_JUMP, Depth, Mask
 from depthtrack.segmentation.palm import HAND_REACH, TIP_TO_WRIST, Palm
-from depthtrack.segmentation.surface_grid import View, dilated, disc, eroded
+from depthtrack.segmentation.surface_grid import SurfaceGrid, dilated, disc, eroded
 from depthtrack.segmentation.wrist import WristPlane
 
 Labels = NDArray[np.uint8]
@@ -30,7 +30,7 @@ ROOM = 0.04
 """Metres around the hand that the region of interest leaves for hypotheses to move in."""
 
 
-def label_hand(view: View, palm: Palm, arm: Mask | None, wrist: WristPlane | None) -> Labels:
+def label_hand(view: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlane | None) -> Labels:
     """ELSEWHERE, HAND, ARM or BESIDE (rows, columns) for every node; `arm` (rows, columns) are the arm's."""
     surface = view.surface
     hand = (surface.depth > 0) & palm.paths.reached(TIP_TO_WRIST)
@@ -51,7 +51,7 @@ def label_hand(view: View, palm: Palm, arm: Mask | None, wrist: WristPlane | Non
     return labels
 
 
-def hand_masks(view: View, labels: Labels, wrist: WristPlane | None) -> tuple[Window, Mask, Mask]:
+def hand_masks(view: SurfaceGrid, labels: Labels, wrist: WristPlane | None) -> tuple[Window, Mask, Mask]:
     """The region of interest in the frame, with the hand's silhouette and its readings (h, w) in it.
 
     Within r of the outline of its readings, where depth is least sure, only what has the colour of skin is hand;

@@ -39,7 +39,7 @@ _NOTHING, _READING, _MISSING = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class HandPlace:
+class RoiPrior:
     """Where a hand is expected: `centre` (3,) of the palm, metres, camera frame; `reach` in metres from there to the
     farthest fingertip; the `wrist` where it ends."""
 
@@ -49,7 +49,7 @@ class HandPlace:
 
 
 @dataclass(frozen=True)
-class GuidedMasks:
+class RoiMasks:
     """`skin` and `readings` (h, w) of the hand in a `window` of the frame."""
 
     window: Window
@@ -57,7 +57,7 @@ class GuidedMasks:
     readings: Mask
 
 
-def find_expected(frame: Frame, place: HandPlace, skin: AdaptiveSkin | None) -> GuidedMasks | None:
+def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> RoiMasks | None:
     """The hand at its expected place, or None where hardly anything is there."""
     if place.centre[2] <= 0.05:
         return None
@@ -82,7 +82,7 @@ def find_expected(frame: Frame, place: HandPlace, skin: AdaptiveSkin | None) -> 
     roi = _around(silhouette, round(ROOM * camera.fx / float(place.centre[2])))
     part = (slice(roi.top, roi.bottom), slice(roi.left, roi.right))
     outer = Window(roi.left + window.left, roi.top + window.top, roi.right + window.left, roi.bottom + window.top)
-    return GuidedMasks(outer, silhouette[part], readings[part])
+    return RoiMasks(outer, silhouette[part], readings[part])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -13,9 +13,9 @@ from depthtrack.segmentation.grid import Mask
 from depthtrack.segmentation.hand_detection import find_start, nearest_palm
 from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.pixel_labels import hand_masks, label_hand
-from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, HandPlace, find_expected
-from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinModel
-from depthtrack.segmentation.surface_grid import View, blind_skin, look
+from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior, segment_roi
+from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinColourModel
+from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
 from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
 from depthtrack.segmentation.wrist_filter import WristFilter
 
@@ -55,14 +55,14 @@ class Segmentation:
     wrist: WristPlane | None
 
 
-class Segmenter:
+class HandLocator:
     """Finds the hand frame after frame. Remembers only where hand and wrist were last, and the colours around them.
 
     `skin_model` is used where frames have colour; None uses depth alone. `wrist_margin` (metres) keeps that much of
     the forearm beyond the wrist.
     """
 
-    def __init__(self, skin_model: SkinModel | None = None, wrist_margin: float = 0.0) -> None:
+    def __init__(self, skin_model: SkinColourModel | None = None, wrist_margin: float = 0.0) -> None:
         self._skin = None if skin_model is None else AdaptiveSkin(skin_model)
         self._wrist = WristFilter()
         self._wrist_margin = wrist_margin
@@ -77,7 +77,7 @@ class Segmenter:
         if self._skin is not None:
             self._skin.forget()
 
-    def segment(self, frame: Frame, place: HandPlace | None = None) -> Segmentation | None:
+    def locate(self, frame: Frame, place: RoiPrior | None = None) -> Segmentation | None:
         """The hand, or None where none is seen. `place` is where a tracker is sure to find it: nothing is searched."""
         guided = None if place is None else self._guided(frame, place)
         if guided is not None:
@@ -94,8 +94,8 @@ class Segmenter:
         self._last_time = frame.timestamp
         return self._without_flying(frame, found)
 
-    def _guided(self, frame: Frame, place: HandPlace) -> Segmentation | None:
-        masks = find_expected(frame, place, self._skin)
+    def _guided(self, frame: Frame, place: RoiPrior) -> Segmentation | None:
+        masks = segment_roi(frame, place, self._skin)
         if masks is None:
             return None
         to_surface = -PALM_HALF_THICKNESS * place.centre / np.linalg.norm(place.centre)
@@ -109,7 +109,7 @@ class Segmenter:
     def _start(self, frame: Frame) -> Array | None:
         """Where a hand is (3,), metres, looking at the whole frame."""
         stride = max(1, round(frame.camera.width / START_COLUMNS))
-        view = look(frame, Window.whole(frame.camera), (NEAREST, FARTHEST), stride, self._skin)
+        view = build_grid(frame, Window.whole(frame.camera), (NEAREST, FARTHEST), stride, self._skin)
         return find_start(view.grid, view.surface, self._last)
 
     def _follow(self, frame: Frame, last: Array) -> Segmentation | None:
@@ -117,7 +117,7 @@ class Segmenter:
         z = float(last[2])
         window = Window.around(frame.camera, last, DEPTH_WINDOW)
         reach = (max(z - DEPTH_WINDOW, NEAREST), z + DEPTH_WINDOW)
-        view = look(frame, window, reach, max(1, round(NODE_SIZE * frame.camera.fx / z)), self._skin)
+        view = build_grid(frame, window, reach, max(1, round(NODE_SIZE * frame.camera.fx / z)), self._skin)
         palm = nearest_palm(view.grid, view.surface, last)
         if palm is None:
             return None
@@ -129,7 +129,7 @@ class Segmenter:
         self._learn(view, roi, skin)
         return Segmentation(roi, skin, readings, centre, palm.radius, None if arm is None else arm.direction, wrist)
 
-    def _arm(self, view: View, palm: Palm) -> tuple[Arm | None, Array, WristPlane | None]:
+    def _arm(self, view: SurfaceGrid, palm: Palm) -> tuple[Arm | None, Array, WristPlane | None]:
         """The forearm, the palm's centre (3,) in the light of it, and the wrist."""
         guess = self._wrist.guess(palm)
         arm = find_arm(view.grid, palm, guess, self._arm_direction)
@@ -150,7 +150,7 @@ class Segmenter:
         self._arm_direction = None
         self._wrist.forget()
 
-    def _learn(self, view: View, roi: Window, hand: Mask) -> None:
+    def _learn(self, view: SurfaceGrid, roi: Window, hand: Mask) -> None:
         """Adapt to the colours of the hand and of what is around it."""
         if self._skin is None or view.skin is None or view.frame.colour is None:
             return

@@ -49,7 +49,7 @@ _CHROMA = np.array([[-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
 
 
 @dataclass(frozen=True)
-class SkinModel:
+class SkinColourModel:
     """What is known of skin before a recording is seen.
 
     `skin` and `other` (64, 64) are P(colour | skin) and P(colour | not skin) by U and V bin; they are scaled to sum
@@ -70,7 +70,7 @@ class SkinModel:
             raise InputError(f"a skin model's 'prior' must be a probability between 0 and 1, found {self.prior!r}")
 
     @classmethod
-    def default(cls) -> "SkinModel":
+    def default(cls) -> "SkinColourModel":
         """The model built from the statistics of Jones and Rehg."""
         return _default_model()
 
@@ -123,8 +123,8 @@ class SkinModel:
 
 
 @cache
-def _default_model() -> SkinModel:
-    return SkinModel(chroma_distribution(SKIN), chroma_distribution(OTHER), DEFAULT_PRIOR)
+def _default_model() -> SkinColourModel:
+    return SkinColourModel(chroma_distribution(SKIN), chroma_distribution(OTHER), DEFAULT_PRIOR)
 
 
 def chroma_distribution(mixture: Mixture) -> Array:
@@ -159,7 +159,7 @@ def _bin_of_colour() -> NDArray[np.int16]:
 class AdaptiveSkin:
     """P(skin | colour) that follows the light: the model, blended with what the last frames showed."""
 
-    def __init__(self, model: SkinModel) -> None:
+    def __init__(self, model: SkinColourModel) -> None:
         self._offline = model.posterior()
         self.forget()
 

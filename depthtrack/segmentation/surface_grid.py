@@ -15,7 +15,7 @@ from depthtrack.segmentation.skin_colour import AdaptiveSkin
 
 
 @dataclass(frozen=True)
-class View:
+class SurfaceGrid:
     """`grid` of everything within reach in a `window` of a frame, and `surface`, its nodes that may be hand: those of
     skin, or all of them where only depth is used. `skin` (h, w) covers the window, not 0 on skin, or None."""
 
@@ -26,19 +26,21 @@ class View:
     skin: NDArray[np.uint8] | None
 
 
-def look(frame: Frame, window: Window, reach: tuple[float, float], stride: int, skin: AdaptiveSkin | None) -> View:
+def build_grid(
+    frame: Frame, window: Window, reach: tuple[float, float], stride: int, skin: AdaptiveSkin | None
+) -> SurfaceGrid:
     """A view of what is between `reach` (nearest, farthest; metres), on blocks of `stride` x `stride` pixels."""
     grid = Grid.over(frame.depth, frame.camera, window, reach, stride)
     if skin is None or frame.colour is None:
-        return View(frame, window, grid, grid, None)
+        return SurfaceGrid(frame, window, grid, grid, None)
     # Colour is asked only about what is within reach, and right beside it: edges of depth are ragged.
     beside = cv2.dilate((grid.depth > 0).astype(np.uint8), disc(1))
     blocks = np.asarray(beside, dtype=np.uint8)
     found = skin.find(frame.colour, window, blocks, stride)
-    return View(frame, window, grid, grid.within(_closed(_covered(found, stride, 0.25, blocks))), found)
+    return SurfaceGrid(frame, window, grid, grid.within(_closed(_covered(found, stride, 0.25, blocks))), found)
 
 
-def blind_skin(view: View, skin: AdaptiveSkin) -> Mask:
+def blind_skin(view: SurfaceGrid, skin: AdaptiveSkin) -> Mask:
     """Nodes (rows, columns) of skin without readings, into which what is too near to the sensor vanishes."""
     if view.frame.colour is None:
         return np.zeros(view.grid.depth.shape, dtype=np.bool_)

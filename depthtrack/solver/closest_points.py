@@ -18,10 +18,11 @@ _fill = filler(F32X16)
 
 
 @kernel_part
-def closest_vertices(cloud, seen, cells, reach, agreement, closest):
+def closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, closest):
     """Find, for each point of the cloud (N), which of the vertices `seen` is closest, into `closest` (N,); -1 for none.
 
-    None is further than `reach` (m); the cosine between the normals is at least `agreement`. Cells are looked through
+    None is further than `max_distance` (m); the cosine between the normals is at least `min_normal_cosine`. Cells are
+    looked through
     in ever wider squares around the point's own, until no vertex beyond can be closer. Those of a row that lie beside
     one another hold vertices that do; that sixteen of them may reach into further cells does no harm.
     """
@@ -38,7 +39,7 @@ def closest_vertices(cloud, seen, cells, reach, agreement, closest):
     u = max(abs(cells.u), abs(cells.u + cells.columns * cells.size))
     v = max(abs(cells.v), abs(cells.v + cells.rows * cells.size))
     slant = 1.0 / math.sqrt(1.0 + u * u + v * v)
-    lanes, limit, least = _load(_LANE, 0), np.float32(reach * reach), np.float32(agreement)
+    lanes, limit, least = _load(_LANE, 0), np.float32(max_distance * max_distance), np.float32(min_normal_cosine)
     for i in range(points.shape[0]):
         z = points[i, 2]
         # The point's place among the cells, and what a cell's side is worth there.

@@ -9,9 +9,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.hand.compiled_kinematics import Bodies, Chain, place, step
-from depthtrack.solver.normal_equations import Moments, energy, normal_equations
-from depthtrack.solver.subspace import Space
+from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics, retract
+from depthtrack.solver.normal_equations import NormalEquations, energy, normal_equations
+from depthtrack.solver.subspace import PostureSubspace
 
 Array = NDArray[np.float64]
 
@@ -23,18 +23,18 @@ class Damping(NamedTuple):
     """What holds the solution back.
 
     `posture` lambda of Eq. (4), m^2 / rad^2, on each finger angle or synergy; `pose` on translation (unitless) and
-    rotation (m^2 / rad^2), only to keep the system solvable. `precision` (20, 20) and `rest` (20,): a pull towards
+    rotation (m^2 / rad^2), only to keep the system solvable. `precision` (20, 20) and `mean` (20,): a pull towards
     likely postures, m^2 / rad^2. `avoid_limits`: whether damping grows towards the limits (Sec. IV-B).
     """
 
     posture: float
     pose: float
     precision: Array
-    rest: Array
+    mean: Array
     avoid_limits: bool
 
 
-class Solution(NamedTuple):
+class SolverState(NamedTuple):
     """Working state of one frame: `pose` (27,), `coordinates` (l,) of its angles, and `slope` (l,), |dH/dtheta| of the
     joint limit function one step before."""
 
@@ -44,15 +44,21 @@ class Solution(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)
-def limit_slope(x: float, low: float, high: float) -> float:
+def limit_gradient(x: float, low: float, high: float) -> float:
     """|dH/dx| for H = (high - low)^2 / ((high - x) (x - low)), the joint limit function of Sec. IV-B."""
-    room = max((high - x) * (x - low), 1e-9)
-    return (high - low) ** 2 * abs(2 * x - high - low) / (room * room)
+    allocate = max((high - x) * (x - low), 1e-9)
+    return (high - low) ** 2 * abs(2 * x - high - low) / (allocate * allocate)
 
 
 @numba.njit(cache=True, nogil=True)
 def solve(
-    chain: Chain, moments: Moments, space: Space, damping: Damping, iterations: int, bodies: Bodies, state: Solution
+    chain: Chain,
+    equations: NormalEquations,
+    space: PostureSubspace,
+    damping: Damping,
+    iterations: int,
+    bodies: BodyPoses,
+    state: SolverState,
 ) -> float:
     """Move `state` to lessen Eq. (3), by at most `iterations` steps; returns the final energy (m^2).
 
@@ -65,16 +71,16 @@ def solve(
     A, b, tangent = np.empty((size, size)), np.empty(size), np.empty(26)
     trial, trial_coordinates = np.empty(27), np.empty(count)
     pull = _reduced_precision(damping, space)
-    place(chain, pose, bodies)
+    forward_kinematics(chain, pose, bodies)
     for _ in range(iterations):
-        current = normal_equations(moments, bodies, H, gradient)
+        current = normal_equations(equations, bodies, H, gradient)
         _reduce(H, gradient, space, A, b)
         current += _add_prior(pose, damping, space, pull, A, b)
         for i in range(3):
             A[i, i] += damping.pose
             A[3 + i, 3 + i] += damping.pose * 1e-2
         for i in range(count):
-            here = limit_slope(coordinates[i], space.lower[i], space.upper[i])
+            here = limit_gradient(coordinates[i], space.lower[i], space.upper[i])
             scale = 1.0 + here if damping.avoid_limits and here >= slope[i] else 1.0
             slope[i] = here
             A[6 + i, 6 + i] += damping.posture * scale
@@ -98,14 +104,14 @@ def solve(
             _tangent_angles(space, pose, trial_coordinates, tangent)
             for i in range(26):
                 largest = max(largest, abs(tangent[i]))
-            step(pose, tangent, trial)
-            place(chain, trial, bodies)
-            if energy(moments, bodies) + _prior(trial, damping) < current:
+            retract(pose, tangent, trial)
+            forward_kinematics(chain, trial, bodies)
+            if energy(equations, bodies) + _prior(trial, damping) < current:
                 improved = True
                 break
             length *= 0.5
         if not improved:
-            place(chain, pose, bodies)
+            forward_kinematics(chain, pose, bodies)
             break
         for i in range(27):
             pose[i] = trial[i]
@@ -113,11 +119,11 @@ def solve(
             coordinates[i] = trial_coordinates[i]
         if largest < _ENOUGH:
             break
-    return energy(moments, bodies) + _prior(pose, damping)
+    return energy(equations, bodies) + _prior(pose, damping)
 
 
 @numba.njit(cache=True, nogil=True)
-def _tangent_angles(space: Space, pose: Array, coordinates: Array, tangent: Array) -> None:
+def _tangent_angles(space: PostureSubspace, pose: Array, coordinates: Array, tangent: Array) -> None:
     """The change of the angles that leads to `coordinates`."""
     for j in range(20):
         if space.full:
@@ -130,7 +136,7 @@ def _tangent_angles(space: Space, pose: Array, coordinates: Array, tangent: Arra
 
 
 @numba.njit(cache=True, nogil=True)
-def _reduce(H: Array, gradient: Array, space: Space, A: Array, b: Array) -> None:
+def _reduce(H: Array, gradient: Array, space: PostureSubspace, A: Array, b: Array) -> None:
     """Normal equations of the space's parameters: J_PC = J M, Eq. (8)."""
     B, count, size = space.basis, space.basis.shape[1], b.shape[0]
     for i in range(size):
@@ -163,7 +169,7 @@ def _reduce(H: Array, gradient: Array, space: Space, A: Array, b: Array) -> None
 
 
 @numba.njit(cache=True, nogil=True)
-def _reduced_precision(damping: Damping, space: Space) -> Array:
+def _reduced_precision(damping: Damping, space: PostureSubspace) -> Array:
     """The prior's precision (l, 20) between the space's parameters and the angles."""
     if space.full:
         return damping.precision
@@ -183,18 +189,18 @@ def _prior(pose: Array, damping: Damping) -> float:
     for i in range(20):
         row = 0.0
         for j in range(20):
-            row += damping.precision[i, j] * (pose[7 + j] - damping.rest[j])
-        total += row * (pose[7 + i] - damping.rest[i])
+            row += damping.precision[i, j] * (pose[7 + j] - damping.mean[j])
+        total += row * (pose[7 + i] - damping.mean[i])
     return 0.5 * total
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_prior(pose: Array, damping: Damping, space: Space, pull: Array, A: Array, b: Array) -> float:
+def _add_prior(pose: Array, damping: Damping, space: PostureSubspace, pull: Array, A: Array, b: Array) -> float:
     """Add the prior to the space's normal equations, `pull` being its `_reduced_precision`; returns `_prior`."""
     count = pull.shape[0]
     for i in range(count):
         for j in range(20):
-            b[6 + i] += pull[i, j] * (pose[7 + j] - damping.rest[j])
+            b[6 + i] += pull[i, j] * (pose[7 + j] - damping.mean[j])
             if space.full:
                 A[6 + i, 6 + j] += pull[i, j]
             else:

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.hand.compiled_kinematics import Bodies
+from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.kinematics import BODY_COUNT
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ ROW = 8
 """Places of a row of the sums: six of a a^T, one of a e, and one to spare."""
 
 
-class Moments(NamedTuple):
+class NormalEquations(NamedTuple):
     """Sums over residuals e with gradients a (6,) by twist: `sums` (16, 6, ROW), in each row of a body six of a a^T
     and one of a e; `e` (16,) of e^2 (m^2); `T` (16, 3, 4) where the bodies were, `centre` (3,) the point the twists
     refer to."""
@@ -35,24 +35,24 @@ class Moments(NamedTuple):
     centre: Array
 
     @staticmethod
-    def empty() -> "Moments":
+    def empty() -> "NormalEquations":
         """No residuals yet."""
         n = BODY_COUNT
-        return Moments(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
+        return NormalEquations(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
 
 
-def clear(moments: Moments, bodies: Bodies) -> None:
+def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
     """Forget all residuals; the bodies are where they are now."""
-    moments.sums.fill(0.0)
-    moments.e.fill(0.0)
-    moments.T[:] = bodies.T
-    moments.centre[:] = bodies.T[0, :, 3]
+    equations.sums.fill(0.0)
+    equations.e.fill(0.0)
+    equations.T[:] = bodies.T
+    equations.centre[:] = bodies.T[0, :, 3]
 
 
 @numba.njit(cache=True, nogil=True)
-def twist(moments: Moments, bodies: Bodies, b: int, out: Array) -> None:
+def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> None:
     """Twist (6,) of body b from where it was when the residuals were added, to first order in its turn."""
-    now, was, c = bodies.T[b], moments.T[b], moments.centre
+    now, was, c = bodies.T[b], equations.T[b], equations.centre
     R = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
@@ -66,44 +66,44 @@ def twist(moments: Moments, bodies: Bodies, b: int, out: Array) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def energy(moments: Moments, bodies: Bodies) -> float:
+def energy(equations: NormalEquations, bodies: BodyPoses) -> float:
     """Half the sum of squared residuals, weighted, with the bodies where they are now (m^2)."""
     total, s = 0.0, np.empty(6)
-    for b in range(moments.e.shape[0]):
-        twist(moments, bodies, b, s)
-        total += moments.e[b]
+    for b in range(equations.e.shape[0]):
+        twist(equations, bodies, b, s)
+        total += equations.e[b]
         for j in range(6):
-            row = moments.sums[b, j]
+            row = equations.sums[b, j]
             Ms = row[0] * s[0] + row[1] * s[1] + row[2] * s[2] + row[3] * s[3] + row[4] * s[4] + row[5] * s[5]
             total += s[j] * (2 * row[6] + Ms)
     return 0.5 * total
 
 
 @numba.njit(cache=True, nogil=True)
-def normal_equations(moments: Moments, bodies: Bodies, H: Array, gradient: Array) -> float:
+def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gradient: Array) -> float:
     """J^T J into `H` (26, 26) and J^T e into `gradient` (26,), with the bodies where they are now; returns `energy`.
 
     A joint moves everything beyond it alike, so sums over bodies are carried from the fingertips inward and each joint
     meets them once, as in Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
     """
     total = 0.0
-    n = moments.e.shape[0]
+    n = equations.e.shape[0]
     M, g, s = np.zeros((n, 6, 6)), np.zeros((n, 6)), np.empty(6)
     for b in range(n):
-        twist(moments, bodies, b, s)
-        total += moments.e[b]
+        twist(equations, bodies, b, s)
+        total += equations.e[b]
         for j in range(6):
             Ms = 0.0
             for k in range(6):
-                M[b, j, k] = moments.sums[b, j, k]
+                M[b, j, k] = equations.sums[b, j, k]
                 Ms += M[b, j, k] * s[k]
-            total += s[j] * (2 * moments.sums[b, j, 6] + Ms)
-            g[b, j] = moments.sums[b, j, 6] + Ms
+            total += s[j] * (2 * equations.sums[b, j, 6] + Ms)
+            g[b, j] = equations.sums[b, j, 6] + Ms
         _shift(M[b], g[b], s[0], s[1], s[2])
     for i in range(26):
         for j in range(26):
             H[i, j] = 0.0
-    c, palm = moments.centre, bodies.T[0]
+    c, palm = equations.centre, bodies.T[0]
     columns, F = np.zeros((26, 6)), np.empty(6)
     for j in range(3):
         columns[j, j] = 1.0
@@ -163,7 +163,7 @@ def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _hinge(bodies: Bodies, a: int, c: Array, out: Array) -> None:
+def _hinge(bodies: BodyPoses, a: int, c: Array, out: Array) -> None:
     """Twist (6,) at the centre of a unit turn of angle a."""
     ux, uy, uz = bodies.axes[a, 0], bodies.axes[a, 1], bodies.axes[a, 2]
     px, py, pz = c[0] - bodies.origins[a, 0], c[1] - bodies.origins[a, 1], c[2] - bodies.origins[a, 2]

@@ -9,16 +9,16 @@ from depthtrack.hand.synergies import Synergies
 
 Array = NDArray[np.float64]
 
-_SPREAD = np.radians(2.0)
+_RESIDUAL_SPREAD = np.radians(2.0)
 """How far postures usually lie from what a few synergies make of them: standard deviation of an angle."""
 
 
 class Prior(NamedTuple):
-    """A pull of the finger angles x towards `rest` (20,): (x - rest)^T `precision` (x - rest) is added to the squared
+    """A pull of the finger angles x towards `mean` (20,): (x - rest)^T `precision` (x - rest) is added to the squared
     distances. `precision` (20, 20) is in m^2/rad^2 beside the sum over 3000 points."""
 
     precision: Array
-    rest: Array
+    mean: Array
 
     @staticmethod
     def none() -> "Prior":
@@ -26,12 +26,12 @@ class Prior(NamedTuple):
         return Prior(np.zeros((20, 20)), np.zeros(20))
 
     @staticmethod
-    def held(angles: Array, strength: float) -> "Prior":
+    def towards(angles: Array, strength: float) -> "Prior":
         """Towards these angles (20,), alike for all of them: `strength` m^2/rad^2."""
         return Prior(strength * np.eye(20), angles.copy())
 
     @staticmethod
-    def likely(synergies: Synergies, strength: float) -> "Prior":
+    def synergy_weight(synergies: Synergies, strength: float) -> "Prior":
         """Towards postures that are common among those of the synergies.
 
         They are taken as probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along
@@ -39,10 +39,10 @@ class Prior(NamedTuple):
         for which the result is the likeliest pose.
         """
         C = synergies.components
-        along = C * (1 / (synergies.variances + _SPREAD**2)) @ C.T
-        across = (np.eye(20) - C @ C.T) / _SPREAD**2
+        along = C * (1 / (synergies.variances + _RESIDUAL_SPREAD**2)) @ C.T
+        across = (np.eye(20) - C @ C.T) / _RESIDUAL_SPREAD**2
         return Prior(strength * (along + across), synergies.mean.copy())
 
     def scaled(self, factor: float) -> "Prior":
         """The same pull, so many times as strong."""
-        return Prior(factor * self.precision, self.rest)
+        return Prior(factor * self.precision, self.mean)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from depthtrack.simd.functions import eight
 from depthtrack.simd.vectors import F64X8, kernel_part, loader, store
-from depthtrack.solver.correspondences import Cloud, Matches
-from depthtrack.solver.normal_equations import ROW, Moments
+from depthtrack.solver.correspondences import Correspondences, PointCloud
+from depthtrack.solver.normal_equations import ROW, NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -21,44 +21,56 @@ modelling by registration of multiple range images", 1992). `symmetric`: along t
 normal, which vanishes on curved surfaces too (Rusinkiewicz, "A symmetric objective function for ICP", 2019)."""
 
 
-def add_matches(moments: Moments, matches: Matches, cloud: Cloud, residual: Residual, softness: float) -> None:
+def add_correspondences(
+    equations: NormalEquations,
+    correspondences: Correspondences,
+    cloud: PointCloud,
+    residual: Residual,
+    kernel_scale: float,
+) -> None:
     """Add the residuals of all matches.
 
-    Each is weighted as Geman and McClure's estimator does: by 1 for near points, 1/4 at a distance of `softness` (m).
-    A `softness` of 0 weighs all alike.
+    Each is weighted as Geman and McClure's estimator does: by 1 for near points, 1/4 at a distance of `kernel_scale`
+    (m). A `kernel_scale` of 0 weighs all alike.
     """
     add = add_points if residual == "point" else add_symmetric if residual == "symmetric" else add_planes
-    add(moments.sums.reshape(-1), moments.e, moments.centre, matches, cloud, softness)
+    add(equations.sums.reshape(-1), equations.e, equations.centre, correspondences, cloud, kernel_scale)
 
 
 @kernel_part
-def add_planes(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
+def add_planes(
+    sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
+) -> None:
     """Add the distances of matches along the hand's normals."""
-    for i in range(matches.body.shape[0]):
-        if matches.body[i] >= 0:
-            n = matches.n[i]
-            _add(sums, total, centre, matches, cloud, i, softness, n[0], n[1], n[2])
+    for i in range(correspondences.body.shape[0]):
+        if correspondences.body[i] >= 0:
+            n = correspondences.n[i]
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, n[0], n[1], n[2])
 
 
 @kernel_part
-def add_symmetric(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
+def add_symmetric(
+    sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
+) -> None:
     """Add the distances of matches along the mean of the hand's and the observed normals."""
-    for i in range(matches.body.shape[0]):
-        if matches.body[i] >= 0:
-            n, m = matches.n[i], cloud.normals[i]
+    for i in range(correspondences.body.shape[0]):
+        if correspondences.body[i] >= 0:
+            n, m = correspondences.n[i], cloud.normals[i]
             x, y, z = n[0] + m[0], n[1] + m[1], n[2] + m[2]
             scale = 1.0 / math.sqrt(max(x * x + y * y + z * z, 1e-12))
-            _add(sums, total, centre, matches, cloud, i, softness, x * scale, y * scale, z * scale)
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, x * scale, y * scale, z * scale)
 
 
 @kernel_part
-def add_points(sums: Array, total: Array, centre: Array, matches: Matches, cloud: Cloud, softness: float) -> None:
+def add_points(
+    sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
+) -> None:
     """Add the distances of matches, all three coordinates."""
-    for i in range(matches.body.shape[0]):
-        if matches.body[i] >= 0:
-            _add(sums, total, centre, matches, cloud, i, softness, 1.0, 0.0, 0.0)
-            _add(sums, total, centre, matches, cloud, i, softness, 0.0, 1.0, 0.0)
-            _add(sums, total, centre, matches, cloud, i, softness, 0.0, 0.0, 1.0)
+    for i in range(correspondences.body.shape[0]):
+        if correspondences.body[i] >= 0:
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, 1.0, 0.0, 0.0)
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, 0.0, 1.0, 0.0)
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, 0.0, 0.0, 1.0)
 
 
 @kernel_part
@@ -66,21 +78,21 @@ def _add(
     sums: Array,
     total: Array,
     centre: Array,
-    matches: Matches,
-    cloud: Cloud,
+    correspondences: Correspondences,
+    cloud: PointCloud,
     i: int,
-    softness: float,
+    kernel_scale: float,
     nx: float,
     ny: float,
     nz: float,
 ) -> None:
     """Add the residual of match i along a direction n."""
-    b, x, y = matches.body[i], matches.x[i], cloud.points[i]
+    b, x, y = correspondences.body[i], correspondences.x[i], cloud.points[i]
     ex, ey, ez = x[0] - y[0], x[1] - y[1], x[2] - y[2]
     px, py, pz = x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]
     # v shifts a point as it is, the turn by its product with p.
     tx, ty, tz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-    w, e = weight(ex, ey, ez, softness), nx * ex + ny * ey + nz * ez
+    w, e = weight(ex, ey, ez, kernel_scale), nx * ex + ny * ey + nz * ez
     row, at = eight(nx, ny, nz, tx, ty, tz, e, 0.0), ROW * 6 * b
     store(sums, at, _load(sums, at) + row * (w * nx))
     store(sums, at + ROW, _load(sums, at + ROW) + row * (w * ny))
@@ -92,9 +104,9 @@ def _add(
 
 
 @kernel_part
-def weight(ex: float, ey: float, ez: float, softness: float) -> float:
+def weight(ex: float, ey: float, ez: float, kernel_scale: float) -> float:
     """Geman and McClure's weight of a distance."""
-    if softness <= 0.0:
+    if kernel_scale <= 0.0:
         return 1.0
-    share = 1.0 / (1.0 + (ex * ex + ey * ey + ez * ez) / (softness * softness))
+    share = 1.0 / (1.0 + (ex * ex + ey * ey + ez * ez) / (kernel_scale * kernel_scale))
     return share * share

@@ -11,7 +11,7 @@ from depthtrack.hand.synergies import Synergies
 Array = NDArray[np.float64]
 
 
-class Space(NamedTuple):
+class PostureSubspace(NamedTuple):
     """Finger angles as `mean` (20,) + `basis` (20, l) @ coordinates (l,): Eq. (6) and (7), less the global pose, which
     no basis changes. `lower`, `upper` (l,) are the coordinates' limits; `full` tells the plain angles (basis: I)."""
 
@@ -22,10 +22,12 @@ class Space(NamedTuple):
     full: bool
 
     @staticmethod
-    def of(synergies: Synergies, count: int | None = None) -> "Space":
+    def of(synergies: Synergies, count: int | None = None) -> "PostureSubspace":
         """The global pose and the first `count` synergies, or all of them. Raises InputError if there are fewer."""
         s = synergies if count is None else synergies.truncated(count)
-        return Space(np.ascontiguousarray(s.components), np.array(s.mean), np.array(s.lower), np.array(s.upper), False)
+        return PostureSubspace(
+            np.ascontiguousarray(s.components), np.array(s.mean), np.array(s.lower), np.array(s.upper), False
+        )
 
     def project(self, angles: Array) -> Array:
         """Coordinates (l,) of the nearest angles that the space holds, moved within the limits."""
@@ -36,5 +38,5 @@ class Space(NamedTuple):
         return self.mean + self.basis @ coordinates
 
 
-FULL = Space(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER), True)
+FULL = PostureSubspace(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER), True)
 """All twenty angles within the hand's limits."""

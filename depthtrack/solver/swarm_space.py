@@ -11,11 +11,11 @@ from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, t
 
 Array = NDArray[np.float64]
 
-REACH = 0.5
+POSITION_RANGE = 0.5
 """Half side of the box of positions (metres): wide enough that only a lost swarm meets it."""
 
 
-class Space(Protocol):
+class SwarmSpace(Protocol):
     """Coordinates of poses for a swarm: dimensions, bounds, and the way to poses and back."""
 
     lower: Array
@@ -37,8 +37,8 @@ class ParameterSpace:
     fingers = ANGLES
 
     def __init__(self, reference: Array) -> None:
-        self.lower = np.concatenate([reference[:3] - REACH, np.full(4, -1.0), LOWER])
-        self.upper = np.concatenate([reference[:3] + REACH, np.full(4, 1.0), UPPER])
+        self.lower = np.concatenate([reference[:3] - POSITION_RANGE, np.full(4, -1.0), LOWER])
+        self.upper = np.concatenate([reference[:3] + POSITION_RANGE, np.full(4, 1.0), UPPER])
         self._quaternion = reference[ORIENTATION]
 
     def poses(self, coordinates: Array) -> Array:
@@ -64,13 +64,13 @@ class TangentSpace:
 
     def __init__(self, reference: Array) -> None:
         self.reference = within_limits(reference)
-        room = np.concatenate([np.full(3, REACH), np.full(3, np.pi)])
-        self.lower = np.concatenate([-room, LOWER - self.reference[ANGLES]])
-        self.upper = np.concatenate([room, UPPER - self.reference[ANGLES]])
+        allocate = np.concatenate([np.full(3, POSITION_RANGE), np.full(3, np.pi)])
+        self.lower = np.concatenate([-allocate, LOWER - self.reference[ANGLES]])
+        self.upper = np.concatenate([allocate, UPPER - self.reference[ANGLES]])
 
     def poses(self, coordinates: Array) -> Array:
         poses = np.empty((len(coordinates), POSE_SIZE))
-        retract_all(self.reference, coordinates, poses)
+        retract_batch(self.reference, coordinates, poses)
         return poses
 
     def coordinates(self, poses: Array) -> Array:
@@ -78,7 +78,7 @@ class TangentSpace:
 
 
 @numba.njit(cache=True)
-def retract_all(reference: Array, steps: Array, poses: Array) -> None:
+def retract_batch(reference: Array, steps: Array, poses: Array) -> None:
     """`pose.retract` of one reference (27,) by steps (N, 26), into poses (N, 27)."""
     w, x, y, z = reference[3], reference[4], reference[5], reference[6]
     for n in range(steps.shape[0]):

@@ -11,8 +11,8 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION, rotation_matrix
 from depthtrack.recording.run_folder import RunRow, RunWriter
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.observation import Observation, Observer
-from depthtrack.segmentation.roi_tracking import HandPlace
+from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
 
@@ -22,7 +22,7 @@ _REACH_MARGIN = 0.03
 
 def track_sequence(
     sequence: Sequence,
-    observer: Observer,
+    segmenter: Segmenter,
     tracker: Tracker,
     model: HandModel,
     run: RunWriter,
@@ -41,10 +41,10 @@ def track_sequence(
     awaiting_start = start_pose is not None and all(row.pose is None for row in done)
     for number, frame in enumerate(islice(sequence, count)):
         begun = clock()
-        observation = observer.observe(frame, hand_place(model, tracker.expected))
+        observation = segmenter.segment(frame, roi_prior(model, tracker.predicted_pose))
         observe_ms = 1e3 * (clock() - begun)
         if number < len(done):
-            tracker.recall([_estimate(done[number])])
+            tracker.restore([_estimate(done[number])])
             continue
         if observation is not None and awaiting_start:
             estimate, awaiting_start = tracker.start(observation, start_pose), False
@@ -59,18 +59,18 @@ def follow(tracker: Tracker, observation: Observation | None) -> Estimate:
     """One frame on; a tracker that is shown no hand remembers that there was none."""
     if observation is not None:
         return tracker.track(observation)
-    tracker.recall([ABSENT])
+    tracker.restore([ABSENT])
     return ABSENT
 
 
-def hand_place(model: HandModel, pose: NDArray[np.float64] | None) -> HandPlace | None:
+def roi_prior(model: HandModel, pose: NDArray[np.float64] | None) -> RoiPrior | None:
     """Where a hand in this pose is: around its palm, as far as its fingers reach, up to its wrist."""
     if pose is None:
         return None
     shape = model.shape
-    reach = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + _REACH_MARGIN
+    max_distance = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + _REACH_MARGIN
     wrist = WristPlane(model.joints(pose)[0], -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return HandPlace(pose[POSITION].copy(), float(reach), wrist)
+    return RoiPrior(pose[POSITION].copy(), float(max_distance), wrist)
 
 
 def _estimate(row: RunRow) -> Estimate:

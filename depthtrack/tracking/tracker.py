@@ -58,7 +58,7 @@ class Tracker(Protocol):
         """Follow the hand into the next frame; starts by itself where there is nothing to follow."""
         ...
 
-    def recall(self, estimates: Sequence[Estimate]) -> None:
+    def restore(self, estimates: Sequence[Estimate]) -> None:
         """Hear of frames that were estimated before, or had no hand, as if they had been tracked just now.
 
         A new tracker that recalls the estimates of all frames so far goes on exactly as the one that made them.
@@ -66,7 +66,7 @@ class Tracker(Protocol):
         ...
 
     @property
-    def expected(self) -> NDArray[np.float64] | None:
+    def predicted_pose(self) -> NDArray[np.float64] | None:
         """Where the hand should be in the next frame, as a pose (27,); None where that is not known well."""
         ...
 

@@ -18,7 +18,7 @@ MaskEstimator = Callable[[Frame], NDArray[np.bool_] | None]
 
 
 @dataclass(frozen=True)
-class Moment:
+class AnnotatedFrame:
     """One frame, the hand's silhouette (h, w) in it, and the true keypoints (21, 3) in metres, camera frame.
 
     `mask_is_true` tells a silhouette known to the recording from an estimated one.
@@ -58,11 +58,11 @@ class Moment:
         (left, top), (right, bottom) = np.floor(found.min(axis=0)), np.floor(found.max(axis=0)) + 1
         return int(left), int(top), int(right), int(bottom)
 
-    def cropped(self, left: int, top: int, width: int, height: int) -> "Moment":
+    def cropped(self, left: int, top: int, width: int, height: int) -> "AnnotatedFrame":
         """The window whose first pixel is (left, top); what lies outside the image is black and without reading."""
         frame = self.frame
         window = (left, top, width, height)
-        return Moment(
+        return AnnotatedFrame(
             Frame(
                 frame.index,
                 frame.timestamp,
@@ -78,13 +78,13 @@ class Moment:
 
 def moments(
     sequence: Sequence, indices: Iterable[int] | None = None, estimate: MaskEstimator | None = None
-) -> Iterator[Moment]:
+) -> Iterator[AnnotatedFrame]:
     """Moments of a recording, one at a time: of the frames `indices` in that order, or of all.
 
     Damaged frames are refused or skipped as was chosen when the recording was opened.
     """
     for frame in sequence.frames(range(len(sequence)) if indices is None else indices):
-        yield Moment.of(sequence, frame, estimate)
+        yield AnnotatedFrame.of(sequence, frame, estimate)
 
 
 def true_keypoints(truth: GroundTruth | None, timestamp: float) -> NDArray[np.float64] | None:

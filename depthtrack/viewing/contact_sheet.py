@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
-from depthtrack.viewing.annotated_frame import Moment
+from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import colour_scale
 from depthtrack.viewing.panels import Layer, beside, blank, captioned, paint, smaller, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
@@ -23,7 +23,7 @@ PICTURE_SETTINGS = {".png": (cv2.IMWRITE_PNG_COMPRESSION, 6), ".jpg": (cv2.IMWRI
 
 
 def contact_sheet(
-    moments: Iterable[Moment], title: str, subtitle: str, near: float, far: float, width: int = 1700
+    moments: Iterable[AnnotatedFrame], title: str, subtitle: str, near: float, far: float, width: int = 1700
 ) -> Image:
     """A page (h, w, 3) of moments in reading order, about `width` pixels wide: depth beside an overview in colour.
 
@@ -78,7 +78,7 @@ def save_picture(image: Image, path: Path) -> None:
         aside.unlink(missing_ok=True)
 
 
-def _tile(moment: Moment, height: int, near: float, far: float) -> Image:
+def _tile(moment: AnnotatedFrame, height: int, near: float, far: float) -> Image:
     """Depth and overview; without colour the overview is drawn on the depth itself."""
     layers: list[Layer] = ["overview"] if moment.frame.colour is None else ["depth", "overview"]
     large = [paint(moment, layer, 2 * height, near, far) for layer in layers]
@@ -86,7 +86,7 @@ def _tile(moment: Moment, height: int, near: float, far: float) -> Image:
     return captioned(beside(pictures, gap=0), f"frame {moment.frame.index}", f"{moment.frame.timestamp:.2f} s")
 
 
-def _tile_height(moment: Moment, tile_width: int) -> int:
+def _tile_height(moment: AnnotatedFrame, tile_width: int) -> int:
     pictures = 1 if moment.frame.colour is None else 2
     return max(16, round(tile_width / pictures * moment.camera.height / moment.camera.width))
 
@@ -100,7 +100,7 @@ def _title(title: str, subtitle: str, width: int) -> Image:
     return bar
 
 
-def _legend(moments: list[Moment], near: float, far: float, width: int) -> Image:
+def _legend(moments: list[AnnotatedFrame], near: float, far: float, width: int) -> Image:
     """The depth scale and the meaning of the colours that occur, left to right as far as there is room."""
     bar = blank(width, 22)
     x = _write(bar, 0, f"{near:.2f} m", FAINT_TEXT) + 8

@@ -4,17 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.segmenter import HandLocator
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.viewing.annotated_frame import MaskEstimator
 
 
 def mask_estimator() -> MaskEstimator:
     """An estimator for one pass over one recording, frames in their order: it follows the hand from frame to frame."""
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
 
     def estimate(frame: Frame) -> NDArray[np.bool_] | None:
-        found = segmenter.segment(frame)
+        found = segmenter.locate(frame)
         if found is None:
             return None
         mask = np.zeros(frame.camera.shape, dtype=np.bool_)

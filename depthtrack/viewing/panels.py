@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Sequence
-from depthtrack.viewing.annotated_frame import MaskEstimator, Moment, evenly_chosen, moments
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator, evenly_chosen, moments
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
@@ -21,7 +21,7 @@ GAP = 6
 CAPTION_HEIGHT = 28
 
 
-def paint(moment: Moment, layer: Layer, height: int, near: float, far: float) -> Image:
+def paint(moment: AnnotatedFrame, layer: Layer, height: int, near: float, far: float) -> Image:
     """One view of a moment, `height` pixels high; depth colours run from `near` to `far` (metres).
 
     "colour" falls back to depth where there is none. "mask" tints the silhouette, "hand" leaves only it lit,
@@ -46,7 +46,7 @@ def paint(moment: Moment, layer: Layer, height: int, near: float, far: float) ->
     return image
 
 
-def panel(moment: Moment, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
+def panel(moment: AnnotatedFrame, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
     """The layers of one moment under their names: a film's picture. Up to three stand side by side, more in two rows.
 
     Each is `height` pixels high without its caption; the first tells the frame's number and time.
@@ -72,7 +72,7 @@ def useful_layers(sequence: Sequence, estimate: MaskEstimator | None = None) -> 
     return tuple(layer for layer, useful in shown.items() if useful)
 
 
-def mask_colour(moment: Moment) -> Rgb:
+def mask_colour(moment: AnnotatedFrame) -> Rgb:
     """True and estimated silhouettes never look the same."""
     return TRUE_MASK if moment.mask_is_true else ESTIMATED_MASK
 
@@ -109,7 +109,7 @@ def blank(width: int, height: int, colour: Rgb = BACKGROUND) -> Image:
     return np.full((height, width, 3), colour, dtype=np.uint8)
 
 
-def _layer_caption(layer: Layer, moment: Moment) -> tuple[str, str, Rgb]:
+def _layer_caption(layer: Layer, moment: AnnotatedFrame) -> tuple[str, str, Rgb]:
     if layer == "mask":
         if moment.mask is None:
             return "hand", "none found", FAINT_TEXT
@@ -119,7 +119,7 @@ def _layer_caption(layer: Layer, moment: Moment) -> tuple[str, str, Rgb]:
     return layer, "", TEXT
 
 
-def _tint(moment: Moment, layer: Layer) -> float:
+def _tint(moment: AnnotatedFrame, layer: Layer) -> float:
     """Opacity of the silhouette: a contour alone around a lit hand, and little colour under a skeleton."""
     if layer == "hand":
         return 0.0

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from depthtrack.evaluation.evaluate import evaluate
-from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.rendering.surface import Surface
 from depthtrack.viewing.annotated_frame import true_keypoints
 from depthtrack.viewing.rerun_stream import CAMERA
@@ -22,7 +22,7 @@ _HAND_IMAGES = ("hypothesis", "residual", "true_skeleton")
 _SERIES = {"energy": (167, 110, 230), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
 
 
-class RerunRunViewer(MomentStream[Replayed]):
+class RerunRunViewer(MomentStream[ReplayedFrame]):
     """Shows a run as it is replayed.
 
     Beside what recordings show: `world/hypothesis`, the tracked hand's visible surface (metres, camera frame);
@@ -39,7 +39,7 @@ class RerunRunViewer(MomentStream[Replayed]):
         points = evaluate(replay, residuals=False).points
         self._error = None if points is None else points.mean().values
 
-    def log(self, item: Replayed) -> None:
+    def log(self, item: ReplayedFrame) -> None:
         """See `RerunStream`."""
         rr, stream, estimate, frame = self._rr, self._stream, item.estimate, item.frame
         moment = run_moment(item, self._surface.model)
@@ -55,7 +55,7 @@ class RerunRunViewer(MomentStream[Replayed]):
         self._log_or_clear(f"{CAMERA}/true_skeleton", bones(rr.LineStrips2D, in_pixels, 0.8, FINGER_TRUTH))
         self._log_numbers(item)
 
-    def _log_numbers(self, item: Replayed) -> None:
+    def _log_numbers(self, item: ReplayedFrame) -> None:
         rr, stream, estimate = self._rr, self._stream, item.estimate
         values = {"energy": estimate.energy, "confidence": estimate.confidence}
         if self._error is not None:

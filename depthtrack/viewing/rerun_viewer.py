@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.viewing.annotated_frame import Moment
+from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES
 from depthtrack.viewing.rerun_stream import CAMERA, ESTIMATED_CLASS, TRUE_CLASS, Item, RerunStream
@@ -25,7 +25,7 @@ class MomentStream(RerunStream[Item]):
     under the silhouette, and `world/skeleton`, the keypoints (metres, camera frame).
     """
 
-    def log_moment(self, moment: Moment) -> None:
+    def log_moment(self, moment: AnnotatedFrame) -> None:
         """Show a moment at its time."""
         rr, stream = self._rr, self._stream
         stream.set_time("time", duration=moment.frame.timestamp)
@@ -41,7 +41,7 @@ class MomentStream(RerunStream[Item]):
         self._log_or_clear("world/skeleton", bones(rr.LineStrips3D, keypoints, radius=0.0015))
         self._log_or_clear(f"{CAMERA}/skeleton", bones(rr.LineStrips2D, in_pixels, radius=1.8))
 
-    def _depth_image(self, moment: Moment) -> Any:
+    def _depth_image(self, moment: AnnotatedFrame) -> Any:
         """Depth as a 16-bit PNG in the camera's own unit: a twentieth of the floats, and without loss."""
         rr, scale = self._rr, moment.camera.depth_scale
         units = np.clip(np.rint(moment.frame.depth / scale), 0, np.iinfo(np.uint16).max).astype(np.uint16)
@@ -57,7 +57,7 @@ class MomentStream(RerunStream[Item]):
             point_fill_ratio=0.6,
         )
 
-    def _hand_points(self, moment: Moment) -> Any | None:
+    def _hand_points(self, moment: AnnotatedFrame) -> Any | None:
         """The measured points under the silhouette, in the image's colours."""
         if moment.mask is None:
             return None
@@ -98,10 +98,10 @@ class MomentStream(RerunStream[Item]):
         )
 
 
-class RerunViewer(MomentStream[Moment]):
+class RerunViewer(MomentStream[AnnotatedFrame]):
     """Shows moments of a recording, its true skeleton and its mask."""
 
-    def log(self, item: Moment) -> None:
+    def log(self, item: AnnotatedFrame) -> None:
         """See `RerunStream`."""
         self.log_moment(item)
 
@@ -121,7 +121,7 @@ def jpeg(rr: Any, image: NDArray[np.uint8], draw_order: float) -> Any:
     return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg", opacity=1, draw_order=draw_order)
 
 
-def _mask_image(rr: Any, moment: Moment) -> Any | None:
+def _mask_image(rr: Any, moment: AnnotatedFrame) -> Any | None:
     if moment.mask is None:
         return None
     label = TRUE_CLASS if moment.mask_is_true else ESTIMATED_CLASS

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.viewing.contact_sheet import frame_rate
 from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.video import VideoWriter
 
-Progress = Callable[[Iterable[Replayed]], Iterable[Replayed]]
+Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
 
 
 def write_run_film(
@@ -24,7 +24,7 @@ def write_run_film(
     `height` pixels of each of the four views; frames stream. Raises InputError.
     """
     painter = RunPainter(replay, height)
-    replayed: Iterable[Replayed] = replay if progress is None else progress(replay)
+    replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
     with VideoWriter(path, speed * (frame_rate(replay.sequence) or 30.0), codecs) as writer:
         for seen in replayed:
             writer.write(painter.picture(seen))

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.evaluation.replay import Replay, Replayed
+from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.rendering.surface import Surface
-from depthtrack.viewing.annotated_frame import Moment, true_keypoints
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.overlay import dimmed, draw_skeleton
@@ -39,7 +39,7 @@ class RunPainter:
         self._scene_near, self._scene_far = hand_range(replay, room=0.5)
         self._timeline: Timeline | None = None
 
-    def picture(self, seen: Replayed) -> Image:
+    def picture(self, seen: ReplayedFrame) -> Image:
         """All four views of a frame, what the tracker said of it, and its place in the run."""
         views = {layer: self.view(seen, layer) for layer in LAYERS}
         _draw_scale(views["residual"])
@@ -49,7 +49,7 @@ class RunPainter:
             self._timeline = Timeline(self._replay.run.energy, self._replay.run.status, grid.shape[1])
         return stacked([self._headline(seen, grid.shape[1]), grid, self._timeline.at(seen.row)])
 
-    def view(self, seen: Replayed, layer: RunLayer) -> Image:
+    def view(self, seen: ReplayedFrame, layer: RunLayer) -> Image:
         """One view (height, w, 3), without a caption: of the whole image for "recording", else close on the hand.
 
         "recording" and "overlay" show the hypothesis over the colour image, where there is one.
@@ -69,22 +69,22 @@ class RunPainter:
             image = self._skeleton(seen, close)
         return _of_width(image, moment.camera.resized(self._height / moment.camera.height).width)
 
-    def _overlay(self, seen: Replayed, moment: Moment, near: float, far: float) -> Image:
+    def _overlay(self, seen: ReplayedFrame, moment: AnnotatedFrame, near: float, far: float) -> Image:
         image, surface = paint(moment, "colour", self._height, near, far), self._rendered(seen, moment.camera)
         return image if surface is None else draw_surface(image, surface, 0.6)
 
-    def _hypothesis(self, seen: Replayed, close: Moment) -> Image:
+    def _hypothesis(self, seen: ReplayedFrame, close: AnnotatedFrame) -> Image:
         image, surface = paint(close, "depth", self._height, self._near, self._far), self._rendered(seen, close.camera)
         return image if surface is None else draw_surface(image, surface, 0.7)
 
-    def _residual(self, seen: Replayed, close: Moment) -> Image:
+    def _residual(self, seen: ReplayedFrame, close: AnnotatedFrame) -> Image:
         camera, surface = close.camera.resized(self._height / close.camera.height), self._rendered(seen, close.camera)
         size = camera.width, camera.height
         rendered = np.zeros(camera.shape) if surface is None else surface.depth
         observed = None if close.mask is None else enlarged(close.mask.astype(np.float32), *size) > 0
         return residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed)
 
-    def _skeleton(self, seen: Replayed, close: Moment) -> Image:
+    def _skeleton(self, seen: ReplayedFrame, close: AnnotatedFrame) -> Image:
         camera = close.camera.resized(self._height / close.camera.height)
         image = dimmed(paint(close, "colour", self._height, self._near, self._far), 0.6)
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
@@ -92,13 +92,13 @@ class RunPainter:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
         return image if close.keypoints is None else draw_skeleton(image, camera, close.keypoints)
 
-    def _rendered(self, seen: Replayed, camera: Camera) -> Surface | None:
+    def _rendered(self, seen: ReplayedFrame, camera: Camera) -> Surface | None:
         """The hypothesis as a view of this camera shows it."""
         if seen.estimate.pose is None:
             return None
         return self._surface.seen(seen.estimate.pose, camera.resized(self._height / camera.height))
 
-    def _caption(self, seen: Replayed, layer: RunLayer) -> tuple[str, str]:
+    def _caption(self, seen: ReplayedFrame, layer: RunLayer) -> tuple[str, str]:
         if layer == "recording":
             return "recording", f"frame {seen.frame.index}  ·  {seen.frame.timestamp:.2f} s"
         if layer == "hypothesis":
@@ -108,7 +108,7 @@ class RunPainter:
         truth = true_keypoints(self._replay.sequence.ground_truth, seen.frame.timestamp)
         return "skeleton", "" if truth is None else "the true one thin"
 
-    def _headline(self, seen: Replayed, width: int) -> Image:
+    def _headline(self, seen: ReplayedFrame, width: int) -> Image:
         bar, estimate = blank(width, 34), seen.estimate
         tracker = str(self._replay.run.configuration.get("tracker", "track"))[:20]
         put_text(bar, f"{self._replay.sequence.name[:40]}  ·  {tracker}", (4, 17), 20)
@@ -120,9 +120,9 @@ class RunPainter:
         return bar
 
 
-def run_moment(seen: Replayed, model: HandModel) -> Moment:
+def run_moment(seen: ReplayedFrame, model: HandModel) -> AnnotatedFrame:
     """The frame with the observed silhouette and the tracked keypoints."""
-    moment = Moment(seen.frame)
+    moment = AnnotatedFrame(seen.frame)
     if seen.observation is not None:
         mask = np.zeros(seen.frame.camera.shape, dtype=np.bool_)
         (left, top), (height, width) = seen.observation.origin, seen.observation.camera.shape

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.viewing.annotated_frame import Moment
+from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.panels import Layer, beside, blank, mask_colour, paint, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
@@ -21,7 +21,7 @@ SMALLEST_SIDE = 32
 """Pixels of a picture in which a hand can still be made out."""
 
 
-def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
+def strip(moments: Iterable[AnnotatedFrame], width: int = 1600) -> Image:
     """A banner (h, w, 3) of `width` pixels: a column a moment, a row a view, close on the hand.
 
     Every moment is seen through a window of the same size, so that sizes compare. Rows with nothing to show are
@@ -43,7 +43,7 @@ def strip(moments: Iterable[Moment], width: int = 1600) -> Image:
     return stacked(rows, GAP)
 
 
-def _has(moments: Sequence[Moment], layer: Layer) -> bool:
+def _has(moments: Sequence[AnnotatedFrame], layer: Layer) -> bool:
     match layer:
         case "colour":
             return any(moment.frame.colour is not None for moment in moments)
@@ -54,7 +54,7 @@ def _has(moments: Sequence[Moment], layer: Layer) -> bool:
     return True
 
 
-def _close_on_the_hand(moments: Sequence[Moment]) -> list[Moment]:
+def _close_on_the_hand(moments: Sequence[AnnotatedFrame]) -> list[AnnotatedFrame]:
     """Square windows of one size around the hand, or around the image's middle where no hand is known."""
     boxes = [moment.hand_box() for moment in moments]
     extents = [max(right - left, bottom - top) for left, top, right, bottom in filter(None, boxes)]
@@ -67,7 +67,7 @@ def _close_on_the_hand(moments: Sequence[Moment]) -> list[Moment]:
     return out
 
 
-def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
+def _range_of_the_hand(moments: Sequence[AnnotatedFrame]) -> tuple[float, float]:
     """Near and far (metres) that give the hand most of the colours; of everything where no silhouette is known."""
     hands = [moment.frame.depth[moment.mask] for moment in moments if moment.mask is not None]
     if not hands:
@@ -76,7 +76,7 @@ def _range_of_the_hand(moments: Sequence[Moment]) -> tuple[float, float]:
     return near, far + 0.25 * (far - near)
 
 
-def _name(moments: Sequence[Moment], layer: Layer) -> tuple[str, Rgb]:
+def _name(moments: Sequence[AnnotatedFrame], layer: Layer) -> tuple[str, Rgb]:
     """What a row is called, and in which colour."""
     if layer != "hand":
         return layer, FAINT_TEXT

@@ -55,7 +55,7 @@ def test_a_film_shows_the_true_hand_with_room_around(recording: Synthesis) -> No
     seen, oracle = film(recording), OracleScorer(recording.hand)
     for index in (0, 29):
         observation = seen[index]
-        oracle.observe(Target(observation.camera, observation.skin, observation.depth))
+        oracle.set_target(Target(observation.camera, observation.skin, observation.depth))
         expected = oracle.render(seen.poses[index])
         np.testing.assert_array_equal(observation.skin, expected > 0)
         np.testing.assert_allclose(observation.depth, expected, atol=2e-4)

@@ -95,8 +95,8 @@ def test_unusable_plans_are_refused() -> None:
     for seconds in (0.0, -1.0, float("nan"), 1e9):
         with pytest.raises(InputError, match="seconds"):
             scoring.plan(["raster"], seconds)
-    assert scoring.plan(["raster", "raster"]).contenders == ("raster",)
-    assert "oracle" not in scoring.plan().contenders
+    assert scoring.plan(["raster", "raster"]).specs == ("raster",)
+    assert "oracle" not in scoring.plan().specs
 
 
 def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, error: str) -> None:
@@ -164,14 +164,14 @@ def test_a_rival_of_ours_needs_no_library_to_be_scored_as_rivals_are() -> None:
         def _load(self) -> None: ...
 
         def _prepare(self, camera: object) -> None:
-            oracle.observe(self.target)
+            oracle.set_target(self.target)
 
         def _depth(self, transforms: np.ndarray) -> np.ndarray:
             return oracle.render(next(poses))
 
     poses = iter(workload.poses[0])
     rival = Perfect(HandShape())
-    rival.observe(workload.targets[0])
+    rival.set_target(workload.targets[0])
     np.testing.assert_allclose(rival.score(workload.poses[0, :CHECKED]), workload.expected[0], atol=0.01)
 
 

@@ -17,7 +17,7 @@ from depthtrack.calibration.parameters import (
     motion_of,
     prior_covariance,
 )
-from depthtrack.calibration.residuals import SkinModel, View, gather
+from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise
 from depthtrack.calibration.views import choose_views, finger_area
 from depthtrack.cli import main
 from depthtrack.cli.calibrate import _text
@@ -31,7 +31,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.rendering.triangles import rasterise
-from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.solver.keypoints import KEYPOINT_BODIES
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.trackers.ik import IkTracker
@@ -119,12 +119,14 @@ def test_views_are_shown_in_the_order_of_the_recording(calibration: Calibration)
 
 
 @pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])
-def test_a_side_that_fits_hardly_better_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
+def test_a_side_that_fits_hardly_better_is_not_sure(
+    calibration: Calibration, margin: float | None, guide_confidence: bool
+) -> None:
     certain = {name: replace(m, confidence=0.9999) for name, m in calibration.measured.items()}
     found = replace(calibration, side_margin=margin, measured=certain)
-    assert summary(found)["side_sure"] == sure
+    assert summary(found)["side_sure"] == guide_confidence
     text = _text(found, Path("hand.json"), Path("hand.png"))
-    assert ("side not sure; give --side" in text) == (not sure)
+    assert ("side not sure; give --side" in text) == (not guide_confidence)
     assert "0.99" in text
     assert "1.00\n" not in text
 
@@ -161,7 +163,7 @@ def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
     sigma = {}
     for name, angles in frames.items():
         pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], angles)
-        view = View(_rendered(pose))
+        view = CalibrationView(_rendered(pose))
         fit = fit_jointly([view], pose[None], _sizes(), "right", rounds=1)
         of_lengths = [g for measure, (_, g) in measures(_sizes()).items() if measure.endswith("_length")]
         sigma[name] = sum(float(g @ fit.covariance @ g) for g in of_lengths)
@@ -172,8 +174,8 @@ def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
 
 def test_the_true_hand_in_its_true_pose_has_no_residuals() -> None:
     observation = observe(MADE, 40)
-    true = gather(View(observation), SkinModel(TRUE_HAND), MADE.poses[40], 0.006)
-    average = gather(View(observation), SkinModel(HandShape()), MADE.poses[40], 0.006)
+    true = linearise(CalibrationView(observation), PosedSkin(TRUE_HAND), MADE.poses[40], 0.006)
+    average = linearise(CalibrationView(observation), PosedSkin(HandShape()), MADE.poses[40], 0.006)
     assert true.distance < 1e-4 < average.distance
     assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
 
@@ -186,7 +188,7 @@ def test_open_hands_are_chosen_before_fists() -> None:
 def test_recordings_without_a_hand_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     empty = _empty_room(tmp_path / "empty")
     with pytest.raises(InputError, match="0 of 4 frames"):
-        choose_views(open_sequence(empty), Observer(), 4)
+        choose_views(open_sequence(empty), Segmenter(), 4)
     assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
     assert "calibrating needs at least 3 frames" in capsys.readouterr().err
     assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2

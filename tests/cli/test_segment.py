@@ -11,7 +11,7 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.evaluation.segmentation import overlap, summary
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.skin_colour import SkinColourModel
 
 FRAMES = 16
 
@@ -105,7 +105,7 @@ def test_training_on_a_recording_makes_a_usable_model(
 ) -> None:
     model = tmp_path / "skin.json"
     assert main(["train-skin", str(recording), "-o", str(model)]) == 0
-    assert 0 < SkinModel.load(model).prior < 0.5
+    assert 0 < SkinColourModel.load(model).prior < 0.5
     capsys.readouterr()
     options = ("--skin-model", str(model), "--json")
     assert main(["segment", str(recording), "-o", str(tmp_path / "out"), *options]) == 0
@@ -118,7 +118,7 @@ def test_training_on_folders(recording: Path, tmp_path: Path) -> None:
     )
     from_recording = tmp_path / "r.json"
     assert main(["train-skin", str(recording), "-o", str(from_recording)]) == 0
-    assert SkinModel.load(tmp_path / "m.json").prior == pytest.approx(SkinModel.load(from_recording).prior)
+    assert SkinColourModel.load(tmp_path / "m.json").prior == pytest.approx(SkinColourModel.load(from_recording).prior)
 
 
 def test_a_skin_model_needs_a_file(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:

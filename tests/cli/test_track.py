@@ -79,7 +79,7 @@ def test_a_run_is_replayed_exactly_as_the_tracker_saw_it(run: Path) -> None:
             assert seen.observation is not None
             assert seen.estimate.pose is not None
             observed = Target(seen.observation.camera, seen.observation.skin, seen.observation.depth)
-            scorer.observe(observed.reduced(RESOLUTION))
+            scorer.set_target(observed.reduced(RESOLUTION))
             assert scorer.score(seen.estimate.pose[None])[0] == seen.estimate.energy
 
 

@@ -13,7 +13,7 @@ import pytest
 from depthtrack.cli import main
 from depthtrack.errors import DepthtrackError, InputError, MissingExtraError
 from depthtrack.recording import open_sequence
-from depthtrack.viewing.annotated_frame import Moment, moments
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, moments
 from depthtrack.viewing.rerun_viewer import RerunViewer
 from depthtrack.viewing.theme import ESTIMATED_MASK
 from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, WEBM_CODECS, VideoWriter
@@ -206,7 +206,7 @@ def test_a_viewer_file_holds_every_moment(sample: Path, out: Path) -> None:
 
 @needs_rerun
 def test_a_viewer_file_that_fails_leaves_nothing(sample: Path, out: Path) -> None:
-    def broken() -> Iterator[Moment]:
+    def broken() -> Iterator[AnnotatedFrame]:
         yield next(moments(open_sequence(sample)))
         raise InputError("the disk is on fire")
 

@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 
 from depthtrack.cli import main
 from depthtrack.errors import InputError
-from depthtrack.evaluation.compare.budget import search, sized
+from depthtrack.evaluation.compare.budget import scale_work, search
 from depthtrack.evaluation.compare.comparison import Comparison, Progress, compare
-from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
+from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.compare.running import Source
-from depthtrack.evaluation.compare.specs import Contender, read_contenders
+from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
 from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.recording.run_folder import Run
 from depthtrack.tracking.tracker import Estimate, Status
@@ -48,17 +48,17 @@ def compared(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_contenders_are_read_as_people_write_them() -> None:
-    assert read_contenders(["pso,ik:variant=paper,rounds=3", "pso:particles=16,resolution=64"]) == [
-        Contender("PSO", "pso"),
-        Contender("IK variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
-        Contender("PSO particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
+    assert read_specs(["pso,ik:variant=paper,rounds=3", "pso:particles=16,resolution=64"]) == [
+        TrackerSpec("PSO", "pso"),
+        TrackerSpec("IK variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
+        TrackerSpec("PSO particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
     ]
 
 
 def test_contenders_are_read_from_a_file(tmp_path: Path) -> None:
     file = tmp_path / "trackers.toml"
     file.write_text('["As in 2011"]\ntracker = "pso"\nvariant = "paper"\n\n[surface]\ntracker = "ik"\n')
-    first, second = read_contenders([str(file)])
+    first, second = read_specs([str(file)])
     assert (first.label, first.tracker, first.options) == ("As in 2011", "pso", {"variant": "paper"})
     assert (second.label, second.options) == ("surface", {})
     # The budget is among the options that a run tells, though nobody gave it.
@@ -82,14 +82,14 @@ def test_contenders_are_read_from_a_file(tmp_path: Path) -> None:
 )
 def test_contenders_that_make_no_sense_are_refused(text: str, told: str) -> None:
     with pytest.raises(InputError, match=told):
-        read_contenders([text])
+        read_specs([text])
 
 
 def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "trackers.toml"
     file.write_text("ik = " + "[" * 50_000)
     with pytest.raises(InputError, match="cannot read the trackers"):
-        read_contenders([str(file)])
+        read_specs([str(file)])
 
 
 @given(st.floats(0.5, 500), st.floats(0, 20), st.floats(0.1, 40))
@@ -100,20 +100,20 @@ def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float
     def cost(options: dict[str, Any]) -> float:
         return always + each * options["particles"] * options["generations"] / 1600
 
-    budget = search(lambda size: sized("pso", defaults, size), cost, ms)
+    budget = search(lambda size: scale_work("pso", defaults, size), cost, ms)
     assert budget.ms == cost(budget.options)
-    least, most = cost(sized("pso", defaults, 1 / 32)), cost(sized("pso", defaults, 64))
+    least, most = cost(scale_work("pso", defaults, 1 / 32)), cost(scale_work("pso", defaults, 64))
     reachable = min(max(ms, least), most)
     assert budget.ms == pytest.approx(reachable, rel=0.15)
 
 
 def test_more_work_is_more_of_everything() -> None:
     swarm: dict[str, Any] = {"particles": 64, "generations": 25}
-    assert sized("pso", swarm, 1) == swarm
-    assert sized("pso", swarm, 4) == {"particles": 128, "generations": 50}
+    assert scale_work("pso", swarm, 1) == swarm
+    assert scale_work("pso", swarm, 4) == {"particles": 128, "generations": 50}
     surface: dict[str, Any] = {"rounds": 5, "subsample": 3}
-    assert sized("ik", surface, 1) == surface
-    work = [sized("ik", surface, size) for size in (0.1, 0.5, 1, 2, 4, 9, 30)]
+    assert scale_work("ik", surface, 1) == surface
+    work = [scale_work("ik", surface, size) for size in (0.1, 0.5, 1, 2, 4, 9, 30)]
     points_times_rounds = [options["rounds"] / options["subsample"] for options in work]
     assert points_times_rounds == sorted(points_times_rounds)
     assert work[-1]["subsample"] == 1
@@ -122,7 +122,7 @@ def test_more_work_is_more_of_everything() -> None:
 class Idle:
     """A tracker that waits and hardly works."""
 
-    name, stages, expected = "idle", ("wait", "work"), None
+    name, stages, predicted_pose = "idle", ("wait", "work"), None
 
     def start(self, observation: Any, pose: Any = None) -> Estimate:
         time.sleep(0.03)
@@ -130,13 +130,13 @@ class Idle:
 
     track = start
 
-    def recall(self, estimates: Any) -> None: ...
+    def restore(self, estimates: Any) -> None: ...
     def close(self) -> None: ...
 
 
 def test_waiting_costs_no_time() -> None:
     """CPU time is told, in the shares of the tracker's own clock."""
-    stage_ms = TimedByProcessor(Idle()).track(None).stage_ms  # type: ignore[arg-type]
+    stage_ms = CpuTimed(Idle()).track(None).stage_ms  # type: ignore[arg-type]
     assert sum(stage_ms.values()) < 20
     assert stage_ms["wait"] == pytest.approx(2 * stage_ms["work"])
 
@@ -216,7 +216,7 @@ def test_other_options_need_another_folder(recording: Path, compared: Path, caps
 
 def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -> None:
     source = Source(str(recording), frames=6)
-    comparison = Comparison((source,), tuple(read_contenders(["pso:resolution=48,ik:subsample=6"])), equal_ms=6.0)
+    comparison = Comparison((source,), tuple(read_specs(["pso:resolution=48,ik:subsample=6"])), equal_ms=6.0)
     heard: list[Progress] = []
     plans = compare(comparison, tmp_path, InThisProcess(), heard.append)
     assert "6 ms" in heard[0].what
@@ -235,8 +235,8 @@ def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -
 def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "everyday"
     assert main(["synth", "everyday", str(other), "--frames", "3", "--seed", "4"]) == 0
-    contenders = tuple(read_contenders(["ik:rounds=1,subsample=6"]))
-    comparison = Comparison((Source(str(recording), frames=3), Source(str(other))), contenders)
+    specs = tuple(read_specs(["ik:rounds=1,subsample=6"]))
+    comparison = Comparison((Source(str(recording), frames=3), Source(str(other))), specs)
     first, second = compare(comparison, tmp_path / "out", InThisProcess())
     assert first.folder != second.folder
     assert Run.load(Path(second.folder)).configuration["sequence"] == str(other)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.hand.compiled_kinematics import Bodies, Chain, step
+from depthtrack.hand import compiled_kinematics
+from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, retract, tangent_between
@@ -23,7 +24,7 @@ def random_pose(rng: np.random.Generator) -> np.ndarray:
 def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) -> None:
     shape, rng = HandShape(side=side, scale=1.2), np.random.default_rng(seed)
     pose, model = random_pose(rng), HandModel(shape)
-    bodies, T = Bodies.at(Chain.of(shape), pose), model.transforms(pose)
+    bodies, T = BodyPoses.at(Chain.of(shape), pose), model.transforms(pose)
     np.testing.assert_allclose(bodies.T, T[:, :3], atol=1e-12)
     # A point of each body moves with each angle as its hinge says.
     points = np.einsum("bij,j->bi", T[:, :3, :3], rng.normal(0, 0.02, 3)) + T[:, :3, 3]
@@ -38,7 +39,7 @@ def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) ->
 def test_a_step_is_a_retraction(seed: int, size: float) -> None:
     rng = np.random.default_rng(seed)
     pose, tangent, out = random_pose(rng), size * rng.normal(size=26), np.empty(27)
-    step(pose, tangent, out)
+    compiled_kinematics.retract(pose, tangent, out)
     np.testing.assert_allclose(tangent_between(out, retract(pose, tangent)), np.zeros(26), atol=1e-9)
     assert np.linalg.norm(out[3:7]) == pytest.approx(1)
     assert out[3] >= 0

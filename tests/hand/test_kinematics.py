@@ -35,13 +35,13 @@ def test_jacobian_equals_finite_differences(side: Side, seed: int, scale: float)
     rng = np.random.default_rng(seed)
     model, pose = HandModel(HandShape(side=side, scale=scale)), random_pose(seed)
     bodies, local = rng.integers(0, BODY_COUNT, 12), rng.normal(scale=0.03, size=(12, 3))
-    J = model.point_jacobian(pose, bodies, model.place(pose, bodies, local))
+    J = model.point_jacobian(pose, bodies, model.transform_points(pose, bodies, local))
     step = 1e-6
     for column in range(26):
         tangent = np.zeros(26)
         tangent[column] = step
-        ahead = model.place(retract(pose, tangent), bodies, local)
-        behind = model.place(retract(pose, -tangent), bodies, local)
+        ahead = model.transform_points(retract(pose, tangent), bodies, local)
+        behind = model.transform_points(retract(pose, -tangent), bodies, local)
         np.testing.assert_allclose(J[..., column], (ahead - behind) / (2 * step), atol=2e-8)
 
 
@@ -49,7 +49,7 @@ def test_batches_equal_single_poses() -> None:
     model, poses = HandModel(HandShape()), random_pose(1, 2, 3)
     bodies = np.arange(BODY_COUNT)
     local = np.random.default_rng(0).normal(size=(BODY_COUNT, 3))
-    points = model.place(poses, bodies, local)
+    points = model.transform_points(poses, bodies, local)
     jacobians = model.point_jacobian(poses, bodies, points)
     for i in np.ndindex(2, 3):
         np.testing.assert_allclose(model.transforms(poses)[i], model.transforms(poses[i]), atol=1e-15)

@@ -20,7 +20,7 @@ def test_every_backend_is_made_by_its_name(name: str) -> None:
         assert name in ("egl", "osmesa")
         pytest.skip(str(error))
     with scorer:
-        scorer.observe(target)
+        scorer.set_target(target)
         terms = scorer.terms(poses[:3])
     assert scorer.name == name
     np.testing.assert_allclose(terms.energy, terms.depth + 5 * terms.skin + 10 * terms.kinematic)

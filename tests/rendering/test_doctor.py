@@ -32,7 +32,7 @@ def test_the_scene_leaves_nothing_to_rounding() -> None:
     """No pixel's match hangs on less than half a micrometre, several times what float32 loses at that distance."""
     shape, target, poses = selfcheck.scene()
     with OracleScorer(shape) as oracle:
-        oracle.observe(target)
+        oracle.set_target(target)
         depth = np.stack([oracle.render(pose) for pose in poses]).astype(np.float64)
     margin = np.abs(np.abs(depth - target.depth) - Objective().match_depth)
     assert margin[depth > 0].min() > 4.5e-7

@@ -99,7 +99,7 @@ def test_a_score_does_not_depend_on_the_batch_around_it(sums: Sums) -> None:
     shape, poses = random_shape(rng), random_poses(rng, 40, (0, 0, 0.35), 0.08)
     target = target_of(shape, poses[0], KINECT.crop(250, 180, 301, 203), rng)
     with OpenGLScorer(shape, sums=sums) as scorer:
-        scorer.observe(target)
+        scorer.set_target(target)
         together = scorer.score(poses)
         alone = np.concatenate([scorer.score(pose[None]) for pose in poses])
         np.testing.assert_array_equal(together, alone)
@@ -116,7 +116,7 @@ def test_the_sums_of_an_empty_view_are_exact_at_any_size(sums: Sums, width: int,
     depth = rng.choice(np.array([0, 0.015625, 0.5], np.float32), size=(height, width))
     poses = random_poses(rng, 7, (0, 0, -1), 0.1)
     with OpenGLScorer(HandShape(), sums=sums) as scorer:
-        scorer.observe(Target(Camera(width, height, 60, 60, 0, 0), skin, depth))
+        scorer.set_target(Target(Camera(width, height, 60, 60, 0, 0), skin, depth))
         terms = scorer.terms(poses)
     clamped = np.minimum(depth, 0.04, dtype=np.float64).sum()
     np.testing.assert_allclose(terms.depth, 1000 * clamped / (skin.sum() + 1e-6), rtol=1e-6)
@@ -198,9 +198,9 @@ def test_the_observed_pose_scores_best() -> None:
     shape, poses = HandShape(), random_poses(rng, 20, (0, 0, 0.5), 0.02)
     camera = window_on(shape, poses[4], 224)
     with OpenGLScorer(shape) as scorer:
-        scorer.observe(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+        scorer.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
         depth = scorer.render(poses[4])
-        scorer.observe(Target(camera, depth > 0, depth))
+        scorer.set_target(Target(camera, depth > 0, depth))
         terms = scorer.terms(poses)
     assert terms.energy.argmin() == 4
     np.testing.assert_allclose(terms.energy[4], 10 * terms.kinematic[4], atol=1e-4)

@@ -72,7 +72,7 @@ def test_hundreds_of_scorers_leave_nothing_behind() -> None:
     counts, sizes = [], []
     for turn in range(301):
         with OpenGLScorer(HandShape(), sums="gpu" if turn % 2 else "cpu") as scorer:
-            scorer.observe(target)
+            scorer.set_target(target)
             scorer.score(poses)
         if turn in (50, 300):
             with shared_renderer("egl").context as gl:
@@ -84,7 +84,7 @@ def test_hundreds_of_scorers_leave_nothing_behind() -> None:
 
 def test_a_scorer_forgotten_without_close_gives_its_texture_back() -> None:
     scorer = OpenGLScorer(HandShape(), sums="gpu")
-    scorer.observe(scene()[0])
+    scorer.set_target(scene()[0])
     shared, (texture,) = shared_renderer("egl"), scorer._textures
     with shared.context as gl:
         assert gl.glIsTexture(texture)
@@ -96,7 +96,7 @@ def test_a_scorer_forgotten_without_close_gives_its_texture_back() -> None:
 
 def test_a_closed_scorer_says_so() -> None:
     scorer = OpenGLScorer(HandShape())
-    scorer.observe(scene()[0])
+    scorer.set_target(scene()[0])
     scorer.close()
     scorer.close()
     with pytest.raises(RuntimeError, match="closed"):
@@ -110,12 +110,12 @@ def test_scorers_live_together() -> None:
     alone = []
     for shape, seen, sums in ((HandShape(), target, "cpu"), (HandShape(side="left", scale=1.2), small, "gpu")):
         with OpenGLScorer(shape, sums=sums) as scorer:  # type: ignore[arg-type]
-            scorer.observe(seen)
+            scorer.set_target(seen)
             alone.append(scorer.score(poses))
     first, second = OpenGLScorer(HandShape()), OpenGLScorer(HandShape(side="left", scale=1.2), sums="gpu")
     with first, second:
-        first.observe(target)
-        second.observe(small)
+        first.set_target(target)
+        second.set_target(small)
         for _ in range(3):
             np.testing.assert_array_equal(first.score(poses), alone[0])
             np.testing.assert_array_equal(second.score(poses), alone[1])
@@ -128,7 +128,7 @@ def test_threads_take_turns_and_score_alike() -> None:
 
     def work(index: int) -> None:
         with OpenGLScorer(HandShape(), sums="gpu" if index % 2 else "cpu") as scorer:
-            scorer.observe(target)
+            scorer.set_target(target)
             results[index] = np.stack([scorer.score(poses) for _ in range(10)])
 
     threads = [threading.Thread(target=work, args=(index,)) for index in range(4)]
@@ -152,7 +152,7 @@ def test_nothing_stays_current_outside_a_call() -> None:
         gl.glBindTexture(gl.GL_TEXTURE_2D, name)
         target, poses = scene()
         with OpenGLScorer(HandShape()) as scorer:
-            scorer.observe(target)
+            scorer.set_target(target)
             scorer.score(poses)
         assert int(gl.glGetIntegerv(gl.GL_TEXTURE_BINDING_2D)) == name
     outer.close()
@@ -162,14 +162,14 @@ def test_nothing_stays_current_outside_a_call() -> None:
 def test_released_contexts_are_refused_and_new_ones_work() -> None:
     target, poses = scene()
     scorer = OpenGLScorer(HandShape())
-    scorer.observe(target)
+    scorer.set_target(target)
     before = scorer.score(poses)
     release_renderers()
     with pytest.raises(OpenGLError, match="released"):
         scorer.score(poses)
     scorer.close()
     with OpenGLScorer(HandShape()) as fresh:
-        fresh.observe(target)
+        fresh.set_target(target)
         np.testing.assert_array_equal(fresh.score(poses), before)
 
 
@@ -189,7 +189,7 @@ from depthtrack.rendering.opengl.scorer import OpenGLScorer
 from tests.rendering.test_opengl_contexts import scene
 scorer = OpenGLScorer(HandShape())
 target, poses = scene()
-scorer.observe(target)
+scorer.set_target(target)
 scorer.score(poses)
 read, write = os.pipe()
 if os.fork() == 0:

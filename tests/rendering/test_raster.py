@@ -44,7 +44,7 @@ def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random
     """An imperfect observation of a pose: holes in the depth, and skin labels that are wrong here and there."""
     empty = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
     oracle = OracleScorer(shape)
-    oracle.observe(empty)
+    oracle.set_target(empty)
     depth = oracle.render(pose)
     skin = (depth > 0) ^ (rng.random(camera.shape) < 0.02)
     return Target(camera, skin, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
@@ -60,8 +60,8 @@ def agree(shape: HandShape, target: Target, poses: np.ndarray, objective: Object
     """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3 but for pixels whose
     match hangs on the last bit of a depth."""
     fast, oracle = RasterScorer(shape, objective), OracleScorer(shape, objective)
-    fast.observe(target)
-    oracle.observe(target)
+    fast.set_target(target)
+    oracle.set_target(target)
     terms, expected = fast.terms(poses), oracle.terms(poses)
     np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
     np.testing.assert_allclose(fast.score(poses), terms.energy, rtol=1e-12)
@@ -121,7 +121,7 @@ def test_agrees_with_the_oracle_where_views_are_absurd(
     target = target_of(shape, random_poses(rng, 1, (0, 0, 0.4), 0)[0], camera, rng)
     if name in ("behind", "outside"):
         fast = RasterScorer(shape)
-        fast.observe(target)
+        fast.set_target(target)
         assert not any(fast.render(pose).any() for pose in poses)
     agree(shape, target, poses)
 
@@ -142,10 +142,10 @@ def test_the_best_pose_is_the_observed_one() -> None:
     shape, poses = HandShape(), random_poses(rng, 20, (0, 0, 0.5), 0.02)
     camera = window_on(shape, poses[4], 224)
     oracle = OracleScorer(shape)
-    oracle.observe(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    oracle.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
     depth = oracle.render(poses[4])
     scorer = RasterScorer(shape)
-    scorer.observe(Target(camera, depth > 0, depth))
+    scorer.set_target(Target(camera, depth > 0, depth))
     terms = scorer.terms(poses)
     assert terms.energy.argmin() == 4
     assert terms.depth[4] < 0.01  # what remains is the float32 of the rendered depth
@@ -158,8 +158,8 @@ def test_the_same_bits_for_any_number_of_threads(threads: int) -> None:
     shape, poses = HandShape(), random_poses(rng, 301, (0, 0, 0.5), 0.1)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 96), rng)
     with RasterScorer(shape) as one, RasterScorer(shape, threads=threads) as many:
-        one.observe(target)
-        many.observe(target)
+        one.set_target(target)
+        many.set_target(target)
         np.testing.assert_array_equal(one.score(poses), many.score(poses))
         np.testing.assert_array_equal(one.score(poses[:1]), many.score(poses[:1]))
         assert one.score(poses[:0]).shape == (0,)
@@ -174,8 +174,8 @@ def test_scores_do_not_depend_on_what_was_scored_before() -> None:
     used = RasterScorer(shape)
     for target in (large, small, large):
         fresh = RasterScorer(shape)
-        used.observe(target)
-        fresh.observe(target)
+        used.set_target(target)
+        fresh.set_target(target)
         np.testing.assert_array_equal([used.score(p[None])[0] for p in poses], fresh.score(poses))
 
 
@@ -191,7 +191,7 @@ def test_many_scorers_leave_no_threads_behind() -> None:
 @pytest.mark.parametrize("poses", [np.zeros(27), np.zeros((2, 26)), np.full((1, 27), np.nan)])
 def test_poses_of_the_wrong_form_are_refused(poses: np.ndarray) -> None:
     scorer = RasterScorer(HandShape())
-    scorer.observe(
+    scorer.set_target(
         target_of(
             HandShape(),
             random_poses(np.random.default_rng(0), 1, (0, 0, 0.5), 0)[0],

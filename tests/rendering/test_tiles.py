@@ -17,8 +17,8 @@ def test_images_come_back_as_they_were_stored(height: int, width: int, seed: int
     image = np.random.default_rng(seed).normal(size=(height, width)).astype(np.float32)
     stored = new_stripes(image.shape)
     assert stored.ctypes.data % 64 == 0
-    stripes, blocks = stripe_counts(image.shape)
-    assert stored.size == stripes * blocks * BLOCK
+    tiles, blocks = stripe_counts(image.shape)
+    assert stored.size == tiles * blocks * BLOCK
     write_stripes(image, np.nan, stored)
     np.testing.assert_array_equal(read_stripes(stored, image.shape), image)
     assert np.count_nonzero(np.isnan(stored)) == stored.size - image.size

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.raster.work_queue.queue import give_back, is_done, new_tickets, offer, take, tell_to_leave
+from depthtrack.rendering.raster.work_queue.queue import done, is_done, new_tickets, pop, submit, tell_to_leave
 from depthtrack.rendering.raster.work_queue.worker import Helper
 from tests.rendering.test_raster import random_poses, target_of, window_on
 
 
 @numba.njit(nogil=True)
-def _count(tickets: NDArray[np.int64], thread: int, patience: int, counts: NDArray[np.int64]) -> None:
+def _count(tickets: NDArray[np.int64], thread: int, spin_limit: int, counts: NDArray[np.int64]) -> None:
     """Note every ticket that this thread gets."""
     while True:
-        n = take(tickets, thread, patience)
+        n = pop(tickets, thread, spin_limit)
         if n < 0:
             break
         counts[thread, n] += 1
-        give_back(tickets, thread)
+        done(tickets, thread)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 4])
@@ -39,7 +39,7 @@ def test_every_ticket_is_taken_once_batch_after_batch(threads: int) -> None:
     rng = np.random.default_rng(threads)
     for size in [0, 1, 300, 2, *rng.integers(0, 300, 2000)]:
         counts[:] = 0
-        offer(tickets, size)
+        submit(tickets, size)
         while not is_done(tickets):
             _count(tickets, 0, 1000, counts)
         np.testing.assert_array_equal(counts.sum(axis=0), np.arange(300) < size)
@@ -92,8 +92,8 @@ def test_batches_and_observations_of_any_size_follow_each_other() -> None:
     with RasterScorer(shape) as one, RasterScorer(shape, threads=3) as many:
         for count in (3, 700, 1, 300, 65, 2):
             for target in targets:
-                one.observe(target)
-                many.observe(target)
+                one.set_target(target)
+                many.set_target(target)
                 for _ in range(5):
                     np.testing.assert_array_equal(one.score(poses[:count]), many.score(poses[:count]))
 
@@ -103,7 +103,7 @@ def test_a_scorer_that_is_forgotten_ends_its_threads() -> None:
     rng = np.random.default_rng(3)
     shape, poses = HandShape(), random_poses(rng, 64, (0, 0, 0.5), 0.1)
     scorer = RasterScorer(shape, threads=3)
-    scorer.observe(target_of(shape, poses[0], window_on(shape, poses[0], 64), rng))
+    scorer.set_target(target_of(shape, poses[0], window_on(shape, poses[0], 64), rng))
     scorer.score(poses)
     assert threading.active_count() == before + 2
     del scorer

@@ -19,8 +19,8 @@ from depthtrack.report.build import write_report
 from depthtrack.report.film import film_of
 from depthtrack.report.narrative import standings, verdict
 from depthtrack.report.pictures import SideBySide
-from depthtrack.report.provenance import at_home, fairness
-from depthtrack.report.series import Shown, over_time, shares, top_of_scale, worst_frames
+from depthtrack.report.provenance import bias_warning, matched_model
+from depthtrack.report.series import TrackerSeries, over_time, shares, top_of_scale, worst_frames
 from tests.run_samples import synthesise, true_poses, write_run
 
 FRAMES = 8
@@ -168,7 +168,7 @@ def test_runs_without_frames_are_refused(recording: Path, tmp_path: Path) -> Non
 def test_a_film_keeps_within_its_bytes(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(films, "LEAST_PICTURES", 2)
     monkeypatch.setattr(films, "FASTEST", 1000.0)
-    shown = [Shown(line, number) for number, line in enumerate(lines_of(evaluations))]
+    shown = [TrackerSeries(line, number) for number, line in enumerate(lines_of(evaluations))]
     painter = SideBySide(shown, "endpoint_error_mm", height=60)
     whole = film_of(painter, 10_000_000)
     assert len(whole.pictures) == FRAMES
@@ -254,12 +254,14 @@ def test_a_single_tracker_is_told_for_itself() -> None:
 
 def test_the_headline_says_where_a_tracker_is_at_home() -> None:
     lines: list[Line] = [Told("a", "PSO", 3.0), Told("a", "IK", 2.0)]
-    assert said(lines, at_home=("IK",)).startswith("On its home ground, IK follows the hand more closely than PSO.")
-    assert said(lines, at_home=("PSO",)).startswith(
+    assert said(lines, matched_model=("IK",)).startswith(
+        "On its home ground, IK follows the hand more closely than PSO."
+    )
+    assert said(lines, matched_model=("PSO",)).startswith(
         "On the home ground of PSO, IK follows the hand more closely than PSO."
     )
     lines.append(Told("b", "PSO", 1.0))
-    assert said(lines, at_home=("IK",)).startswith(
+    assert said(lines, matched_model=("IK",)).startswith(
         "Neither tracker is the closest everywhere, on the home ground of IK."
     )
     assert "home ground" not in said(lines)
@@ -331,13 +333,13 @@ def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, 
     skin = write_run(tmp_path / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin")
     compared = [*evaluations[:2], evaluate_run(skin, residuals=False)]
     lines = lines_of(compared)
-    told = fairness({"model": "skin"}, lines)
+    told = bias_warning({"model": "skin"}, lines)
     assert told.startswith("Home ground")
     assert "that Skin fits, and Far <b> and Near do not" in told
-    assert "that Far <b> and Near fit, and Skin does not" in fairness({"model": "primitives"}, lines)
-    assert fairness({"sensor": "kinect1"}, lines) == ""
-    assert at_home({"model": "skin"}, lines) == ("Skin",)
+    assert "that Far <b> and Near fit, and Skin does not" in bias_warning({"model": "primitives"}, lines)
+    assert bias_warning({"sensor": "kinect1"}, lines) == ""
+    assert matched_model({"model": "skin"}, lines) == ("Skin",)
     write_report(compared, tmp_path / "report.html")
     text = Reader((tmp_path / "report.html").read_text(encoding="utf-8")).text
     assert "On the home ground of Far <b> and Near, Skin follows the hand most closely of three trackers" in text
-    assert at_home({"model": "skin"}, lines[:1]) == ()
+    assert matched_model({"model": "skin"}, lines[:1]) == ()

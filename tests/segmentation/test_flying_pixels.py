@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.flying_pixels import STEEPEST, flying_pixels
-from depthtrack.segmentation.observation import Observer
+from depthtrack.segmentation.observation import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 FOCAL = 366.0
@@ -58,7 +58,7 @@ def test_an_observation_is_rid_of_them(coloured: bool) -> None:
     beside = np.logical_or.reduce([np.roll(padded, step, axis) for step in (-1, 1) for axis in (0, 1)])[1:-1, 1:-1]
     outline = beside & ~frame.mask & (rng.random(depth.shape) < 0.5)
     depth[outline] = frame.depth[frame.mask].max() + 0.05 * rng.uniform(0.5, 1.5, np.count_nonzero(outline))
-    o = Observer().observe(Frame(0, 0.0, depth, frame.colour if coloured else None, camera))
+    o = Segmenter().segment(Frame(0, 0.0, depth, frame.colour if coloured else None, camera))
     assert o is not None
     left, top = o.origin
     seen = np.zeros(depth.shape, np.bool_)

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.roi_tracking import _READING, HandPlace, _reachable, find_expected
-from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinModel
+from depthtrack.segmentation.roi_tracking import _READING, RoiPrior, _reachable, segment_roi
+from depthtrack.segmentation.segmenter import HandLocator
+from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinColourModel
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
@@ -23,19 +23,19 @@ def frame_of(index: int) -> Frame:
     return Frame(index, made.timestamp, made.depth.astype(np.float32), made.colour, MADE.sensor.camera)
 
 
-def place_of(index: int, error: float = 0.0) -> HandPlace:
+def place_of(index: int, error: float = 0.0) -> RoiPrior:
     """The true place of frame `index`, moved by `error` metres."""
     pose = MADE.poses[index].copy()
     pose[:3] += error
     wrist = MODEL.joints(pose)[0]
     axis = wrist - pose[:3]
-    return HandPlace(pose[:3], 0.19, WristPlane(wrist, axis / np.linalg.norm(axis)))
+    return RoiPrior(pose[:3], 0.19, WristPlane(wrist, axis / np.linalg.norm(axis)))
 
 
 @pytest.mark.parametrize("index", [0, 120, 257, 320, 345])
 def test_cuts_out_the_hand_where_it_is_expected(index: int) -> None:
     """Among them a hand that shows its edge, which a search loses."""
-    found = find_expected(frame_of(index), place_of(index, error=0.004), AdaptiveSkin(SkinModel.default()))
+    found = segment_roi(frame_of(index), place_of(index, error=0.004), AdaptiveSkin(SkinColourModel.default()))
     assert found is not None
     mask = np.zeros(MADE.sensor.camera.shape, np.bool_)
     mask[found.window.slices] = found.skin
@@ -67,15 +67,15 @@ def test_reach_kernel_equals_plain_geometry(seed: int) -> None:
 def test_nothing_expected_is_there() -> None:
     camera = MADE.sensor.camera
     empty = Frame(0, 0.0, np.zeros(camera.shape, np.float32), None, camera)
-    assert find_expected(empty, place_of(0), None) is None
-    behind = HandPlace(np.array([0, 0, -0.5]), 0.2, place_of(0).wrist)
-    assert find_expected(frame_of(0), behind, None) is None
+    assert segment_roi(empty, place_of(0), None) is None
+    behind = RoiPrior(np.array([0, 0, -0.5]), 0.2, place_of(0).wrist)
+    assert segment_roi(frame_of(0), behind, None) is None
 
 
 def test_a_segmenter_searches_where_the_guide_was_wrong() -> None:
-    segmenter = Segmenter(SkinModel.default())
-    nowhere = HandPlace(np.array([-0.2, -0.15, 0.3]), 0.05, place_of(0).wrist)
-    found = segmenter.segment(frame_of(0), nowhere)
+    segmenter = HandLocator(SkinColourModel.default())
+    nowhere = RoiPrior(np.array([-0.2, -0.15, 0.3]), 0.05, place_of(0).wrist)
+    found = segmenter.locate(frame_of(0), nowhere)
     assert found is not None
     assert np.linalg.norm(found.centre - MADE.poses[0][:3]) < 0.06
 
@@ -84,9 +84,9 @@ def test_a_segmenter_goes_on_from_where_it_was_guided() -> None:
     """Guided for a few frames and then left alone, it cuts about as well as one that was alone all the time."""
     overlaps = {}
     for guided in (True, False):
-        segmenter = Segmenter(SkinModel.default())
+        segmenter = HandLocator(SkinColourModel.default())
         for index in range(100, 108):
-            found = segmenter.segment(frame_of(index), place_of(index) if guided and index < 107 else None)
+            found = segmenter.locate(frame_of(index), place_of(index) if guided and index < 107 else None)
         assert found is not None
         assert (found.arm_direction is None) == (found.wrist is None)
         mask = np.zeros(MADE.sensor.camera.shape, np.bool_)

@@ -26,8 +26,8 @@ from depthtrack.segmentation.pixel_labels import (
     READING,
     sort_pixels,
 )
-from depthtrack.segmentation.segmenter import DEPTH_WINDOW, Segmentation, Segmenter
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.segmenter import DEPTH_WINDOW, HandLocator, Segmentation
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 Mask = np.ndarray
@@ -62,11 +62,11 @@ def overlap(found: Segmentation | None, mask: Mask) -> float:
 
 def test_a_hand_with_forearm_in_a_cluttered_room() -> None:
     """A bookshelf of skin's colour right behind, a face beside: a sequence followed from its first frame."""
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
     overlaps, wrists = [], []
     for index in range(0, 40, 2):
         frame, mask, wrist = made(CLUTTERED, index)
-        found = segmenter.segment(frame)
+        found = segmenter.locate(frame)
         overlaps.append(overlap(found, mask))
         assert found is not None
         assert found.wrist is not None
@@ -80,16 +80,16 @@ def test_every_frame_may_be_the_first(sensor: str) -> None:
     options = Synthesis(motion="signs", sensor=sensor, background="room", seed=3)  # type: ignore[arg-type]
     for index in (0, 60, 150):
         frame, mask, _ = made(options, index)
-        assert overlap(Segmenter(SkinModel.default()).segment(frame), mask) > 0.8
-        assert overlap(Segmenter(None).segment(frame), mask) > 0.75
+        assert overlap(HandLocator(SkinColourModel.default()).locate(frame), mask) > 0.8
+        assert overlap(HandLocator(None).locate(frame), mask) > 0.75
 
 
 def test_a_ring_of_fingers_is_seen_through() -> None:
     """Thumb and index touch, and the shelf behind them has the colour of skin."""
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
     for index in range(284, 296, 2):
         frame, mask, _ = made(CLUTTERED, index)
-        found = segmenter.segment(frame)
+        found = segmenter.locate(frame)
     assert found is not None
     whole = np.zeros_like(mask)
     whole[found.window.slices] = found.skin
@@ -100,24 +100,24 @@ def test_a_ring_of_fingers_is_seen_through() -> None:
 @pytest.mark.parametrize("model", ["skin", "primitives"])
 def test_hands_of_both_kinds_are_cut_at_the_same_wrist(model: str) -> None:
     options = replace(CLUTTERED, model=model)  # type: ignore[arg-type]
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
     overlaps = []
     for index in range(200, 240, 4):
         frame, mask, _ = made(options, index)
-        overlaps.append(overlap(segmenter.segment(frame), mask))
+        overlaps.append(overlap(segmenter.locate(frame), mask))
     assert np.mean(overlaps) > 0.94
 
 
 def test_depth_alone_follows_the_hand() -> None:
-    segmenter = Segmenter(None)
+    segmenter = HandLocator(None)
     for index in range(0, 20, 2):
         frame, mask, _ = made(CLUTTERED, index)
-        assert overlap(segmenter.segment(without_colour(frame)), mask) > 0.85
+        assert overlap(segmenter.locate(without_colour(frame)), mask) > 0.85
 
 
 def test_a_hand_without_an_arm_is_not_cut() -> None:
     frame, mask, _ = made(Synthesis(motion="everyday", sensor="ideal", forearm=False), 0)
-    found = Segmenter(SkinModel.default()).segment(frame)
+    found = HandLocator(SkinColourModel.default()).locate(frame)
     assert found is not None
     assert found.wrist is None
     assert found.arm_direction is None
@@ -126,7 +126,7 @@ def test_a_hand_without_an_arm_is_not_cut() -> None:
 
 def test_the_arm_points_from_hand_to_forearm() -> None:
     frame, _, wrist = made(CLUTTERED, 0)
-    found = Segmenter(SkinModel.default()).segment(frame)
+    found = HandLocator(SkinColourModel.default()).locate(frame)
     assert found is not None
     assert found.arm_direction is not None
     along = wrist - found.centre
@@ -139,10 +139,10 @@ def test_an_empty_room_has_no_hand() -> None:
     # Beyond a metre there are the bookshelf, of skin's colour, the table, and a bystander with a face.
     far = frame.depth * (frame.depth > 1.0)
     empty = replace(frame, depth=far.astype(np.float32))
-    assert Segmenter(SkinModel.default()).segment(replace(frame, depth=np.zeros_like(frame.depth))) is None
-    assert Segmenter(SkinModel.default()).segment(empty) is None
+    assert HandLocator(SkinColourModel.default()).locate(replace(frame, depth=np.zeros_like(frame.depth))) is None
+    assert HandLocator(SkinColourModel.default()).locate(empty) is None
     flat = replace(frame, depth=np.full(frame.depth.shape, 0.8, np.float32), colour=None)
-    assert Segmenter(None).segment(flat) is None
+    assert HandLocator(None).locate(flat) is None
 
 
 def test_a_ball_as_large_as_a_head_is_no_hand() -> None:
@@ -151,24 +151,24 @@ def test_a_ball_as_large_as_a_head_is_no_hand() -> None:
     T[2, 3] = 0.6
     ball = raycast(camera, np.array([SPHERE]), (T @ sphere(0.0, 0.09))[None], np.array([0]))
     frame = Frame(0, 0.0, ball.depth.astype(np.float32), None, camera)
-    assert Segmenter(None).segment(frame) is None
+    assert HandLocator(None).locate(frame) is None
 
 
 def test_a_hand_lost_is_found_again() -> None:
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
     frame, mask, _ = made(CLUTTERED, 0)
-    assert segmenter.segment(frame) is not None
+    assert segmenter.locate(frame) is not None
     gone = replace(frame, depth=np.zeros_like(frame.depth), timestamp=frame.timestamp + 1 / 30)
-    assert segmenter.segment(gone) is None
+    assert segmenter.locate(gone) is None
     again = replace(frame, timestamp=frame.timestamp + 2 / 30)
-    assert overlap(segmenter.segment(again), mask) > 0.9
+    assert overlap(segmenter.locate(again), mask) > 0.9
 
 
 def test_a_hand_far_from_its_last_place_is_found_again() -> None:
     """Farther than the window that is searched first."""
-    segmenter = Segmenter(SkinModel.default())
+    segmenter = HandLocator(SkinColourModel.default())
     frame, mask, _ = made(Synthesis(motion="everyday", sensor="ideal", forearm=False), 0)
-    assert segmenter.segment(frame) is not None
+    assert segmenter.locate(frame) is not None
     shift = -150
     assert abs(shift) / frame.camera.fx * 0.5 > DEPTH_WINDOW / 2
     assert frame.colour is not None
@@ -179,7 +179,7 @@ def test_a_hand_far_from_its_last_place_is_found_again() -> None:
         depth=np.roll(farther, shift, axis=1),
         colour=np.roll(frame.colour, shift, axis=1),
     )
-    assert overlap(segmenter.segment(moved), np.roll(mask, shift, axis=1)) > 0.9
+    assert overlap(segmenter.locate(moved), np.roll(mask, shift, axis=1)) > 0.9
 
 
 def test_a_hand_at_the_border_is_found_as_far_as_it_is_seen() -> None:
@@ -188,7 +188,7 @@ def test_a_hand_at_the_border_is_found_as_far_as_it_is_seen() -> None:
     camera = frame.camera.crop(0, top, frame.camera.width, frame.camera.height - top)
     assert frame.colour is not None
     cut = replace(frame, depth=frame.depth[top:].copy(), colour=frame.colour[top:].copy(), camera=camera)
-    found = Segmenter(SkinModel.default()).segment(cut)
+    found = HandLocator(SkinColourModel.default()).locate(cut)
     assert overlap(found, mask[top:]) > 0.95
     assert found is not None
     assert found.window.top == 0
@@ -196,7 +196,7 @@ def test_a_hand_at_the_border_is_found_as_far_as_it_is_seen() -> None:
 
 def test_observations_lie_where_the_frame_saw_them() -> None:
     frame, _, _ = made(CLUTTERED, 0)
-    found = Segmenter(SkinModel.default()).segment(frame)
+    found = HandLocator(SkinColourModel.default()).locate(frame)
     assert found is not None
     observation = Observation.of(frame, found)
     assert observation.skin.shape == observation.depth.shape == observation.camera.shape
@@ -213,8 +213,8 @@ def test_observations_lie_where_the_frame_saw_them() -> None:
 
 def test_more_of_the_forearm_is_kept_on_demand() -> None:
     frame, _, _ = made(CLUTTERED, 0)
-    usual = Segmenter(SkinModel.default()).segment(frame)
-    more = Segmenter(SkinModel.default(), wrist_margin=0.03).segment(frame)
+    usual = HandLocator(SkinColourModel.default()).locate(frame)
+    more = HandLocator(SkinColourModel.default(), wrist_margin=0.03).locate(frame)
     assert usual is not None
     assert more is not None
     assert usual.wrist is not None
@@ -225,8 +225,8 @@ def test_more_of_the_forearm_is_kept_on_demand() -> None:
 
 def test_the_same_frames_give_the_same_masks() -> None:
     def masks() -> list[np.ndarray]:
-        segmenter = Segmenter(SkinModel.default())
-        found = [segmenter.segment(made(CLUTTERED, index)[0]) for index in (0, 2, 4)]
+        segmenter = HandLocator(SkinColourModel.default())
+        found = [segmenter.locate(made(CLUTTERED, index)[0]) for index in (0, 2, 4)]
         return [each.skin for each in found if each is not None]
 
     for one, two in zip(masks(), masks(), strict=True):
@@ -253,13 +253,13 @@ def slow_kind(
     ]
     if not around:
         return NOTHING
-    sure = [node for node in around if labels[node] != BESIDE]
-    if not sure:
+    guide_confidence = [node for node in around if labels[node] != BESIDE]
+    if not guide_confidence:
         return OTHER if z > 0 else NOTHING
     if z > 0:
-        best = min(sure, key=lambda node: abs(nodes[node] - np.float32(z)))
+        best = min(guide_confidence, key=lambda node: abs(nodes[node] - np.float32(z)))
     else:
-        best = min(sure, key=lambda node: (node[0] - i) ** 2 + (node[1] - j) ** 2)
+        best = min(guide_confidence, key=lambda node: (node[0] - i) ** 2 + (node[1] - j) ** 2)
     hand = labels[best] == HAND
     if {HAND, ARM} <= {int(labels[node]) for node in around}:
         point = camera.unproject((u, v), z if z > 0 else float(nodes[best]))

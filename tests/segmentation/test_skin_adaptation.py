@@ -13,7 +13,7 @@ from depthtrack.segmentation.skin_colour import (
     OFFLINE_WEIGHT,
     WINDOW,
     AdaptiveSkin,
-    SkinModel,
+    SkinColourModel,
     chroma_distribution,
     count_colours,
 )
@@ -81,7 +81,7 @@ def seen(colour: tuple[int, int, int], is_skin: bool) -> tuple[np.ndarray, np.nd
 
 
 def test_adaptation_is_the_published_blend() -> None:
-    skin, window, colour = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20), (120, 110, 130)
+    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20), (120, 110, 130)
     u, v = divmod(plain_bin(*colour), BINS)
     before = skin.posterior()
     image, found, hand = seen(colour, is_skin=True)
@@ -94,7 +94,7 @@ def test_adaptation_is_the_published_blend() -> None:
 
 
 def test_adaptation_forgets_after_its_window() -> None:
-    skin, window, colour = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20), (205, 150, 125)
+    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20), (205, 150, 125)
     u, v = divmod(plain_bin(*colour), BINS)
     before = skin.posterior()[u, v]
     image, nothing, nowhere = seen(colour, is_skin=False)
@@ -110,7 +110,7 @@ def test_adaptation_forgets_after_its_window() -> None:
 
 def test_what_is_skin_elsewhere_teaches_nothing() -> None:
     """A face, or the arm: skin that is not the hand's."""
-    skin, window = AdaptiveSkin(SkinModel.default()), Window(0, 0, 30, 20)
+    skin, window = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20)
     before = skin.posterior()
     skin.learn(
         np.full((20, 30, 3), (205, 150, 125), np.uint8),

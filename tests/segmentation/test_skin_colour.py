@@ -16,7 +16,7 @@ from depthtrack.segmentation.skin_colour import (
     NOT_SKIN,
     SURELY_SKIN,
     AdaptiveSkin,
-    SkinModel,
+    SkinColourModel,
     grow_skin,
 )
 
@@ -27,7 +27,7 @@ def test_posterior_is_bayes_rule() -> None:
     skin, other = np.zeros((BINS, BINS)), np.zeros((BINS, BINS))
     skin[10, 20], skin[11, 20] = 3, 1
     other[10, 20], other[40, 40] = 1, 4
-    posterior = SkinModel(skin, other, prior=0.25).posterior()
+    posterior = SkinColourModel(skin, other, prior=0.25).posterior()
     # P(c | s) = 3/4, P(c | not s) = 1/5: 0.75 * 0.25 / (0.75 * 0.25 + 0.2 * 0.75)
     assert posterior[10, 20] == pytest.approx(0.1875 / 0.3375)
     assert posterior[11, 20] == 1
@@ -59,14 +59,14 @@ def painted() -> np.ndarray:
 
 
 def test_published_statistics_know_skin_from_sky_and_leaves() -> None:
-    found = AdaptiveSkin(SkinModel.default()).find(painted(), Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
+    found = AdaptiveSkin(SkinColourModel.default()).find(painted(), Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
     expected = np.zeros((20, 30), np.bool_)
     expected[4:12, 6:18] = True
     np.testing.assert_array_equal(found > 0, expected)
 
 
 def test_only_the_window_and_blocks_asked_for_are_looked_at() -> None:
-    skin, window = AdaptiveSkin(SkinModel.default()), Window(2, 3, 22, 13)
+    skin, window = AdaptiveSkin(SkinColourModel.default()), Window(2, 3, 22, 13)
     whole = skin.find(painted(), Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
     np.testing.assert_array_equal(skin.find(painted(), window, np.ones((1, 1), np.uint8), 20), whole[3:13, 2:22])
     blocks = np.array([[1, 0], [1, 0]], np.uint8)
@@ -78,14 +78,16 @@ def test_only_the_window_and_blocks_asked_for_are_looked_at() -> None:
 def test_black_and_white_are_no_skin() -> None:
     image = np.zeros((4, 8, 3), np.uint8)
     image[:, 4:] = 255
-    assert not AdaptiveSkin(SkinModel.default()).find(image, Window(0, 0, 8, 4), np.ones((1, 1), np.uint8), 8).any()
+    assert (
+        not AdaptiveSkin(SkinColourModel.default()).find(image, Window(0, 0, 8, 4), np.ones((1, 1), np.uint8), 8).any()
+    )
 
 
 def test_training_learns_the_colours_it_is_shown() -> None:
     image, mask = painted(), np.zeros((20, 30), np.bool_)
     mask[:10] = True  # the sky is called skin
     mask[4:12, 6:18] = False
-    model = SkinModel.train([(image, mask)])
+    model = SkinColourModel.train([(image, mask)])
     assert model.prior == pytest.approx(mask.mean())
     found = AdaptiveSkin(model).find(image, Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30) > 0
     np.testing.assert_array_equal(found, mask)
@@ -94,13 +96,13 @@ def test_training_learns_the_colours_it_is_shown() -> None:
 @pytest.mark.parametrize("mask", [np.zeros((20, 30), np.bool_), np.ones((20, 30), np.bool_)])
 def test_training_needs_skin_and_other_pixels(mask: np.ndarray) -> None:
     with pytest.raises(InputError, match="skin and of other"):
-        SkinModel.train([(painted(), mask)])
+        SkinColourModel.train([(painted(), mask)])
 
 
 def test_models_survive_their_file(tmp_path: Path) -> None:
-    model = SkinModel.default()
+    model = SkinColourModel.default()
     model.save(tmp_path / "skin.json")
-    loaded = SkinModel.load(tmp_path / "skin.json")
+    loaded = SkinColourModel.load(tmp_path / "skin.json")
     np.testing.assert_allclose(loaded.posterior(), model.posterior(), atol=1e-12)
     assert [path.name for path in tmp_path.iterdir()] == ["skin.json"]
 
@@ -118,7 +120,7 @@ def test_models_survive_their_file(tmp_path: Path) -> None:
 )
 def test_files_that_are_no_model_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
     path = tmp_path / "skin.json"
-    SkinModel.default().save(path)
+    SkinColourModel.default().save(path)
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
     with pytest.raises(InputError, match="skin model"):
-        SkinModel.load(path)
+        SkinColourModel.load(path)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from depthtrack.hand.compiled_kinematics import Bodies, Chain
+from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES, retract
@@ -16,12 +16,12 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import load_synergies
 from depthtrack.solver import gauss_newton as solver
 from depthtrack.solver import normal_equations as sums
-from depthtrack.solver.correspondences import Cloud, Matches
-from depthtrack.solver.gauss_newton import Damping, Solution
-from depthtrack.solver.normal_equations import Moments
+from depthtrack.solver.correspondences import Correspondences, PointCloud
+from depthtrack.solver.gauss_newton import Damping, SolverState
+from depthtrack.solver.normal_equations import NormalEquations
 from depthtrack.solver.prior import Prior
-from depthtrack.solver.residuals import Residual, add_matches, weight
-from depthtrack.solver.subspace import FULL, Space
+from depthtrack.solver.residuals import Residual, add_correspondences, weight
+from depthtrack.solver.subspace import FULL, PostureSubspace
 from tests.hand.test_compiled_kinematics import random_pose
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -35,27 +35,27 @@ class Problem:
     """Random matches of a random hand, some points without one; `rows` (M, 3 or 1, 3) are the directions in which
     each distance counts."""
 
-    def __init__(self, seed: int, residual: Residual, softness: float, count: int = 60) -> None:
+    def __init__(self, seed: int, residual: Residual, kernel_scale: float, count: int = 60) -> None:
         rng = np.random.default_rng(seed)
-        self.residual, self.softness = residual, softness
+        self.residual, self.kernel_scale = residual, kernel_scale
         self.pose = random_pose(rng)
         body = rng.integers(-1, 16, count)
         self.local = rng.normal(0, 0.02, (count, 3))
-        x = HAND.place(self.pose, np.maximum(body, 0), self.local)
-        self.matches = Matches(body, x, _unit(rng.normal(size=(count, 3))))
-        self.cloud = Cloud(x + rng.normal(0, 0.008, (count, 3)), _unit(rng.normal(size=(count, 3))))
-        self.bodies, self.moments = Bodies.at(CHAIN, self.pose), Moments.empty()
-        sums.clear(self.moments, self.bodies)
-        add_matches(self.moments, self.matches, self.cloud, residual, softness)
+        x = HAND.transform_points(self.pose, np.maximum(body, 0), self.local)
+        self.correspondences = Correspondences(body, x, _unit(rng.normal(size=(count, 3))))
+        self.cloud = PointCloud(x + rng.normal(0, 0.008, (count, 3)), _unit(rng.normal(size=(count, 3))))
+        self.bodies, self.equations = BodyPoses.at(CHAIN, self.pose), NormalEquations.empty()
+        sums.clear(self.equations, self.bodies)
+        add_correspondences(self.equations, self.correspondences, self.cloud, residual, kernel_scale)
         self.kept = body >= 0
-        normals = self.matches.n + (self.cloud.normals if residual == "symmetric" else 0)
+        normals = self.correspondences.n + (self.cloud.normals if residual == "symmetric" else 0)
         self.rows = np.tile(np.eye(3), (count, 1, 1)) if residual == "point" else _unit(normals)[:, None]
         gap = np.linalg.norm(x - self.cloud.points, axis=1)
-        self.weights = np.ones(count) if softness == 0 else 1 / (1 + (gap / softness) ** 2) ** 2
+        self.weights = np.ones(count) if kernel_scale == 0 else 1 / (1 + (gap / kernel_scale) ** 2) ** 2
 
     def residuals(self, pose: np.ndarray) -> np.ndarray:
         """(M, 3 or 1) with the matched points carried along, weights and directions unchanged."""
-        gap = HAND.place(pose, np.maximum(self.matches.body, 0), self.local) - self.cloud.points
+        gap = HAND.transform_points(pose, np.maximum(self.correspondences.body, 0), self.local) - self.cloud.points
         return np.asarray(np.einsum("nri,ni->nr", self.rows, gap))[self.kept]
 
     def energy(self, pose: np.ndarray) -> float:
@@ -63,7 +63,7 @@ class Problem:
 
     def normal_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """J^T W J and J^T W e from the dense Jacobian."""
-        J = HAND.point_jacobian(self.pose, np.maximum(self.matches.body, 0), self.matches.x)
+        J = HAND.point_jacobian(self.pose, np.maximum(self.correspondences.body, 0), self.correspondences.x)
         J = np.einsum("nri,nij->nrj", self.rows, J)[self.kept]
         w = self.weights[self.kept]
         return np.einsum("n,nri,nrj->ij", w, J, J), np.einsum("n,nri,nr->i", w, J, self.residuals(self.pose))
@@ -78,24 +78,24 @@ def _slope(function: Callable[[np.ndarray], float], size: int, h: float = 1e-6) 
     return np.array([(function(step) - function(-step)) / (2 * h) for step in steps])
 
 
-@given(seed=SEEDS, residual=RESIDUALS, softness=SOFTNESS)
-def test_normal_equations_are_those_of_the_dense_jacobian(seed: int, residual: Residual, softness: float) -> None:
-    problem = Problem(seed, residual, softness)
+@given(seed=SEEDS, residual=RESIDUALS, kernel_scale=SOFTNESS)
+def test_normal_equations_are_those_of_the_dense_jacobian(seed: int, residual: Residual, kernel_scale: float) -> None:
+    problem = Problem(seed, residual, kernel_scale)
     H, gradient = np.empty((26, 26)), np.empty(26)
-    found = sums.normal_equations(problem.moments, problem.bodies, H, gradient)
+    found = sums.normal_equations(problem.equations, problem.bodies, H, gradient)
     expected_H, expected_gradient = problem.normal_equations()
     np.testing.assert_allclose(H, expected_H, atol=1e-9 * np.abs(expected_H).max())
     np.testing.assert_allclose(gradient, expected_gradient, atol=1e-9)
     assert found == pytest.approx(problem.energy(problem.pose), rel=1e-9)
-    assert found == pytest.approx(sums.energy(problem.moments, problem.bodies), rel=1e-9)
+    assert found == pytest.approx(sums.energy(problem.equations, problem.bodies), rel=1e-9)
 
 
 @settings(max_examples=10)
-@given(seed=SEEDS, residual=RESIDUALS, softness=SOFTNESS)
-def test_the_gradient_is_the_energys_slope(seed: int, residual: Residual, softness: float) -> None:
-    problem = Problem(seed, residual, softness)
+@given(seed=SEEDS, residual=RESIDUALS, kernel_scale=SOFTNESS)
+def test_the_gradient_is_the_energys_slope(seed: int, residual: Residual, kernel_scale: float) -> None:
+    problem = Problem(seed, residual, kernel_scale)
     gradient = np.empty(26)
-    sums.normal_equations(problem.moments, problem.bodies, np.empty((26, 26)), gradient)
+    sums.normal_equations(problem.equations, problem.bodies, np.empty((26, 26)), gradient)
     slope = _slope(lambda step: problem.energy(retract(problem.pose, step)), 26)
     np.testing.assert_allclose(gradient, slope, atol=1e-7)
 
@@ -106,25 +106,25 @@ def test_after_small_steps_sums_still_tell_energy_and_slope(seed: int, residual:
     """A body's turn is followed to first order: what is left out is of second order in it."""
     problem = Problem(seed, residual, 0.01)
     pose = retract(problem.pose, np.random.default_rng(seed).normal(0, 0.004, 26))
-    bodies, gradient = Bodies.at(CHAIN, pose), np.empty(26)
-    found = sums.normal_equations(problem.moments, bodies, np.empty((26, 26)), gradient)
+    bodies, gradient = BodyPoses.at(CHAIN, pose), np.empty(26)
+    found = sums.normal_equations(problem.equations, bodies, np.empty((26, 26)), gradient)
     assert found == pytest.approx(problem.energy(pose), rel=1e-2)
-    assert found == pytest.approx(sums.energy(problem.moments, bodies), rel=1e-9)
+    assert found == pytest.approx(sums.energy(problem.equations, bodies), rel=1e-9)
     slope = _slope(lambda step: problem.energy(retract(pose, step)), 26)
     assert np.linalg.norm(gradient - slope) < 0.02 * np.linalg.norm(slope)
 
 
-@given(gap=st.floats(0, 0.1), softness=st.sampled_from([0.0, 0.003, 0.03]))
-def test_weights_are_geman_and_mcclures(gap: float, softness: float) -> None:
+@given(gap=st.floats(0, 0.1), kernel_scale=st.sampled_from([0.0, 0.003, 0.03]))
+def test_weights_are_geman_and_mcclures(gap: float, kernel_scale: float) -> None:
     x, y, z = gap * np.array([2, -1, 2]) / 3
-    expected = 1.0 if softness == 0 else (softness**2 / (softness**2 + gap**2)) ** 2
-    assert weight(x, y, z, softness) == pytest.approx(expected)
-    assert softness == 0 or weight(softness, 0.0, 0.0, softness) == pytest.approx(0.25)
+    expected = 1.0 if kernel_scale == 0 else (kernel_scale**2 / (kernel_scale**2 + gap**2)) ** 2
+    assert weight(x, y, z, kernel_scale) == pytest.approx(expected)
+    assert kernel_scale == 0 or weight(kernel_scale, 0.0, 0.0, kernel_scale) == pytest.approx(0.25)
 
 
 @given(seed=SEEDS, count=st.integers(1, 20))
 def test_synergies_reduce_the_system_as_in_equation_8(seed: int, count: int) -> None:
-    problem, space = Problem(seed, "plane", 0.0), Space.of(load_synergies("leap-grasps"), count)
+    problem, space = Problem(seed, "plane", 0.0), PostureSubspace.of(load_synergies("leap-grasps"), count)
     H, gradient = problem.normal_equations()
     A, b = np.empty((6 + count, 6 + count)), np.empty(6 + count)
     solver._reduce(H, gradient, space, A, b)
@@ -146,8 +146,8 @@ def test_the_limit_slope_is_that_of_the_papers_function(low: float, width: float
         return (high - low) ** 2 / ((high - x) * (x - low))
 
     slope = (limit_function(x + h) - limit_function(x - h)) / (2 * h)
-    assert solver.limit_slope(x, low, high) == pytest.approx(abs(slope), rel=1e-4, abs=1e-3 / width)
-    assert math.isfinite(solver.limit_slope(low, low, high))
+    assert solver.limit_gradient(x, low, high) == pytest.approx(abs(slope), rel=1e-4, abs=1e-3 / width)
+    assert math.isfinite(solver.limit_gradient(low, low, high))
 
 
 @given(seed=SEEDS, size=st.integers(1, 26))
@@ -161,12 +161,12 @@ def test_cholesky_solves_as_numpy_does(seed: int, size: int) -> None:
     assert not solver.cholesky_solve(A - (np.linalg.eigvalsh(A)[0] + 0.1) * np.eye(size), b.copy())
 
 
-def solved(problem: Problem, space: Space, damping: Damping, iterations: int) -> tuple[Solution, float]:
+def solved(problem: Problem, space: PostureSubspace, damping: Damping, iterations: int) -> tuple[SolverState, float]:
     coordinates = space.project(problem.pose[ANGLES])
     pose = problem.pose.copy()
     pose[ANGLES] = space.angles(coordinates)
-    state = Solution(pose, coordinates, np.zeros(len(coordinates)))
-    return state, solver.solve(CHAIN, problem.moments, space, damping, iterations, Bodies.empty(), state)
+    state = SolverState(pose, coordinates, np.zeros(len(coordinates)))
+    return state, solver.solve(CHAIN, problem.equations, space, damping, iterations, BodyPoses.empty(), state)
 
 
 @given(seed=SEEDS, residual=RESIDUALS, strength=st.sampled_from([1e-4, 1e-2]))
@@ -175,7 +175,7 @@ def test_one_step_is_the_damped_least_squares_one(seed: int, residual: Residual,
     problem = Problem(seed, residual, 0.0)
     problem.pose[ANGLES] = (LOWER + UPPER) / 2
     problem = _nearly_met(problem, 1e-3)
-    prior = Prior.held(problem.pose[ANGLES] + 1e-4, strength)
+    prior = Prior.towards(problem.pose[ANGLES] + 1e-4, strength)
     damping = Damping(1e-3, 1e-9, *prior, avoid_limits=False)
     state, _ = solved(problem, FULL, damping, 1)
     H, gradient = problem.normal_equations()
@@ -188,12 +188,14 @@ def test_one_step_is_the_damped_least_squares_one(seed: int, residual: Residual,
 
 def _nearly_met(problem: Problem, share: float) -> Problem:
     """The same matches in the pose as it is now, every distance this share of what it was."""
-    gap = problem.cloud.points - problem.matches.x
-    problem.bodies = Bodies.at(CHAIN, problem.pose)
-    problem.matches.x[:] = HAND.place(problem.pose, np.maximum(problem.matches.body, 0), problem.local)
-    problem.cloud.points[:] = problem.matches.x + share * gap
-    sums.clear(problem.moments, problem.bodies)
-    add_matches(problem.moments, problem.matches, problem.cloud, problem.residual, 0.0)
+    gap = problem.cloud.points - problem.correspondences.x
+    problem.bodies = BodyPoses.at(CHAIN, problem.pose)
+    problem.correspondences.x[:] = HAND.transform_points(
+        problem.pose, np.maximum(problem.correspondences.body, 0), problem.local
+    )
+    problem.cloud.points[:] = problem.correspondences.x + share * gap
+    sums.clear(problem.equations, problem.bodies)
+    add_correspondences(problem.equations, problem.correspondences, problem.cloud, problem.residual, 0.0)
     return problem
 
 
@@ -202,14 +204,14 @@ def test_solving_lessens_the_energy_within_the_limits(
     seed: int, residual: Residual, count: int | None, avoid: bool
 ) -> None:
     problem = Problem(seed, residual, 0.0)
-    space = FULL if count is None else Space.of(load_synergies(), count)
+    space = FULL if count is None else PostureSubspace.of(load_synergies(), count)
     problem.pose[ANGLES] = space.angles(space.project(problem.pose[ANGLES]))
     problem = _nearly_met(problem, 0.05)
     damping = Damping(1e-6, 1e-9, *Prior.none(), avoid_limits=avoid)
     after, energy = solved(problem, space, damping, 8)
-    assert energy < sums.energy(problem.moments, problem.bodies)
+    assert energy < sums.energy(problem.equations, problem.bodies)
     assert problem.energy(after.pose) < problem.energy(problem.pose)
-    assert energy == pytest.approx(sums.energy(problem.moments, Bodies.at(CHAIN, after.pose)), rel=1e-9)
+    assert energy == pytest.approx(sums.energy(problem.equations, BodyPoses.at(CHAIN, after.pose)), rel=1e-9)
     assert np.all((after.coordinates >= space.lower) & (after.coordinates <= space.upper))
     np.testing.assert_allclose(after.pose[ANGLES], space.angles(after.coordinates), atol=1e-9)
 
@@ -221,9 +223,10 @@ def _pulled_up(by: float) -> Problem:
     target = problem.pose.copy()
     target[ANGLES] += by
     now, then = (
-        HAND.place(pose, np.maximum(problem.matches.body, 0), problem.local) for pose in (problem.pose, target)
+        HAND.transform_points(pose, np.maximum(problem.correspondences.body, 0), problem.local)
+        for pose in (problem.pose, target)
     )
-    problem.cloud.points[:] = problem.matches.x + then - now
+    problem.cloud.points[:] = problem.correspondences.x + then - now
     return _nearly_met(problem, 1.0)
 
 
@@ -250,12 +253,12 @@ def test_limit_avoidance_slows_what_moves_towards_a_limit_and_nothing_that_leave
 @given(seed=SEEDS, count=st.integers(1, 20))
 def test_likely_postures_are_those_of_probabilistic_components(seed: int, count: int) -> None:
     synergies = load_synergies().truncated(count)
-    prior = Prior.likely(synergies, 1e-6)
+    prior = Prior.synergy_weight(synergies, 1e-6)
     covariance = synergies.components * synergies.variances @ synergies.components.T + np.radians(2) ** 2 * np.eye(20)
     np.testing.assert_allclose(prior.precision @ covariance, 1e-6 * np.eye(20), atol=1e-12)
     pose = random_pose(np.random.default_rng(seed))
     damping = Damping(0.0, 0.0, *prior.scaled(2.0), avoid_limits=False)
-    for space in (FULL, Space.of(load_synergies("leap-grasps"), 4)):
+    for space in (FULL, PostureSubspace.of(load_synergies("leap-grasps"), 4)):
         size = 6 + space.basis.shape[1]
         A, b = np.zeros((size, size)), np.zeros(size)
         pull = solver._reduced_precision(damping, space)

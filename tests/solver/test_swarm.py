@@ -10,7 +10,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, normalised, retract, tangent_between
 from depthtrack.solver.swarm import SwarmOptions, advance, constriction, minimise, randomise
-from depthtrack.solver.swarm_space import ParameterSpace, Space, TangentSpace
+from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid
 
 seeds = st.integers(0, 2**32 - 1)
@@ -83,7 +83,7 @@ def test_the_same_generator_gives_the_same_bits() -> None:
 def test_spaces_lead_to_poses_and_back(kind: type[ParameterSpace] | type[TangentSpace], seed: int) -> None:
     rng = np.random.default_rng(seed)
     reference = make_pose([0, 0, 0.5], rng.normal(size=4), rng.uniform(LOWER, UPPER))
-    space: Space = kind(reference)
+    space: SwarmSpace = kind(reference)
     poses = make_pose(rng.normal(scale=0.05, size=(6, 3)), rng.normal(size=(6, 4)), rng.uniform(LOWER, UPPER, (6, 20)))
     coordinates = space.coordinates(poses)
     assert coordinates.shape == (6, len(space.lower))

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.hand.compiled_kinematics import Bodies, Chain
+from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces import capsules
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, distance, fitted_capsules
 from depthtrack.tracking.surfaces.capsules import Distances, Placed, View
@@ -40,7 +40,7 @@ def swept(capsule: Capsules, placed: Placed, k: int, points: np.ndarray) -> np.n
 
 
 def measured(points: np.ndarray, capsule: Capsules, placed: Placed) -> Distances:
-    out = Distances.room(len(capsule.body), len(points))
+    out = Distances.allocate(len(capsule.body), len(points))
     capsules.measure(points, capsule, placed, out)
     return out
 
@@ -82,26 +82,30 @@ def test_surface_points_are_closest_and_on_the_side_that_is_seen(seed: int) -> N
         assert np.linalg.norm(n[i]) == pytest.approx(1)
 
 
-@given(seed=SEEDS, reach=st.sampled_from([0.004, 0.04]), agreement=st.sampled_from([-1.0, 0.3, 0.8]))
-def test_matches_go_to_the_nearest_capsule_that_agrees(seed: int, reach: float, agreement: float) -> None:
+@given(seed=SEEDS, max_distance=st.sampled_from([0.004, 0.04]), min_normal_cosine=st.sampled_from([-1.0, 0.3, 0.8]))
+def test_matches_go_to_the_nearest_capsule_that_agrees(
+    seed: int, max_distance: float, min_normal_cosine: float
+) -> None:
     rng = np.random.default_rng(seed)
     capsule, placed = random_capsules(rng, 5)
     normals = rng.normal([0, 0, -1], 0.5, (40, 3))
-    cloud = Cloud(rng.normal([0, 0, 0.48], 0.03, (40, 3)), normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    found, matches = measured(cloud.points, capsule, placed), Matches.room(40)
-    capsules.choose(cloud, capsule, placed, found, OPEN_VIEW, (reach, agreement), matches)
+    cloud = PointCloud(
+        rng.normal([0, 0, 0.48], 0.03, (40, 3)), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    )
+    found, correspondences = measured(cloud.points, capsule, placed), Correspondences.allocate(40)
+    capsules.choose(cloud, capsule, placed, found, OPEN_VIEW, (max_distance, min_normal_cosine), correspondences)
     x, n = np.empty((40, 3)), np.empty((40, 3))
     for i in range(40):
-        expected = -1
+        predicted_pose = -1
         for k in np.argsort(found.each[:, i]):
             capsules.surface_point(cloud.points, i, capsule, placed, int(k), x, n)
-            if found.each[k, i] < reach and n[i] @ cloud.normals[i] >= agreement:
-                expected = int(k)
+            if found.each[k, i] < max_distance and n[i] @ cloud.normals[i] >= min_normal_cosine:
+                predicted_pose = int(k)
                 break
-        assert matches.body[i] == expected
-        if expected >= 0:
-            np.testing.assert_array_equal(matches.x[i], x[i])
-            np.testing.assert_array_equal(matches.n[i], n[i])
+        assert correspondences.body[i] == predicted_pose
+        if predicted_pose >= 0:
+            np.testing.assert_array_equal(correspondences.x[i], x[i])
+            np.testing.assert_array_equal(correspondences.n[i], n[i])
 
 
 def test_what_the_rendered_hand_hides_is_passed_over() -> None:
@@ -109,17 +113,19 @@ def test_what_the_rendered_hand_hides_is_passed_over() -> None:
     one = np.ones(2)
     capsule = Capsules(np.arange(2), np.zeros((2, 3)), np.zeros((2, 3)), 0.05 * one, 0.01 * one, 0 * one)
     placed = Placed(np.array([[-0.02, 0, 0.40], [-0.02, 0, 0.43]]), np.array([[1.0, 0, 0], [1, 0, 0]]))
-    cloud = Cloud(np.array([[0.0, 0, 0.419]]), np.array([[0.0, 0, -1]]))
+    cloud = PointCloud(np.array([[0.0, 0, 0.419]]), np.array([[0.0, 0, -1]]))
     wall = View(np.full((3, 3), 0.39, np.float32), (1.0, 1.0, 1.0, 1.0))
     for view, body in ((OPEN_VIEW, 1), (wall, 0)):
-        matches = Matches.room(1)
-        capsules.choose(cloud, capsule, placed, measured(cloud.points, capsule, placed), view, (0.04, 0.3), matches)
-        assert matches.body[0] == body
+        correspondences = Correspondences.allocate(1)
+        capsules.choose(
+            cloud, capsule, placed, measured(cloud.points, capsule, placed), view, (0.04, 0.3), correspondences
+        )
+        assert correspondences.body[0] == body
 
 
 def test_capsules_move_with_their_bodies_and_lie_along_the_skin() -> None:
     pose = within_limits(random_pose(np.random.default_rng(2)))
-    bodies = Bodies.at(Chain.of(SHAPE), pose)
+    bodies = BodyPoses.at(Chain.of(SHAPE), pose)
     placed = Placed(np.empty_like(FITTED.start), np.empty_like(FITTED.start))
     capsules.place_capsules(FITTED, bodies, placed)
     R, p = bodies.T[FITTED.body, :, :3], bodies.T[FITTED.body, :, 3]

@@ -12,8 +12,8 @@ from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.stages.coarse_to_fine import FLAT_LADDER, Ladder, SingleFrameFitter
-from depthtrack.tracking.state import LostBelow
+from depthtrack.tracking.stages.coarse_to_fine import DIRECT, CoarseToFine, SingleFrameFitter
+from depthtrack.tracking.state import TrackingThresholds
 from depthtrack.tracking.surfaces.registry import Model
 from depthtrack.tracking.tracker import Estimate, Status
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
@@ -84,7 +84,7 @@ def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
     frames = range(160, 280, 2)
 
     def mean_error(options: IkOptions) -> float:
-        tracker = IkTracker(made.options.hand, replace(options, lost=LostBelow(0.0, np.inf)))
+        tracker = IkTracker(made.options.hand, replace(options, lost=TrackingThresholds(0.0, np.inf)))
         poses = [tracker.start(observe(made, frames[0]), made.poses[frames[0]]).pose]
         poses += [tracker.track(observe(made, frame)).pose for frame in frames[1:]]
         return float(angle_error(np.array(poses), made.poses[frames]).values.mean())
@@ -98,13 +98,13 @@ def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
     made = Synthesiser(Synthesis(motion="signs", model="skin"))
     synergies, frames = _synergies_of("signs"), [16, 108, 330]
 
-    def errors(ladder: Ladder) -> np.ndarray:
-        fitter = SingleFrameFitter(made.options.hand, synergies, ladder)
+    def errors(coarse_to_fine: CoarseToFine) -> np.ndarray:
+        fitter = SingleFrameFitter(made.options.hand, synergies, coarse_to_fine)
         poses = [fitter.estimate(observe(made, frame), made.poses[frame]) for frame in frames]
         return angle_error(np.array(poses), made.poses[frames]).values
 
-    assert errors(Ladder()).max() < 1
-    assert errors(FLAT_LADDER).mean() > 3
+    assert errors(CoarseToFine()).max() < 1
+    assert errors(DIRECT).mean() > 3
 
 
 def _synergies_of(motion: str) -> Synergies:
@@ -114,7 +114,7 @@ def _synergies_of(motion: str) -> Synergies:
 def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
     whole = follow(IkTracker(MADE.options.hand), range(0, 8))
     resumed = IkTracker(MADE.options.hand)
-    resumed.recall(whole[:5])
+    resumed.restore(whole[:5])
     for index in range(5, 8):
         np.testing.assert_array_equal(resumed.track(observe(MADE, index)).pose, whole[index].pose)
 

@@ -100,7 +100,7 @@ def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
     options = PsoOptions(resolution=64)
     whole = follow(PsoTracker(MADE.options.hand, options), range(0, 8))
     resumed = PsoTracker(MADE.options.hand, options)
-    resumed.recall(whole[:5])
+    resumed.restore(whole[:5])
     for index in range(5, 8):
         estimate = resumed.track(observe(MADE, index))
         np.testing.assert_array_equal(estimate.pose, whole[index].pose)
@@ -120,7 +120,7 @@ class _Recording:
 
 
 class _Observer:
-    def observe(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
+    def set_target(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
         return None if frame.index % 8 == 5 else observe(MADE, frame.index)
 
 
@@ -146,7 +146,7 @@ def test_an_interrupted_run_ends_like_one_that_was_not(tmp_path: Path, interrupt
 def test_absent_frames_forget_the_track() -> None:
     tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=64))
     follow(tracker, range(0, 3))
-    tracker.recall([ABSENT])
+    tracker.restore([ABSENT])
     assert tracker.track(observe(MADE, 3)).status is Status.STARTED
 
 

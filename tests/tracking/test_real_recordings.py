@@ -10,7 +10,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import RunWriter
-from depthtrack.segmentation.observation import Observer
+from depthtrack.segmentation.observation import Segmenter
 from depthtrack.tracking.pipeline import track_sequence
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker
 
@@ -22,7 +22,7 @@ def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: fl
     With its own wrist taken for the cut, the best union of colour and depth reaches 0.844.
     """
     sequence = open_sequence(real_data / "rgbd" / "open-close")
-    rows = [r.row() for r in segment_sequence(sequence, Observer.for_sequence(sequence, wrist_margin=margin))]
+    rows = [r.row() for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, wrist_margin=margin))]
     report = summary(rows)
     assert report["frames_with_hand"] == len(sequence)
     assert report["mean_iou"] > least
@@ -31,20 +31,20 @@ def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: fl
 def test_the_annotated_hand_is_cut_out_by_depth_alone(real_data: Path) -> None:
     """It begins with a hand half closed, and a shoulder in view."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
-    report = summary(r.row() for r in segment_sequence(sequence, Observer.for_sequence(sequence, use_colour=False)))
+    report = summary(r.row() for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, use_colour=False)))
     assert report["frames_with_hand"] == len(sequence)
     assert report["mean_iou"] > 0.74
 
 
 def test_every_frame_of_the_counting_hand_is_found(real_data: Path) -> None:
     sequence = open_sequence(real_data / "rgbd" / "kinect2-counting")
-    report = summary(r.row() for r in segment_sequence(sequence, Observer.for_sequence(sequence)))
+    report = summary(r.row() for r in segment_sequence(sequence, Segmenter.for_sequence(sequence)))
     assert report["frames_with_hand"] == len(sequence) == 200
 
 
 def test_single_frames_with_a_body_in_view_show_a_hand(real_data: Path) -> None:
     sequence = open_sequence(real_data / "rgbd" / "sr305-poses")
-    found = [result.observation for result in segment_sequence(sequence, Observer.for_sequence(sequence))]
+    found = [result.observation for result in segment_sequence(sequence, Segmenter.for_sequence(sequence))]
     assert sum(observation is not None for observation in found) >= len(sequence) - 1
     # The hand is in front of the body in all of them.
     assert all(o.centre[2] < 0.85 for o in found if o is not None)
@@ -58,7 +58,7 @@ def test_the_swarm_follows_a_real_hand(real_data: Path, tmp_path: Path) -> None:
     assert truth.joints is not None
     tracker = PsoTracker(model.shape, PsoOptions(resolution=96))
     with RunWriter(tmp_path / "run", {}, ("segment", *tracker.stages)) as run:
-        rows = list(track_sequence(sequence, Observer.for_sequence(sequence), tracker, model, run))
+        rows = list(track_sequence(sequence, Segmenter.for_sequence(sequence), tracker, model, run))
     errors = [
         np.linalg.norm(model.keypoints(row.pose) - truth.joints[index], axis=-1).mean()
         for row in rows

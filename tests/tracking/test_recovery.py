@@ -19,10 +19,10 @@ from depthtrack.rendering.target import Target
 from depthtrack.solver.swarm import SwarmOptions
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
-from depthtrack.tracking.proposals.local import close_by, one_finger_further, other_finger
+from depthtrack.tracking.proposals.local import finger_shift_proposals, local_proposals, search_one_finger
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, refine
-from depthtrack.tracking.state import LostBelow, TrackMemory
+from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.tracker import Status
 from depthtrack.tracking.trackers.pso import PsoOptions
 from tests.synthetic_observations import observe
@@ -46,18 +46,18 @@ def test_another_place_is_found_where_a_swarm_stays() -> None:
     frame, wrong = 11, _shifted(MADE.poses[11])
     o = observe(MADE, frame)
     with RasterScorer(MADE.options.hand) as scorer:
-        scorer.observe(Target(o.camera, o.skin, o.depth).reduced(96))
+        scorer.set_target(Target(o.camera, o.skin, o.depth).reduced(96))
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
         stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
         options = SearchOptions(apart=0.1)
         generator = np.random.default_rng(5)
-        found, _ = find_candidates(scorer, close_by(wrong, generator, options.hypotheses), generator, options)
+        found, _ = find_candidates(scorer, local_proposals(wrong, generator, options.hypotheses), generator, options)
     errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, MADE.poses[[frame, frame]]).values
     assert errors[1] < 0.7 * errors[0]
 
 
 def test_poses_close_by_are_possible_and_close() -> None:
-    poses = close_by(MADE.poses[20], np.random.default_rng(1), 500)
+    poses = local_proposals(MADE.poses[20], np.random.default_rng(1), 500)
     angles = poses[:, ANGLES]
     assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
     assert np.linalg.norm(poses[:, POSITION] - MADE.poses[20, POSITION], axis=1).max() < 0.12
@@ -81,12 +81,12 @@ def test_a_finger_that_is_elsewhere_is_found() -> None:
     frame = 11
     o, truth = observe(MADE, frame), MADE.poses[frame]
     with RasterScorer(MADE.options.hand) as scorer:
-        scorer.observe(Target(o.camera, o.skin, o.depth))
+        scorer.set_target(Target(o.camera, o.skin, o.depth))
         for finger in range(1, 5):
             wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
             straight = truth[angles][1:].sum() < np.radians(90)
             wrong[angles] = POSTURES["fist" if straight else "open"][4 * finger : 4 * finger + 4]
-            found, energy = other_finger(scorer, wrong, finger, np.random.default_rng(finger))
+            found, energy = search_one_finger(scorer, wrong, finger, np.random.default_rng(finger))
             assert energy == scorer.score(found[None])[0]
             before, after = endpoint_error(MODEL, np.stack([wrong, found]), MODEL, np.stack([truth, truth])).values
             assert after < 0.4 * before
@@ -98,9 +98,9 @@ def test_one_finger_further_undoes_a_shift() -> None:
     truth = MADE.poses[11].copy()
     truth[ANGLES] = POSTURES["open"]
     for way in (0, 1):
-        shifted = one_finger_further(MODEL, truth)[way]
+        shifted = finger_shift_proposals(MODEL, truth)[way]
         assert not np.allclose(shifted, truth)
-        back = one_finger_further(MODEL, shifted)[1 - way]
+        back = finger_shift_proposals(MODEL, shifted)[1 - way]
         there, here = (MODEL.endpoints(pose).reshape(5, 4, 3) for pose in (truth, back))
         distances = np.linalg.norm(there - here, axis=-1)[1:, 3]
         assert np.sort(distances)[2] < 0.015
@@ -109,26 +109,26 @@ def test_one_finger_further_undoes_a_shift() -> None:
 
 @pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
 def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int, remembered: bool) -> None:
-    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
-    memory.settle(pose, 5.0, 0.9, Status.TRACKED, {})
+    memory, pose = TrackState(TrackingThresholds()), MADE.poses[0]
+    memory.commit(pose, 5.0, 0.9, Status.TRACKED, {})
     for _ in range(frames):
-        lost = memory.settle(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
+        lost = memory.commit(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
         assert lost.status is Status.LOST
         assert memory.pose is None
-    assert (memory.recent is pose) == remembered
+    assert (memory.last_trusted is pose) == remembered
 
 
 def test_a_pose_of_unusual_energy_does_not_guide() -> None:
-    memory, pose = TrackMemory(LostBelow()), MADE.poses[0]
+    memory, pose = TrackState(TrackingThresholds()), MADE.poses[0]
     for _ in range(5):
-        memory.settle(pose, 16.0, 0.8, Status.TRACKED, {})
-        assert memory.expected is not None
-    memory.settle(pose, 22.0, 0.8, Status.TRACKED, {})
+        memory.commit(pose, 16.0, 0.8, Status.TRACKED, {})
+        assert memory.predicted_pose is not None
+    memory.commit(pose, 22.0, 0.8, Status.TRACKED, {})
     assert memory.pose is not None
-    assert memory.expected is None
-    memory.settle(pose, 18.0, 0.55, Status.TRACKED, {})
+    assert memory.predicted_pose is None
+    memory.commit(pose, 18.0, 0.55, Status.TRACKED, {})
     assert memory.pose is not None
-    assert memory.expected is None
+    assert memory.predicted_pose is None
 
 
 class _Levels:
@@ -144,7 +144,7 @@ class _Levels:
 
 def test_each_of_the_best_postures_of_a_finger_leads_on() -> None:
     scorer = _Levels(0.7)
-    other_finger(scorer, MADE.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
+    search_one_finger(scorer, MADE.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
     first, second = scorer.seen[0], scorer.seen[1]
     kept = first[np.argsort(scorer.score(first), kind="stable")[:8]]
     assert np.array_equal(second[:8], kept)
@@ -179,7 +179,7 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str)
     ):
         estimates = [whole.start(frames[0], MADE.poses[20]), *(whole.track(frame) for frame in frames[1:])]
         assert [estimate.status for estimate in estimates[1:3]] == ["lost", "started"]
-        cut.recall(estimates[:2])
+        cut.restore(estimates[:2])
         again = [cut.track(frame) for frame in frames[2:]]
     poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
     assert np.array_equal(poses, poses_again)
@@ -190,9 +190,9 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str)
 def test_the_papers_have_no_second_thoughts(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The hand jumps by as much as makes every other variant think again."""
     module = {"ik": "fit_recovery", "pso": "swarm_recovery"}[name]
-    thoughts = import_module(f"depthtrack.tracking.stages.{module}").SecondThoughts
+    thoughts = import_module(f"depthtrack.tracking.stages.{module}").Recovery
     thought = list[str]()
-    for method in ("close_by", "finger_by_finger"):
+    for method in ("search_locally", "refine_per_finger"):
         monkeypatch.setattr(thoughts, method, _noted(method, getattr(thoughts, method), thought))
     for variant in ("paper", "default"):
         with closing(create_tracker(name, MADE.options.hand, variant=variant)) as tracker:

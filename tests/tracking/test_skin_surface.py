@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.hand.compiled_kinematics import Bodies, Chain
+from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver import closest_points as closest
-from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces import skin as mesh
 from depthtrack.tracking.surfaces.skin import Cells, MeshModel, Posed, Seen
 from tests.hand.test_compiled_kinematics import random_pose
@@ -24,7 +24,7 @@ TOLERANCE = 0.008
 
 def posed_hand(pose: np.ndarray, model: MeshModel = MODEL) -> Posed:
     posed = Posed(np.empty_like(model.rest), np.empty_like(model.rest))
-    mesh.skin_vertices(model, Bodies.at(Chain.of(SHAPE), pose), posed)
+    mesh.skin_vertices(model, BodyPoses.at(Chain.of(SHAPE), pose), posed)
     return posed
 
 
@@ -32,12 +32,12 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def cloud_near(posed: Posed, rng: np.random.Generator, count: int = 60, spread: float = 0.01) -> Cloud:
+def cloud_near(posed: Posed, rng: np.random.Generator, count: int = 60, spread: float = 0.01) -> PointCloud:
     """Points about the vertices that face the camera, with normals about theirs."""
     facing = np.flatnonzero(np.einsum("vi,vi->v", posed.x, posed.n) < 0)
     pick = rng.choice(facing, count)
     normals = unit(posed.n[pick] + rng.normal(0, 0.3, (count, 3)))
-    return Cloud(posed.x[pick] + rng.normal(0, spread, (count, 3)), normals)
+    return PointCloud(posed.x[pick] + rng.normal(0, spread, (count, 3)), normals)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -49,8 +49,8 @@ def test_vertices_and_normals_are_blended_as_skinning_says(seed: int) -> None:
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
     moved = HandModel(SHAPE).transforms(pose)[:, :3] @ SKIN.T_body_rest
     blended = np.einsum("vb,bij->vij", weights, moved)
-    expected = np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.rest) + blended[:, :, 3]
-    np.testing.assert_allclose(posed.x, expected, atol=1e-12)
+    predicted_pose = np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.rest) + blended[:, :, 3]
+    np.testing.assert_allclose(posed.x, predicted_pose, atol=1e-12)
     np.testing.assert_allclose(posed.n, unit(np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.normals)), atol=1e-9)
 
 
@@ -88,10 +88,10 @@ def test_seen_vertices_are_sorted_by_cell(seed: int) -> None:
     posed = posed_hand(random_pose(rng))
     cells = mesh.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
     seen = mesh.sort_seen(MODEL, posed, cells, TOLERANCE)
-    expected = _seen_slowly(posed, cells)
-    assert seen.first[-1] == len(seen.vertex) == sum(map(len, expected.values()))
+    predicted_pose = _seen_slowly(posed, cells)
+    assert seen.first[-1] == len(seen.vertex) == sum(map(len, predicted_pose.values()))
     for cell in range(cells.rows * cells.columns):
-        assert seen.vertex[seen.first[cell] : seen.first[cell + 1]].tolist() == expected.get(cell, [])
+        assert seen.vertex[seen.first[cell] : seen.first[cell + 1]].tolist() == predicted_pose.get(cell, [])
     there = seen.table[:, : len(seen.vertex)]
     np.testing.assert_allclose(there[:3].T + seen.origin, posed.x[seen.vertex], atol=1e-7)
     np.testing.assert_allclose(there[3:].T, posed.n[seen.vertex], atol=1e-6)
@@ -112,36 +112,36 @@ def test_what_another_finger_hides_is_not_seen() -> None:
 
 @given(
     seed=st.integers(0, 2**32 - 1),
-    reach=st.sampled_from([0.005, 0.04]),
-    agreement=st.sampled_from([-1.1, 0.3, 0.9]),
+    max_distance=st.sampled_from([0.005, 0.04]),
+    min_normal_cosine=st.sampled_from([-1.1, 0.3, 0.9]),
     cell=st.sampled_from([0.002, 0.004, 0.02]),
 )
 def test_matches_are_the_closest_seen_vertices_that_agree(
-    seed: int, reach: float, agreement: float, cell: float
+    seed: int, max_distance: float, min_normal_cosine: float, cell: float
 ) -> None:
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
-    cloud = cloud_near(posed, rng, spread=0.5 * reach)
-    cells = mesh.cells_over(cloud.points, cell, reach)
-    seen, matches = mesh.sort_seen(MODEL, posed, cells, TOLERANCE), Matches.room(len(cloud.points))
-    closest.closest_vertices(cloud, seen, cells, reach, agreement, matches.body)
-    found, vertex = matches.body >= 0, seen.vertex[matches.body]
-    mesh.take_up(MODEL, posed, seen, matches)
-    np.testing.assert_array_equal(matches.body >= 0, found)
-    np.testing.assert_array_equal(matches.body[found], MODEL.bodies[vertex[found], 0])
-    np.testing.assert_array_equal(matches.x[found], posed.x[vertex[found]])
-    np.testing.assert_array_equal(matches.n[found], posed.n[vertex[found]])
+    cloud = cloud_near(posed, rng, spread=0.5 * max_distance)
+    cells = mesh.cells_over(cloud.points, cell, max_distance)
+    seen, correspondences = mesh.sort_seen(MODEL, posed, cells, TOLERANCE), Correspondences.allocate(len(cloud.points))
+    closest.closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, correspondences.body)
+    found, vertex = correspondences.body >= 0, seen.vertex[correspondences.body]
+    mesh.resolve_bodies(MODEL, posed, seen, correspondences)
+    np.testing.assert_array_equal(correspondences.body >= 0, found)
+    np.testing.assert_array_equal(correspondences.body[found], MODEL.bodies[vertex[found], 0])
+    np.testing.assert_array_equal(correspondences.x[found], posed.x[vertex[found]])
+    np.testing.assert_array_equal(correspondences.n[found], posed.n[vertex[found]])
 
     distance = np.linalg.norm(cloud.points[:, None] - posed.x[seen.vertex], axis=-1)
     same = cloud.normals @ posed.n[seen.vertex].T
     # Single precision may see equal distances, and normals at the edge of agreement, either way.
-    least, most = (np.where(same < agreement + slack, np.inf, distance).min(axis=1) for slack in (-1e-6, 1e-6))
-    np.testing.assert_array_equal(found[least == most], (least < reach)[least == most])
+    least, most = (np.where(same < min_normal_cosine + slack, np.inf, distance).min(axis=1) for slack in (-1e-6, 1e-6))
+    np.testing.assert_array_equal(found[least == most], (least < max_distance)[least == most])
     at = _index(seen, vertex)
-    chosen = np.where(found, distance[np.arange(len(found)), at], reach)
-    assert np.all(chosen >= np.minimum(least, reach) - 1e-6)
-    assert np.all(chosen <= np.minimum(most, reach) + 1e-6)
-    assert np.all(same[found, at[found]] >= agreement - 1e-6)
+    chosen = np.where(found, distance[np.arange(len(found)), at], max_distance)
+    assert np.all(chosen >= np.minimum(least, max_distance) - 1e-6)
+    assert np.all(chosen <= np.minimum(most, max_distance) + 1e-6)
+    assert np.all(same[found, at[found]] >= min_normal_cosine - 1e-6)
 
 
 def _index(seen: Seen, vertex: np.ndarray) -> np.ndarray:

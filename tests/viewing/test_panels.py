@@ -13,7 +13,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import Frame, GroundTruth, open_sequence
-from depthtrack.viewing.annotated_frame import Moment, evenly_chosen, moments, true_keypoints
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, moments, true_keypoints
 from depthtrack.viewing.contact_sheet import contact_sheet, save_picture
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.panels import paint, panel, tile_grid, useful_layers
@@ -23,10 +23,10 @@ from tests.recording_samples import TIMES, joints_at, mask_at, write_sample
 from tests.viewing_samples import CAMERA, GREY, open_hand
 
 
-def moment(depth: float = 0.5, colour: int | None = 100, index: int = 0) -> Moment:
+def moment(depth: float = 0.5, colour: int | None = 100, index: int = 0) -> AnnotatedFrame:
     """A plane of one depth and one grey."""
     pixels = None if colour is None else np.full((*CAMERA.shape, 3), colour, dtype=np.uint8)
-    return Moment(Frame(index, 0.1 * index, np.full(CAMERA.shape, depth, dtype=np.float32), pixels, CAMERA))
+    return AnnotatedFrame(Frame(index, 0.1 * index, np.full(CAMERA.shape, depth, dtype=np.float32), pixels, CAMERA))
 
 
 # Moments
@@ -73,7 +73,9 @@ def test_a_crop_sees_the_same_points_of_space_in_the_same_colours() -> None:
     rng = np.random.default_rng(2)
     colour = rng.integers(0, 256, (*CAMERA.shape, 3), dtype=np.uint8)
     mask = rng.random(CAMERA.shape) < 0.5
-    whole = Moment(Frame(0, 0.0, rng.random(CAMERA.shape, dtype=np.float32), colour, CAMERA), mask, True, open_hand())
+    whole = AnnotatedFrame(
+        Frame(0, 0.0, rng.random(CAMERA.shape, dtype=np.float32), colour, CAMERA), mask, True, open_hand()
+    )
     part = whole.cropped(-5, 100, 60, 170)
     assert part.mask is not None
     assert part.frame.colour is not None
@@ -127,7 +129,7 @@ def test_a_contact_sheet_of_nothing_is_refused() -> None:
 
 
 def test_panels_have_one_size_whatever_is_missing() -> None:
-    known = Moment(moment().frame, np.ones(CAMERA.shape, dtype=np.bool_), True, open_hand())
+    known = AnnotatedFrame(moment().frame, np.ones(CAMERA.shape, dtype=np.bool_), True, open_hand())
     for layers in (("depth",), ("depth", "mask", "skeleton"), ("depth", "colour", "mask", "skeleton")):
         shapes = {panel(seen, layers, 120, 0.4, 0.6).shape for seen in (known, moment(), moment(colour=None))}
         assert len(shapes) == 1
@@ -139,7 +141,7 @@ def test_skeleton_and_mask_meet_at_any_resolution(height: int) -> None:
     keypoints, mask = open_hand(), np.zeros(CAMERA.shape, dtype=np.bool_)
     tip = CAMERA.project(keypoints[8]).round().astype(int)
     mask[tip[1] - 4 : tip[1] + 5, tip[0] - 4 : tip[0] + 5] = True
-    seen = Moment(moment(colour=0).frame, mask, True, keypoints)
+    seen = AnnotatedFrame(moment(colour=0).frame, mask, True, keypoints)
     tinted = np.argwhere(np.any(paint(seen, "mask", height, 0.4, 0.6) > 0, axis=-1)).mean(axis=0)
     drawn = np.argwhere(
         np.all(np.abs(paint(seen, "skeleton", height, 0.4, 0.6).astype(int) - FINGER_COLOURS["index"]) <= 3, axis=-1)
@@ -151,7 +153,7 @@ def test_skeleton_and_mask_meet_at_any_resolution(height: int) -> None:
 def test_a_strip_looks_close_at_the_hand() -> None:
     mask = np.zeros(CAMERA.shape, dtype=np.bool_)
     mask[100:150, 200:250] = True
-    shown = [Moment(moment(index=n).frame, np.roll(mask, -10 * n, axis=1), True, None) for n in range(4)]
+    shown = [AnnotatedFrame(moment(index=n).frame, np.roll(mask, -10 * n, axis=1), True, None) for n in range(4)]
     banner = strip(shown, width=800)
     # Three rows (no skeleton is known) of four squares; the hand fills 50 of 60 pixels of its window's side.
     assert abs(banner.shape[1] - 800) <= 4

@@ -12,8 +12,8 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
-from depthtrack.tracking.stages.swarm_recovery import LookAgain
-from depthtrack.tracking.state import LostBelow
+from depthtrack.tracking.stages.swarm_recovery import RecoveryOptions
+from depthtrack.tracking.state import TrackingThresholds
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
@@ -43,7 +43,7 @@ def how(options: ExperimentOptions) -> Cell:
     return {"variant": options.variant, "renderer": options.renderer, "resolution": options.side}
 
 
-_NEVER = LostBelow(confidence=0.0, energy=np.inf)
+_NEVER = TrackingThresholds(confidence=0.0, energy=np.inf)
 
 
 def follow(
@@ -83,7 +83,7 @@ def follow(
         resolution=resolution,
         # Never lost: a search would cost more than many frames of a small swarm, and noise is no loss.
         lost=_NEVER,
-        look_again=LookAgain(every=0, one_finger=0, doubted=_NEVER),
+        recovery=RecoveryOptions(every=0, accept_finger=0, doubted=_NEVER),
     )
     with closing(PsoTracker(seen.hand, options)) as tracker:
         estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]

@@ -29,12 +29,17 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
 def draw(axes: Axes, rows: Sequence[Row]) -> None:
     table = tabulate(rows)
     error = [line["error_mm"] for line in table]
-    reach = [
+    max_distance = [
         [line["error_mm"] - line["lowest_mm"] for line in table],
         [line["highest_mm"] - line["error_mm"] for line in table],
     ]
     axes.errorbar(
-        [line["viewpoint"] for line in table], error, reach, fmt="o", capsize=4, label="ours (bars: all repetitions)"
+        [line["viewpoint"] for line in table],
+        error,
+        max_distance,
+        fmt="o",
+        capsize=4,
+        label="ours (bars: all repetitions)",
     )
     axes.axhline(5, color="black", linestyle="--", lw=1, label="paper at 0.5 m (its Fig. 2b), read from its text")
     axes.set(

@@ -14,8 +14,8 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
-from depthtrack.tracking.stages.fit_recovery import LookAgain
-from depthtrack.tracking.state import LostBelow
+from depthtrack.tracking.stages.fit_recovery import RecoveryOptions
+from depthtrack.tracking.state import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 
@@ -69,8 +69,8 @@ def follow(
         synergies=None if synergies is None else basis(synergies).synergies.truncated(components or 20),
         soft=soft,
         # Never lost: what is measured is following, and a search would put right what an experiment is about.
-        lost=LostBelow(confidence=0.0, energy=np.inf),
-        look_again=LookAgain(every=0, one_finger=0),
+        lost=TrackingThresholds(confidence=0.0, energy=np.inf),
+        recovery=RecoveryOptions(every=0, accept_finger=0),
     )
     points, seconds, estimates = [], [], list[Estimate]()
     with closing(IkTracker(seen.hand, options)) as tracker:

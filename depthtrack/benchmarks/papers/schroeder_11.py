@@ -18,10 +18,10 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
-from depthtrack.solver.icp import PAPER_FIT, FitOptions
+from depthtrack.solver.icp import PAPER_ICP, IcpOptions
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film, film
-from depthtrack.tracking.stages.coarse_to_fine import FLAT_LADDER, PAPER_LADDER, Ladder, SingleFrameFitter
+from depthtrack.tracking.stages.coarse_to_fine import DIRECT, PAPER_COARSE_TO_FINE, CoarseToFine, SingleFrameFitter
 
 Array = NDArray[np.float64]
 Way = Literal["hierarchical", "all angles at once"]
@@ -60,9 +60,11 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
     seen, holds = _film(None), _signs(None)
     frame = sum(holds[sign]) // 2
     known = _without(sign) if synergies == OTHERS else bases.basis(synergies).synergies
-    ladder = FLAT_LADDER if way == "all angles at once" else PAPER_LADDER if variant == "paper" else Ladder()
+    coarse_to_fine = (
+        DIRECT if way == "all angles at once" else PAPER_COARSE_TO_FINE if variant == "paper" else CoarseToFine()
+    )
     fitter = SingleFrameFitter(
-        seen.hand, known, ladder, PAPER_FIT if variant == "paper" else FitOptions(), seed=repetition
+        seen.hand, known, coarse_to_fine, PAPER_ICP if variant == "paper" else IcpOptions(), seed=repetition
     )
     _compile()
     observation, begun = seen.again(frame), process_time()
@@ -107,8 +109,8 @@ def _without(sign: int) -> Synergies:
 def _compile() -> None:
     """Let the first frame that is timed find everything compiled."""
     seen = _film(None)
-    for ladder, fit in ((Ladder(), FitOptions()), (PAPER_LADDER, PAPER_FIT)):
-        SingleFrameFitter(seen.hand, bases.basis(MOTION).synergies, ladder, fit, subsample=50).estimate(
+    for coarse_to_fine, fit in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
+        SingleFrameFitter(seen.hand, bases.basis(MOTION).synergies, coarse_to_fine, fit, subsample=50).estimate(
             seen.again(0), seen.poses[0]
         )
 

@@ -48,7 +48,7 @@ class Rival(ScorerBase):
         except (ImportError, AttributeError, OSError) as error:
             raise RivalMissingError(f"installed, but it cannot be loaded: {error}") from error
 
-    def observe(self, target: Target) -> None:
+    def set_target(self, target: Target) -> None:
         self._target = target
         self._prepare(target.camera)
 

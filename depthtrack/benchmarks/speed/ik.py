@@ -23,9 +23,9 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.machine import Machine, describe_machine
-from depthtrack.solver.icp import Fitter
+from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.residuals import Residual
-from depthtrack.solver.subspace import FULL, Space
+from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film
 from depthtrack.text_table import aligned
@@ -191,7 +191,7 @@ def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> _
     made = list[Estimate]()
 
     def track() -> None:
-        tracker.recall(before)
+        tracker.restore(before)
         made.append(tracker.track(film.again(index)))
 
     track()
@@ -208,9 +208,9 @@ def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: fl
     options = setting.options(film)
     fitting = replace(options.fitting, rigid=0)
     synergies = options.chosen_synergies
-    space = FULL if synergies is None else Space.of(synergies)
-    fitter = Fitter(film.hand, make_surface(setting.model, film.hand), fitting)
-    fitter.observe(film[index], setting.subsample)
+    space = FULL if synergies is None else PostureSubspace.of(synergies)
+    fitter = IcpFitter(film.hand, make_surface(setting.model, film.hand), fitting)
+    fitter.set_target(film[index], setting.subsample)
     fitter.fit(pose, space)
     return time_calls(partial(fitter.fit, pose, space), seconds)
 

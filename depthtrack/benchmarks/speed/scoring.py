@@ -80,21 +80,21 @@ class ScoreReport:
 
 @dataclass(frozen=True)
 class ScorePlan:
-    """What to measure: `contenders` by name, each at every one of `rois`, `seconds` a row."""
+    """What to measure: `specs` by name, each at every one of `rois`, `seconds` a row."""
 
-    contenders: tuple[str, ...]
+    specs: tuple[str, ...]
     seconds: float
     rois: tuple[Roi, ...] = ROIS
 
     @property
     def row_count(self) -> int:
         """How many rows come of it when every contender can run."""
-        return sum(len(_thread_counts(name)) for name in self.contenders) * len(self.rois)
+        return sum(len(_thread_counts(name)) for name in self.specs) * len(self.rois)
 
 
-def plan(contenders: Sequence[str] | None = None, seconds: float = 1.0) -> ScorePlan:
+def plan(specs: Sequence[str] | None = None, seconds: float = 1.0) -> ScorePlan:
     """A plan for these contenders, or the usual ones. Raises InputError for unknown names and unusable times."""
-    chosen = USUAL if contenders is None else tuple(dict.fromkeys(contenders))
+    chosen = USUAL if specs is None else tuple(dict.fromkeys(specs))
     unknown = [name for name in chosen if name not in CONTENDERS]
     if unknown or not chosen:
         raise InputError(f"--backends takes {', '.join(CONTENDERS)}; found {', '.join(unknown) or 'none'}")
@@ -108,7 +108,7 @@ def run(plan: ScorePlan, progress: Callable[[Iterator[ScoreRow]], Iterable[Score
     machine, workloads, absent = describe_machine(), make_workloads(plan.rois), list[Absent]()
 
     def rows() -> Iterator[ScoreRow]:
-        for name in plan.contenders:
+        for name in plan.specs:
             try:
                 yield from in_own_process(measure, name, workloads, plan.seconds, patience=_PATIENCE + 2 * plan.seconds)
             except DepthtrackError as error:
@@ -142,12 +142,12 @@ def _create(name: str, shape: HandShape, threads: int | None) -> Scorer:
 def _row(scorer: Scorer, threads: int | None, workload: Workload, seconds: float, start: float) -> ScoreRow:
     peer = scorer.name in RIVALS
     swarms = workload.poses[:, : _RIVAL_BATCH if peer else HYPOTHESES]
-    scorer.observe(workload.targets[0])
+    scorer.set_target(workload.targets[0])
     scorer.score(swarms[0])
     first_call = perf_counter() - start
     best, median, calls, error = 0.0, 0.0, 0, 0.0
     for target, swarm, expected in zip(workload.targets, swarms, workload.expected, strict=True):
-        scorer.observe(target)
+        scorer.set_target(target)
         error = max(error, float(np.abs(scorer.score(swarm)[:CHECKED] - expected).max()))
         durations = time_calls(partial(scorer.score, swarm), seconds / len(swarms))
         best, median, calls = best + durations.min(), median + float(np.median(durations)), calls + len(durations)

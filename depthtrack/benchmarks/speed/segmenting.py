@@ -20,8 +20,8 @@ from depthtrack.evaluation.segmentation import overlap, whole_mask
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.recording import open_sequence
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.observation import Observer
-from depthtrack.segmentation.skin_colour import SkinModel
+from depthtrack.segmentation.observation import Segmenter
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.text_table import aligned
 
@@ -113,10 +113,10 @@ def run(plan: SegmentPlan, progress: Callable[[Iterator[SegmentRow]], Iterable[S
 
 def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
     """The row of a recording. Raises InputError where no hand can be followed in it."""
-    observer = Observer(SkinModel.default() if use_colour else None)
+    segmenter = Segmenter(SkinColourModel.default() if use_colour else None)
     durations, overlaps, points = list[Array](), list[float](), list[int]()
     for frame, truth in zip(shot.frames, shot.truth, strict=True):  # once for the compiler, and for what is found
-        observation = observer.observe(frame)
+        observation = segmenter.segment(frame)
         if observation is None:
             raise InputError(f"{shot.name}: no hand is seen in frame {frame.index}: give a recording that shows one")
         points.append(len(observation.points))
@@ -124,7 +124,7 @@ def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
             overlaps.append(overlap(whole_mask(observation, frame.depth.shape), truth))
     end = perf_counter() + seconds
     while not durations or perf_counter() < end:
-        durations.append(_time_frames(observer, shot.frames))
+        durations.append(_time_frames(segmenter, shot.frames))
     best, median = np.min(durations, axis=0).mean(axis=0), np.median(durations, axis=(0, 1))
     camera = shot.frames[0].camera
     return SegmentRow(
@@ -143,14 +143,14 @@ def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
     )
 
 
-def _time_frames(observer: Observer, frames: Sequence[Frame]) -> Array:
+def _time_frames(segmenter: Segmenter, frames: Sequence[Frame]) -> Array:
     """Milliseconds (N - 1, 2) for observation and point cloud of N frames but the first, where the hand is found."""
-    observer.reset()
-    observer.observe(frames[0])
+    segmenter.reset()
+    segmenter.segment(frames[0])
     durations = []
     for frame in frames[1:]:
         begun = perf_counter()
-        observation = observer.observe(frame)
+        observation = segmenter.segment(frame)
         seen = perf_counter()
         if observation is not None:
             observation.points  # noqa: B018 (made when asked for)

@@ -63,7 +63,7 @@ def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, windows: list[Ta
     targets = windows if roi == "native" else [window.reduced(int(roi)) for window in windows]
     expected = []
     for target, swarm in zip(targets, poses, strict=True):
-        oracle.observe(target)
+        oracle.set_target(target)
         expected.append(oracle.score(swarm[:CHECKED]))
     return Workload(roi, shape, tuple(targets), poses, np.stack(expected))
 
@@ -71,7 +71,7 @@ def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, windows: list[Ta
 def _windows(oracle: OracleScorer, truth: Array) -> list[Target]:
     """Square windows on the hand at full resolution, all of one size: the largest hand's, with a margin."""
     camera = PRESETS["kinect1"]
-    oracle.observe(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    oracle.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
     depths = [oracle.render(pose) for pose in truth]
     extents = np.array([[(hit.min(), hit.max() + 1) for hit in np.nonzero(depth)] for depth in depths])
     side = round(float(np.diff(extents, axis=-1).max()) * (1 + MARGIN))

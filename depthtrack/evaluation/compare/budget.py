@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
+from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Sequence as Recording
-from depthtrack.segmentation.observation import Observation, Observer
+from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Estimate
 
@@ -36,7 +36,7 @@ class Budget:
     ms: float
 
 
-def sized(tracker: str, options: dict[str, Any], size: float) -> dict[str, Any]:
+def scale_work(tracker: str, options: dict[str, Any], size: float) -> dict[str, Any]:
     """The options that set a tracker's work, at `size` times what all its `options` ask for.
 
     The swarm keeps the ratio of its generations to its particles, along which the error falls fastest (Oikonomidis
@@ -54,7 +54,7 @@ def sized(tracker: str, options: dict[str, Any], size: float) -> dict[str, Any]:
 def calibrate(
     recording: Recording,
     count: int,
-    observer: Observer,
+    segmenter: Segmenter,
     hand: HandShape,
     tracker: str,
     options: dict[str, Any],
@@ -65,14 +65,14 @@ def calibrate(
     Where even the least or the most work misses `ms`, the nearest is taken; its own time is told. Where the hand is not
     found, nothing is chosen.
     """
-    places = _stretches(recording, count, observer, hand, tracker, options)
+    places = _stretches(recording, count, segmenter, hand, tracker, options)
     if not places:
         return Budget({}, float("nan"))
 
     def cost(chosen: dict[str, Any]) -> float:
         return _cost(places, hand, tracker, options | chosen)
 
-    return search(lambda size: sized(tracker, options, size), cost, ms)
+    return search(lambda size: scale_work(tracker, options, size), cost, ms)
 
 
 def search(at: Callable[[float], dict[str, Any]], cost: Callable[[dict[str, Any]], float], ms: float) -> Budget:
@@ -106,9 +106,9 @@ def _next_size(tried: dict[float, Budget], ms: float) -> float:
 def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dict[str, Any]) -> float:
     """CPU milliseconds of an ordinary tracked frame, the median: a frame in doubt costs a search, whatever the work."""
     spent: list[float] = []
-    with closing(TimedByProcessor(create_tracker(tracker, hand, **options))) as timed:
+    with closing(CpuTimed(create_tracker(tracker, hand, **options))) as timed:
         for first, following in places:
-            timed.recall([first])
+            timed.restore([first])
             # The first frame after a recall also warms up caches; it counts for nothing.
             estimates = [timed.track(observation) for observation in following][1:]
             spent += [sum(estimate.stage_ms.values()) for estimate in estimates if estimate.status == "tracked"]
@@ -116,7 +116,7 @@ def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dic
 
 
 def _stretches(
-    recording: Recording, count: int, observer: Observer, hand: HandShape, tracker: str, options: dict[str, Any]
+    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, tracker: str, options: dict[str, Any]
 ) -> list[Stretch]:
     """Places spread over the recording where the tracker, with the options as they are, finds and keeps the hand."""
     length = min(STRETCH + 2, count)
@@ -124,9 +124,9 @@ def _stretches(
     found = []
     with closing(create_tracker(tracker, hand, **options)) as finder:
         for first in firsts:
-            observer.reset()
+            segmenter.reset()
             frames = recording.frames(range(first, first + length))
-            seen = [observation for observation in map(observer.observe, frames) if observation is not None]
+            seen = [observation for observation in map(segmenter.segment, frames) if observation is not None]
             if len(seen) < 3:
                 continue
             start = finder.start(seen[0])

@@ -9,7 +9,7 @@ from typing import Any
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.compare.running import FrameCount, PlannedRun, Source, calibrate_cell, track_cell
-from depthtrack.evaluation.compare.specs import Contender
+from depthtrack.evaluation.compare.specs import TrackerSpec
 from depthtrack.evaluation.sweep.rows import Cell, Journal
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
 
@@ -26,7 +26,7 @@ class Comparison:
     """
 
     sources: tuple[Source, ...]
-    contenders: tuple[Contender, ...]
+    specs: tuple[TrackerSpec, ...]
     repeats: int = 1
     seed: int = 0
     equal_ms: float | None = None
@@ -34,7 +34,7 @@ class Comparison:
     def __post_init__(self) -> None:
         if not self.sources:
             raise InputError("name at least one recording to compare on")
-        if self.repeats < 1 or len(self.sources) * len(self.contenders) * self.repeats > MOST_RUNS:
+        if self.repeats < 1 or len(self.sources) * len(self.specs) * self.repeats > MOST_RUNS:
             raise InputError(f"a comparison has 1 to {MOST_RUNS} runs: choose other repeats, found {self.repeats}")
         if not 0 <= self.seed < 2**62:
             raise InputError(f"the seed must be a whole number from 0 to 2^62 - 1, found {self.seed}")
@@ -79,13 +79,13 @@ def _plans(comparison: Comparison, folder: Path, budgets: dict[tuple[int, int], 
     names = _unique_names([Path(source.path) for source in comparison.sources])
     plans = []
     for s, (source, name) in enumerate(zip(comparison.sources, names, strict=True)):
-        for c, contender in enumerate(comparison.contenders):
+        for c, spec in enumerate(comparison.specs):
             budget = budgets.get((s, c))
-            options = contender.complete_options | (budget["chosen"] if budget else {})
+            options = spec.complete_options | (budget["chosen"] if budget else {})
             told = budget and {"equal_ms": comparison.equal_ms, "calibrated_ms": budget["calibrated_ms"]}
             for seed in range(comparison.seed, comparison.seed + comparison.repeats):
-                run = folder / "runs" / f"{name}_{contender.slug}_{seed}"
-                plans.append(PlannedRun(str(run), source, contender.label, contender.tracker, options, seed, told))
+                run = folder / "runs" / f"{name}_{spec.slug}_{seed}"
+                plans.append(PlannedRun(str(run), source, spec.label, spec.tracker, options, seed, told))
     return plans
 
 
@@ -98,12 +98,12 @@ def _budgets(
     """
     if comparison.equal_ms is None:
         return {}
-    numbers = [(s, c) for s in range(len(comparison.sources)) for c in range(len(comparison.contenders))]
+    numbers = [(s, c) for s in range(len(comparison.sources)) for c in range(len(comparison.specs))]
     cells: list[Cell] = [
         {
             "source": asdict(comparison.sources[s]),
-            "tracker": comparison.contenders[c].tracker,
-            "options": comparison.contenders[c].complete_options,
+            "tracker": comparison.specs[c].tracker,
+            "options": comparison.specs[c].complete_options,
             "ms": comparison.equal_ms,
         }
         for s, c in numbers

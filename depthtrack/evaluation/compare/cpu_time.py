@@ -11,7 +11,7 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.tracker import Estimate, Tracker
 
 
-class TimedByProcessor:
+class CpuTimed:
     """A tracker as it is, but its stages' times are CPU milliseconds of this process, all of its threads together.
 
     How a frame's time falls to the stages is as the tracker says; their sum is the processor's.
@@ -27,12 +27,12 @@ class TimedByProcessor:
     def track(self, observation: Observation) -> Estimate:
         return _timed(lambda: self._tracker.track(observation))
 
-    def recall(self, estimates: Sequence[Estimate]) -> None:
-        self._tracker.recall(estimates)
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        self._tracker.restore(estimates)
 
     @property
-    def expected(self) -> NDArray[np.float64] | None:
-        return self._tracker.expected
+    def predicted_pose(self) -> NDArray[np.float64] | None:
+        return self._tracker.predicted_pose
 
     def close(self) -> None:
         self._tracker.close()

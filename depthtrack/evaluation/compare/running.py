@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 
 from depthtrack.evaluation.compare.budget import calibrate
-from depthtrack.evaluation.compare.cpu_time import TimedByProcessor
+from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
@@ -21,7 +21,7 @@ from depthtrack.machine import describe_machine
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import RunWriter, check_same, read_configuration
 from depthtrack.recording.sequence import OnDamage, Sequence
-from depthtrack.segmentation.observation import Observer
+from depthtrack.segmentation.observation import Segmenter
 from depthtrack.tracking.configuration import chosen_hand, run_configuration
 from depthtrack.tracking.pipeline import track_sequence
 from depthtrack.tracking.registry import create_tracker
@@ -48,8 +48,8 @@ class Source:
     def hand_of(self, sequence: Sequence) -> HandShape:
         return chosen_hand(sequence, None if self.hand is None else Path(self.hand))
 
-    def observer(self, sequence: Sequence) -> Observer:
-        return Observer.for_sequence(sequence, None if self.skin_model is None else Path(self.skin_model))
+    def segmenter(self, sequence: Sequence) -> Segmenter:
+        return Segmenter.for_sequence(sequence, None if self.skin_model is None else Path(self.skin_model))
 
     def count(self, sequence: Sequence) -> int:
         """Frames to track."""
@@ -113,15 +113,15 @@ def track_cell(cell: Cell) -> Row:
     cv2.setNumThreads(1)
     sequence = plan.source.open()
     hand = plan.source.hand_of(sequence)
-    observer = plan.source.observer(sequence)
+    segmenter = plan.source.segmenter(sequence)
     options = plan.options | {"seed": plan.seed}
     folder = Path(plan.folder)
     with (
-        closing(TimedByProcessor(create_tracker(plan.tracker, hand, **options))) as tracker,
+        closing(CpuTimed(create_tracker(plan.tracker, hand, **options))) as tracker,
         RunWriter(folder, plan.configuration(sequence), ("segment", *tracker.stages), resume=True) as run,
     ):
         count, clock = plan.source.count(sequence), time.process_time
-        rows = track_sequence(sequence, observer, tracker, HandModel(hand), run, count=count, clock=clock)
+        rows = track_sequence(sequence, segmenter, tracker, HandModel(hand), run, count=count, clock=clock)
         tracked_now = sum(1 for _ in rows)
         done = {"frames": len(run.rows), "damaged": [asdict(damage) for damage in sequence.damaged]}
     _write_done(folder, done)
@@ -133,8 +133,8 @@ def calibrate_cell(cell: Cell) -> Row:
     source = Source(**cell["source"])
     cv2.setNumThreads(1)
     sequence = source.open()
-    hand, observer = source.hand_of(sequence), source.observer(sequence)
-    budget = calibrate(sequence, source.count(sequence), observer, hand, cell["tracker"], cell["options"], cell["ms"])
+    hand, segmenter = source.hand_of(sequence), source.segmenter(sequence)
+    budget = calibrate(sequence, source.count(sequence), segmenter, hand, cell["tracker"], cell["options"], cell["ms"])
     # JSON knows no infinity: no hand was followed anywhere.
     ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
     return {"chosen": budget.options, "calibrated_ms": ms}

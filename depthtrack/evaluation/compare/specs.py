@@ -19,7 +19,7 @@ _PLAIN = (bool, int, float, str, NoneType)
 
 
 @dataclass(frozen=True)
-class Contender:
+class TrackerSpec:
     """A tracker that takes part: its name and options, under a `label` of its own."""
 
     label: str
@@ -38,24 +38,24 @@ class Contender:
         return re.sub(r"[^a-z0-9.=]+", "-", self.label.lower()).strip("-") or "tracker"
 
 
-def read_contenders(texts: Sequence[str]) -> list[Contender]:
+def read_specs(texts: Sequence[str]) -> list[TrackerSpec]:
     """Contenders as people write them: `pso,ik:variant=paper,rounds=3`, or the path of a TOML file.
 
     In the file, a table for each: its heading is the label, `tracker` names the tracker, the rest are options. Raises
     InputError for trackers and options that do not exist, values of the wrong kind, and labels that are not unique.
     """
-    found: list[Contender] = []
+    found: list[TrackerSpec] = []
     for text in texts:
         found += _from_file(Path(text)) if text.endswith(".toml") else _from_text(text)
     if not found:
         raise InputError(f"name at least one tracker: {', '.join(TRACKERS)}")
-    for number, contender in enumerate(found):
-        if contender.slug in {other.slug for other in found[:number]}:
-            raise InputError(f"two trackers are called '{contender.label}': give them different labels or options")
+    for number, spec in enumerate(found):
+        if spec.slug in {other.slug for other in found[:number]}:
+            raise InputError(f"two trackers are called '{spec.label}': give them different labels or options")
     return found
 
 
-def _from_text(text: str) -> list[Contender]:
+def _from_text(text: str) -> list[TrackerSpec]:
     parts: list[tuple[str, dict[str, Any]]] = []
     for piece in filter(None, (piece.strip() for piece in text.split(","))):
         # A comma also stands between options: what has no tracker's name before it belongs to the tracker before it.
@@ -70,7 +70,7 @@ def _from_text(text: str) -> list[Contender]:
     return [_checked(" ".join([name.upper(), *(f"{k}={v}" for k, v in o.items())]), name, o) for name, o in parts]
 
 
-def _from_file(path: Path) -> list[Contender]:
+def _from_file(path: Path) -> list[TrackerSpec]:
     try:
         tables = tomllib.loads(read_text(path))
     except (InputError, tomllib.TOMLDecodeError, RecursionError) as error:
@@ -92,7 +92,7 @@ def _value(text: str) -> Any:
         return text
 
 
-def _checked(label: str, tracker: str, options: dict[str, Any]) -> Contender:
+def _checked(label: str, tracker: str, options: dict[str, Any]) -> TrackerSpec:
     if tracker not in TRACKERS:
         raise InputError(f"no tracker '{tracker}': choose among {', '.join(TRACKERS)}")
     kinds = _settable(tracker)
@@ -102,7 +102,7 @@ def _checked(label: str, tracker: str, options: dict[str, Any]) -> Contender:
         if not any(_fits(value, kind) for kind in _alternatives(kinds[name])):
             wanted = " or ".join(str(getattr(kind, "__name__", kind)) for kind in _alternatives(kinds[name]))
             raise InputError(f"{tracker}: option {name} must be {wanted}, found {value!r}")
-    return Contender(label, tracker, options)
+    return TrackerSpec(label, tracker, options)
 
 
 def _settable(tracker: str) -> dict[str, Any]:

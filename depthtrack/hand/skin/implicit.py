@@ -59,7 +59,7 @@ class Cone:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class Web:
     """A web: strands from one edge to another, side by side, thinning towards the far end.
 
     `one` and `other` (2, 3) are the near and the far end of either edge; `radius_near` and `radius_far` half the
@@ -91,7 +91,7 @@ def smooth_min(a: Array, b: Array, k: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Flesh:
+class ImplicitHand:
     """The solid hand at rest. `bones` (16, 4, 4) are the rest transforms, T_palm_body."""
 
     shape: HandShape
@@ -99,7 +99,7 @@ class Flesh:
     fingers: tuple[tuple[Cone, ...], ...]
     palm: tuple[tuple[Cone, ...], ...]
     muscles: tuple[Cone, ...]
-    webs: tuple[Sheet, ...]
+    webs: tuple[Web, ...]
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
@@ -214,7 +214,7 @@ def _muscles(shape: HandShape, bones: Array) -> list[Cone]:
     return [thenar, hypothenar]
 
 
-def _webs(shape: HandShape, bones: Array) -> list[Sheet]:
+def _webs(shape: HandShape, bones: Array) -> list[Web]:
     webs = []
     for finger in range(1, 4):
         radius = float(shape.radii[finger : finger + 2, 0].mean())
@@ -223,7 +223,7 @@ def _webs(shape: HandShape, bones: Array) -> list[Sheet]:
             np.stack([_at(bones[body_of(f, 0)], (0, t * shape.lengths[f, 0], 0.25 * radius)) for t in (-0.25, 0.33)])
             for f in (finger, finger + 1)
         )
-        webs.append(Sheet(one, other, 0.6 * radius, 0.42 * radius))
+        webs.append(Web(one, other, 0.6 * radius, 0.42 * radius))
     # Between thumb and index, the fold spans from metacarpal to metacarpal.
     length, knuckle, carpus = (
         shape.lengths[0, 0],
@@ -233,7 +233,7 @@ def _webs(shape: HandShape, bones: Array) -> list[Sheet]:
     thumb = np.stack([_at(bones[body_of(0, 0)], (0, t * length, 0)) for t in (0.35, 0.85)])
     index = np.stack([carpus + t * (knuckle - carpus) for t in (0.4, 0.75)])
     radius = 0.5 * float(shape.radii[1, 0])
-    return [*webs, Sheet(thumb, index, radius, radius)]
+    return [*webs, Web(thumb, index, radius, radius)]
 
 
 def _cone(T: Array, start: tuple[float, ...], end: tuple[float, ...], radius_start: float, radius_end: float) -> Cone:

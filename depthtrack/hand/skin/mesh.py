@@ -13,7 +13,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.isosurface import Faces, neighbour_average, polygonise
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.skin.implicit import Flesh, rest_pose
+from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
 from depthtrack.hand.skin.weights import skin_weights
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class Skin:
 
 @lru_cache(maxsize=8)
 def _skin_of(shape: HandShape) -> Skin:
-    flesh = Flesh.of(shape)
+    flesh = ImplicitHand.of(shape)
     low, high = flesh.bounds()
     vertices, faces = polygonise(flesh.distance, low, high, _cell(shape, high - low))
     _check_closed(vertices, faces)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from depthtrack.geometry.isosurface import Faces, neighbour_average
 from depthtrack.hand.kinematics import BODY_COUNT, body_of
-from depthtrack.hand.skin.implicit import Flesh
+from depthtrack.hand.skin.implicit import ImplicitHand
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ _BLEND = (1.4, 1.0, 1.0)
 """Half the width of the passage at each joint of a finger, in radii; the skin over a knuckle slides furthest."""
 
 
-def skin_weights(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
+def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
     """Convex weights (V, 16) of vertices (V, 3) on the flesh at rest."""
     to_finger = np.stack([flesh.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
     to_palm = flesh.palm_distance(vertices)
@@ -46,7 +46,7 @@ def skin_weights(flesh: Flesh, vertices: Array, faces: Faces) -> Array:
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
-def _along(flesh: Flesh, finger: int, points: Array, distance: Array) -> Array:
+def _along(flesh: ImplicitHand, finger: int, points: Array, distance: Array) -> Array:
     """Convex shares (N, 4) of the palm and the three phalanges, looking at one finger alone."""
     passed = np.ones(len(points))
     shares = np.empty((len(points), 4))

@@ -14,7 +14,7 @@ class OSMesaBinding:
 
     def __init__(self, osmesa: Any, gl: Any) -> None:
         self._osmesa, self._type = osmesa, gl.GL_UNSIGNED_BYTE
-        self._memory = (ctypes.c_ubyte * (4 * _SIDE * _SIDE))()
+        self._state = (ctypes.c_ubyte * (4 * _SIDE * _SIDE))()
         attributes = (
             *(osmesa.OSMESA_FORMAT, osmesa.OSMESA_RGBA),
             *(osmesa.OSMESA_PROFILE, osmesa.OSMESA_CORE_PROFILE),
@@ -25,7 +25,7 @@ class OSMesaBinding:
             raise OpenGLError("OSMesa gives no OpenGL 3.3 core context: a newer libosmesa6 is needed")
 
     def bind(self) -> None:
-        if not self._osmesa.OSMesaMakeCurrent(self._context, self._memory, self._type, _SIDE, _SIDE):
+        if not self._osmesa.OSMesaMakeCurrent(self._context, self._state, self._type, _SIDE, _SIDE):
             raise OpenGLError("OSMesa cannot make its context current")
 
     def unbind(self) -> None:

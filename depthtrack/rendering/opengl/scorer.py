@@ -56,7 +56,7 @@ class OpenGLScorer(ScorerBase):
         self._pixels = np.empty(0, np.float32)
         self._release = weakref.finalize(self, _discard, context, self._textures)
 
-    def observe(self, target: Target) -> None:
+    def set_target(self, target: Target) -> None:
         camera = target.camera
         # Floats, whatever the camera file held: one compiled kernel serves all.
         self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)

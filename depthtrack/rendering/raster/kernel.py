@@ -14,7 +14,7 @@ from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.spans import find_spans
 from depthtrack.rendering.raster.tiles import BLOCK, COLUMNS, ROWS
-from depthtrack.rendering.raster.work_queue.queue import give_back, take
+from depthtrack.rendering.raster.work_queue.queue import done, pop
 from depthtrack.rendering.surface import NEAR
 from depthtrack.simd.functions import (
     estimated_reciprocal,
@@ -48,7 +48,7 @@ _LARGE = 64
 
 
 @kernel_part
-def _draw(slot, is_segment, is_close, table, buffer, blocks, first, last, low, high):
+def _draw(slot, is_segment, crosses_near, table, buffer, blocks, first, last, low, high):
     """Draw one primitive; `low` and `high` keep the blocks of each stripe that were reached."""
     left, right = int(table[q.LEFT * q.SLOTS + slot]), int(table[q.RIGHT * q.SLOTS + slot])
     box_top, box_bottom = int(table[q.TOP * q.SLOTS + slot]), int(table[q.BOTTOM * q.SLOTS + slot])
@@ -63,7 +63,7 @@ def _draw(slot, is_segment, is_close, table, buffer, blocks, first, last, low, h
     axis_v = _fill(table[q.AXIS_V * q.SLOTS + slot])
     axis_low, axis_high = _fill(table[q.AXIS_LOW * q.SLOTS + slot]), _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
     sigma = table[q.SIGMA * q.SLOTS + slot]
-    is_special = is_close or sigma < 0.0
+    is_special = crosses_near or sigma < 0.0
     for stripe in range(left, right + 1):
         top, bottom = box_top, box_bottom
         if is_large:
@@ -100,13 +100,13 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
     """Draw all primitives into a cleared buffer; returns how many blocks a stripe has."""
     blocks = buffer.shape[0] // (low.shape[0] * BLOCK)
     set_up(pose, hand, camera, scratch, table)
-    is_close = pose[2] < hand[8 * layout.REACH] + NEAR
+    crosses_near = pose[2] < hand[8 * layout.REACH] + NEAR
     for n in range(_ACTIVE.shape[0]):
         slot = _ACTIVE[n]
         if slot < layout.CONES or slot > layout.GENERAL:
-            _draw(slot, False, is_close, table, buffer, blocks, first, last, low, high)
+            _draw(slot, False, crosses_near, table, buffer, blocks, first, last, low, high)
         else:
-            _draw(slot, True, is_close, table, buffer, blocks, first, last, low, high)
+            _draw(slot, True, crosses_near, table, buffer, blocks, first, last, low, high)
     return blocks
 
 
@@ -148,7 +148,7 @@ def score_poses(
     poses: Array,
     tickets: NDArray[np.int64],
     thread: int,
-    patience: int,
+    spin_limit: int,
     hand: Array,
     camera: Array,
     observed: Array32,
@@ -165,7 +165,7 @@ def score_poses(
     sums: Array,
     energies: Array,
 ) -> None:
-    """Score the poses that `tickets` are for, together with other threads; see `tickets.take` for when this returns.
+    """Score the poses that `tickets` are for, together with other threads; see `tickets.pop` for when this returns.
 
     `poses` (B, 27); `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes; `empty` the sums of
     Eq. (2) for an empty image; `objective`: d_m, d_M, unit, epsilon, lambda, lambda_k. Writes `sums` (B, 3) and
@@ -174,7 +174,7 @@ def score_poses(
     """
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
     while True:
-        n = take(tickets, thread, patience)
+        n = pop(tickets, thread, spin_limit)
         if n < 0:
             break
         blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
@@ -183,7 +183,7 @@ def score_poses(
         sums[n, 1] = on_skin
         sums[n, 2] = empty[2] + matched - on_skin
         energies[n] = _energy(poses[n], sums[n], objective)
-        give_back(tickets, thread)
+        done(tickets, thread)
 
 
 @kernel_part

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import layout
-from depthtrack.rendering.raster import tiles as stripes
+from depthtrack.rendering.raster import tiles as tiles
 from depthtrack.rendering.surface import NEAR
 from depthtrack.simd.functions import narrow, vabs, vfloor, vsqrt
 from depthtrack.simd.vectors import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
@@ -75,9 +75,9 @@ def _write(table, slot, camera, bounds, q, G, C):
     a lens on the surface; it is kept from dividing.
     """
     ex, ey = camera[4], camera[5]
-    left, right = vfloor(bounds[0] * (1 / stripes.COLUMNS)), vfloor(bounds[1] * (1 / stripes.COLUMNS))
-    top, bottom = vfloor(bounds[2] * (1 / stripes.ROWS)), vfloor(bounds[3] * (1 / stripes.ROWS))
-    u, v = left * stripes.COLUMNS, top * stripes.ROWS
+    left, right = vfloor(bounds[0] * (1 / tiles.COLUMNS)), vfloor(bounds[1] * (1 / tiles.COLUMNS))
+    top, bottom = vfloor(bounds[2] * (1 / tiles.ROWS)), vfloor(bounds[3] * (1 / tiles.ROWS))
+    u, v = left * tiles.COLUMNS, top * tiles.ROWS
     xx, yy, zz, xy, xz, yz = G
     dx, dy = (u - camera[2]) * ex, (v - camera[3]) * ey
     i = 1.0 / select(vabs(C) > 1e-12, C, 1e-12)

@@ -14,8 +14,8 @@ from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, Terms
 from depthtrack.rendering.raster import kernel, layout, quadrics
-from depthtrack.rendering.raster import tiles as stripes
-from depthtrack.rendering.raster.work_queue.queue import Tickets, is_done, new_tickets, offer, tell_to_leave
+from depthtrack.rendering.raster import tiles as tiles
+from depthtrack.rendering.raster.work_queue.queue import Tickets, is_done, new_tickets, submit, tell_to_leave
 from depthtrack.rendering.raster.work_queue.worker import Helper
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
@@ -41,9 +41,9 @@ class _Workspace:
 
     @classmethod
     def of(cls, shape: tuple[int, int]) -> Self:
-        count, blocks = stripes.stripe_counts(shape)
+        count, blocks = tiles.stripe_counts(shape)
         first, last = np.zeros((2, count + 1), np.int64)
-        return cls(stripes.new_stripes(shape), first, last, np.full(count, blocks), np.full(count, -1))
+        return cls(tiles.new_stripes(shape), first, last, np.full(count, blocks), np.full(count, -1))
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
@@ -73,14 +73,14 @@ class RasterScorer(ScorerBase):
         self._helpers = [Helper(partial(_help, weakref.ref(self), n)) for n in range(1, threads)]
         self._dismiss = weakref.finalize(self, _dismiss, self._tickets, self._helpers)
 
-    def observe(self, target: Target) -> None:
+    def set_target(self, target: Target) -> None:
         shape = target.camera.shape
         if self._target is None or self._target.camera.shape != shape:
             self._send_to_sleep()
             self._workspaces = [_Workspace.of(shape) for _ in range(len(self._helpers) + 1)]
-            self._observed, self._skin = stripes.new_stripes(shape), stripes.new_stripes(shape)
-        stripes.write_stripes(target.depth, np.nan, self._observed)
-        stripes.write_stripes(target.skin, 0, self._skin)
+            self._observed, self._skin = tiles.new_stripes(shape), tiles.new_stripes(shape)
+        tiles.write_stripes(target.depth, np.nan, self._observed)
+        tiles.write_stripes(target.skin, 0, self._skin)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty[:] = clamped, 0.0, np.count_nonzero(target.skin)
         c = target.camera
@@ -99,7 +99,7 @@ class RasterScorer(ScorerBase):
         shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
         space = self._workspaces[0]
         kernel.draw_pose(batch[0], self._hand, self._camera, *space.arrays)
-        inverse = stripes.read_stripes(space.buffer, shape)
+        inverse = tiles.read_stripes(space.buffer, shape)
         depth = np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
         space.buffer[:] = 0
         return depth
@@ -115,7 +115,7 @@ class RasterScorer(ScorerBase):
             self._send_to_sleep()
             self._make_room(count)
         self._poses[:count] = poses
-        offer(self._tickets, count)
+        submit(self._tickets, count)
         if count > 1:
             for helper in self._helpers:
                 helper.wake()

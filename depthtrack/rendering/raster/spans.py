@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import quadrics as q
-from depthtrack.rendering.raster import tiles as stripes
+from depthtrack.rendering.raster import tiles as tiles
 from depthtrack.simd.functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
 from depthtrack.simd.vectors import F32X16, kernel_part, loader, select, vmax, vmin
 
@@ -30,9 +30,9 @@ def find_spans(slot, is_segment, table, count, top, bottom, first, last):
     axis, axis_u = table[q.AXIS * q.SLOTS + slot], table[q.AXIS_U * q.SLOTS + slot]
     axis_near, axis_far = table[q.AXIS_NEAR * q.SLOTS + slot], table[q.AXIS_FAR * q.SLOTS + slot]
     per_row = table[q.ROWS_PER_AXIS * q.SLOTS + slot]
-    height = np.float32((bottom - top + 1) * stripes.ROWS)
+    height = np.float32((bottom - top + 1) * tiles.ROWS)
     for n in range(0, count, 2):
-        x = _load(_COLUMNS, 0) + np.float32(n * stripes.COLUMNS)
+        x = _load(_COLUMNS, 0) + np.float32(n * tiles.COLUMNS)
         b = x * d_uv + d_v
         discriminant = b * b - (x * (x * d_uu + d_u) + d) * four_a
         root = discriminant * estimated_reciprocal_sqrt(discriminant)

@@ -20,8 +20,8 @@ def stripe_counts(shape: tuple[int, int]) -> tuple[int, int]:
 
 def new_stripes(shape: tuple[int, int]) -> NDArray[np.float32]:
     """Zeros (stripes * blocks * BLOCK,) for an image of (height, width), aligned to cache lines."""
-    stripes, blocks = stripe_counts(shape)
-    size = stripes * blocks * BLOCK
+    tiles, blocks = stripe_counts(shape)
+    size = tiles * blocks * BLOCK
     memory = np.zeros(size + _CACHE_LINE // 4, np.float32)
     start = -memory.ctypes.data % _CACHE_LINE // 4
     return memory[start : start + size]
@@ -29,14 +29,14 @@ def new_stripes(shape: tuple[int, int]) -> NDArray[np.float32]:
 
 def write_stripes(image: NDArray[np.generic], beyond: float, stored: NDArray[np.float32]) -> None:
     """Store an image (h, w); what the last blocks hold beyond it becomes `beyond`."""
-    (height, width), (stripes, blocks) = image.shape, stripe_counts(image.shape)
-    rows = np.full((blocks * ROWS, stripes * COLUMNS), beyond, np.float32)
+    (height, width), (tiles, blocks) = image.shape, stripe_counts(image.shape)
+    rows = np.full((blocks * ROWS, tiles * COLUMNS), beyond, np.float32)
     rows[:height, :width] = image
-    stored.reshape(stripes, blocks * ROWS, COLUMNS)[:] = rows.reshape(-1, stripes, COLUMNS).swapaxes(0, 1)
+    stored.reshape(tiles, blocks * ROWS, COLUMNS)[:] = rows.reshape(-1, tiles, COLUMNS).swapaxes(0, 1)
 
 
 def read_stripes(stored: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.float32]:
     """The image (h, w) of that shape."""
-    stripes, blocks = stripe_counts(shape)
-    rows = stored.reshape(stripes, blocks * ROWS, COLUMNS).swapaxes(0, 1).reshape(-1, stripes * COLUMNS)
+    tiles, blocks = stripe_counts(shape)
+    rows = stored.reshape(tiles, blocks * ROWS, COLUMNS).swapaxes(0, 1).reshape(-1, tiles * COLUMNS)
     return rows[: shape[0], : shape[1]]

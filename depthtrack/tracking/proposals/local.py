@@ -39,7 +39,7 @@ _FINGER_TRIALS, _FINGER_KEPT, _FINGER_SPREADS = 96, 8, (0.2, 0.1)
 are: standard deviations, radians."""
 
 
-def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
+def local_proposals(pose: Array, generator: np.random.Generator, count: int) -> Array:
     """Poses (count, 27) of hands close to where the one in `pose` (27,) is, every finger in some typical posture; in
     every fourth, those of `pose` are kept."""
     shift, turn = generator.standard_normal((2, count, 3)) * [[[_PLACE]], [[_TURN]]]
@@ -50,7 +50,7 @@ def close_by(pose: Array, generator: np.random.Generator, count: int) -> Array:
     return within_limits(make_pose(pose[POSITION] + shift, quaternions, angles))
 
 
-def other_finger(scorer: Scorer, pose: Array, finger: int, generator: np.random.Generator) -> tuple[Array, float]:
+def search_one_finger(scorer: Scorer, pose: Array, finger: int, generator: np.random.Generator) -> tuple[Array, float]:
     """The pose (27,) that explains the observation best if but one finger (0 to 4) of `pose` (27,) is elsewhere, and
     its energy: among typical and random postures of it, and twice around the best of them."""
     limits = slice(4 * finger, 4 * finger + 4)
@@ -74,7 +74,7 @@ def _best(scorer: Scorer, poses: Array) -> tuple[Array, Array]:
     return poses[best], energies[best]
 
 
-def one_finger_further(model: HandModel, pose: Array) -> Array:
+def finger_shift_proposals(model: HandModel, pose: Array) -> Array:
     """Poses (2, 27) of the hand in `pose` (27,) with each finger where the next one was, one way and the other: what
     remains of a hand that was found one finger beside where it is. The thumb, and a finger that has none beside it on
     that side, go along."""

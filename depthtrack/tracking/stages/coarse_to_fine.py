@@ -19,9 +19,9 @@ from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
-from depthtrack.solver.icp import FitOptions, Fitter
+from depthtrack.solver.icp import IcpFitter, IcpOptions
 from depthtrack.solver.prior import Prior
-from depthtrack.solver.subspace import FULL, Space
+from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.surfaces.registry import Model, make_surface
 
@@ -42,7 +42,7 @@ class Stage(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Ladder:
+class CoarseToFine:
     """The hierarchy: `stages`, and the `samples` postures from which the first of them takes the best that differ by
     `apart` (rad, root mean square) or more. One sample is the mean posture."""
 
@@ -56,59 +56,64 @@ class Ladder:
     apart: float = 0.15
 
 
-PAPER_LADDER = Ladder((Stage(1, 1, 10), Stage(1, 4, 10), Stage(1, None, 10)), samples=1)
+PAPER_COARSE_TO_FINE = CoarseToFine((Stage(1, 1, 10), Stage(1, 4, 10), Stage(1, None, 10)), samples=1)
 """Schroeder et al. 2014, Fig. 11: 1 synergy, 4, all angles, from the mean posture, ten ICP iterations each."""
 
-FLAT_LADDER = Ladder((Stage(1, None, 10),), samples=1)
+DIRECT = CoarseToFine((Stage(1, None, 10),), samples=1)
 """No hierarchy: all angles at once, from the mean posture."""
 
 
 class SingleFrameFitter:
     """Estimates a hand's posture from one frame alone, where only its global pose is known.
 
-    `fit` says how, `PAPER_FIT` as the paper does; every `subsample`-th point is used. Equal calls give equal bits.
+    `fit` says how, `PAPER_ICP` as the paper does; every `subsample`-th point is used. Equal calls give equal bits.
     """
 
     def __init__(
         self,
         shape: HandShape,
         synergies: Synergies,
-        ladder: Ladder | None = None,
-        fit: FitOptions | None = None,
+        coarse_to_fine: CoarseToFine | None = None,
+        fit: IcpOptions | None = None,
         model: Model = "skin",
         subsample: int = 1,
         seed: int = 0,
     ) -> None:
-        options = fit or FitOptions()
-        self._fitter = Fitter(shape, make_surface(model, shape), options)
+        options = fit or IcpOptions()
+        self._fitter = IcpFitter(shape, make_surface(model, shape), options)
         self._scorer = RasterScorer(shape)
-        self._synergies, self._ladder = synergies, ladder or Ladder()
+        self._synergies, self._ladder = synergies, coarse_to_fine or CoarseToFine()
         self._subsample, self._seed = subsample, seed
 
     def estimate(self, observation: Observation, pose: ArrayLike) -> Array:
         """The pose (27,) of the observed hand: `pose` (27,) tells about where it is; its angles are not looked at."""
         target = Target(observation.camera, observation.skin, observation.depth)
-        self._scorer.observe(target.reduced(_LONGEST_SIDE))
-        self._fitter.observe(observation, self._subsample)
+        self._scorer.set_target(target.reduced(_LONGEST_SIDE))
+        self._fitter.set_target(observation, self._subsample)
         generator = frame_generator(self._seed, observation.frame_index)
         start = np.array(pose, dtype=np.float64)
-        return climb(self._fitter, self._scorer, start, self._synergies, self._ladder, generator)
+        return estimate_single_frame(self._fitter, self._scorer, start, self._synergies, self._ladder, generator)
 
 
-def climb(
-    fitter: Fitter, scorer: Scorer, pose: Array, synergies: Synergies, ladder: Ladder, generator: np.random.Generator
+def estimate_single_frame(
+    fitter: IcpFitter,
+    scorer: Scorer,
+    pose: Array,
+    synergies: Synergies,
+    coarse_to_fine: CoarseToFine,
+    generator: np.random.Generator,
 ) -> Array:
     """The pose (27,) that a hierarchy of stages finds when the global part of `pose` is about right."""
-    poses = np.tile(pose, (ladder.samples, 1))
+    poses = np.tile(pose, (coarse_to_fine.samples, 1))
     poses[0, ANGLES] = synergies.mean
-    poses[1:, ANGLES] = postures(synergies, generator, ladder.samples - 1)
-    poses = by_energy(scorer, within_limits(poses))[0]
-    poses = poses[_different(poses[:, ANGLES], ladder.apart, ladder.stages[0].keep)]
-    return descend(fitter, scorer, poses, synergies, ladder.stages)[0][0]
+    poses[1:, ANGLES] = postures(synergies, generator, coarse_to_fine.samples - 1)
+    poses = sort_by_energy(scorer, within_limits(poses))[0]
+    poses = poses[_different(poses[:, ANGLES], coarse_to_fine.apart, coarse_to_fine.stages[0].keep)]
+    return run_stages(fitter, scorer, poses, synergies, coarse_to_fine.stages)[0][0]
 
 
-def descend(
-    fitter: Fitter, scorer: Scorer, poses: Array, synergies: Synergies, stages: Sequence[Stage]
+def run_stages(
+    fitter: IcpFitter, scorer: Scorer, poses: Array, synergies: Synergies, stages: Sequence[Stage]
 ) -> tuple[Array, Array]:
     """Poses (N, 27), best first, and their energies (N,) after all stages; `poses` (B, 27) are best first too.
 
@@ -117,25 +122,25 @@ def descend(
     energies = np.full(len(poses), np.inf)
     for keep, count, rounds, coarse in stages:
         poses = np.stack([_fit(fitter, pose, space_of(synergies, count), rounds, coarse) for pose in poses[:keep]])
-        poses, energies = by_energy(scorer, poses)
+        poses, energies = sort_by_energy(scorer, poses)
     return poses, energies
 
 
-def _fit(fitter: Fitter, pose: Array, space: Space, rounds: int, coarse: bool) -> Array:
-    prior = Prior.held(pose[ANGLES], fitter.options.hold) if space.full else None
+def _fit(fitter: IcpFitter, pose: Array, space: PostureSubspace, rounds: int, coarse: bool) -> Array:
+    prior = Prior.towards(pose[ANGLES], fitter.options.temporal_weight) if space.full else None
     return fitter.fit(pose, space, rounds, prior, coarse)
 
 
-def by_energy(scorer: Scorer, poses: Array) -> tuple[Array, Array]:
+def sort_by_energy(scorer: Scorer, poses: Array) -> tuple[Array, Array]:
     """Poses (N, 27) sorted by how well they explain the observation, best first, and their energies (N,)."""
     energies = scorer.score(poses)
     order = np.argsort(energies, kind="stable")
     return poses[order], energies[order]
 
 
-def space_of(synergies: Synergies, count: int | None) -> Space:
+def space_of(synergies: Synergies, count: int | None) -> PostureSubspace:
     """The space of so many synergies, or of as many as there are; None: of all angles."""
-    return FULL if count is None else Space.of(synergies, min(count, len(synergies)))
+    return FULL if count is None else PostureSubspace.of(synergies, min(count, len(synergies)))
 
 
 def postures(synergies: Synergies, generator: np.random.Generator, count: int) -> Array:

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from depthtrack.hand.synergies import Synergies
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.solver.icp import Fitter
+from depthtrack.solver.icp import IcpFitter
 from depthtrack.tracking.proposals.global_ import apart, hypotheses, typical_angles
-from depthtrack.tracking.stages.coarse_to_fine import Stage, by_energy, descend, postures
+from depthtrack.tracking.stages.coarse_to_fine import Stage, postures, run_stages, sort_by_energy
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class SearchOptions:
 
 
 def find_pose(
-    fitter: Fitter,
+    fitter: IcpFitter,
     scorer: Scorer,
     centre: Array,
     synergies: Synergies,
@@ -47,9 +47,9 @@ def find_pose(
     best, lowest = np.empty(0), np.inf
     for _ in range(options.attempts):
         angles = _angles(synergies, generator, options.hypotheses)
-        poses = by_energy(scorer, hypotheses(centre, angles, generator, arm))[0]
+        poses = sort_by_energy(scorer, hypotheses(centre, angles, generator, arm))[0]
         poses = poses[apart(poses, options.apart, options.stages[0].keep)]
-        poses, energies = descend(fitter, scorer, poses, synergies, options.stages)
+        poses, energies = run_stages(fitter, scorer, poses, synergies, options.stages)
         before = lowest
         if energies[0] < lowest:
             best, lowest = poses[0], float(energies[0])

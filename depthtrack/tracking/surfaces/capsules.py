@@ -11,12 +11,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.hand.compiled_kinematics import Bodies
+from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
-from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class Distances(NamedTuple):
     which: NDArray[np.int32]
 
     @staticmethod
-    def room(capsules: int, points: int) -> "Distances":
+    def allocate(capsules: int, points: int) -> "Distances":
         """Room for so many."""
         each = np.empty((capsules, points), np.float32)
         return Distances(each, np.empty(points, np.float32), np.empty(points, np.int32))
@@ -64,24 +64,31 @@ class CapsuleSurface:
         self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
         self._scorer = RasterScorer(shape)
 
-    def observe(self, observation: Observation, cloud: Cloud, reach: float) -> None:
+    def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         target = Target(observation.camera, observation.skin, observation.depth).reduced(_RESOLUTION)
-        self._scorer.observe(target)
+        self._scorer.set_target(target)
         c = target.camera
         self._lens = (c.fx, c.fy, c.cx, c.cy)
-        self._reach = reach
-        self._distances = Distances.room(len(self._capsules.body), len(cloud.points))
+        self._reach = max_distance
+        self._distances = Distances.allocate(len(self._capsules.body), len(cloud.points))
 
-    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
+    def match(
+        self,
+        pose: Array,
+        bodies: BodyPoses,
+        cloud: PointCloud,
+        min_normal_cosine: float,
+        correspondences: Correspondences,
+    ) -> None:
         view = View(self._scorer.render(pose), self._lens)
         place_capsules(self._capsules, bodies, self._placed)
         measure(cloud.points, self._capsules, self._placed, self._distances)
-        limits = (self._reach, agreement)
-        choose(cloud, self._capsules, self._placed, self._distances, view, limits, matches)
+        limits = (self._reach, min_normal_cosine)
+        choose(cloud, self._capsules, self._placed, self._distances, view, limits, correspondences)
 
 
 @numba.njit(cache=True, nogil=True)
-def place_capsules(capsules: Capsules, bodies: Bodies, placed: Placed) -> None:
+def place_capsules(capsules: Capsules, bodies: BodyPoses, placed: Placed) -> None:
     """Move the capsules to where their bodies are."""
     for k in range(capsules.body.shape[0]):
         T = bodies.T[capsules.body[k]]
@@ -126,31 +133,32 @@ def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -
 
 @numba.njit(cache=True, nogil=True)
 def choose(
-    cloud: Cloud,
+    cloud: PointCloud,
     capsules: Capsules,
     placed: Placed,
     distances: Distances,
     view: View,
     limits: tuple[float, float],
-    matches: Matches,
+    correspondences: Correspondences,
 ) -> None:
-    """The nearest capsule whose closest point is seen and faces as observed; its point and normal into `matches`.
+    """The nearest capsule whose closest point is seen and faces as observed; its point and normal into
+    `correspondences`.
 
     `limits`: reach (m) and agreement (cosine) of `matching.Surface`.
     """
-    x, n, normals = matches.x, matches.n, cloud.normals
-    reach, agreement = limits
+    x, n, normals = correspondences.x, correspondences.n, cloud.normals
+    max_distance, min_normal_cosine = limits
     for i in range(cloud.points.shape[0]):
-        matches.body[i] = -1
+        correspondences.body[i] = -1
         k, distance = distances.which[i], distances.least[i]
-        while distance < reach:
+        while distance < max_distance:
             surface_point(cloud.points, i, capsules, placed, k, x, n)
             same = n[i, 0] * normals[i, 0] + n[i, 1] * normals[i, 1] + n[i, 2] * normals[i, 2]
-            if same >= agreement and not _hidden(x, i, view):
-                matches.body[i] = capsules.body[k]
+            if same >= min_normal_cosine and not _hidden(x, i, view):
+                correspondences.body[i] = capsules.body[k]
                 break
             # The next one further out.
-            passed, distance = distance, reach
+            passed, distance = distance, max_distance
             for j in range(capsules.body.shape[0]):
                 if passed < distances.each[j, i] < distance:
                     k, distance = j, distances.each[j, i]

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from depthtrack.hand.compiled_kinematics import Bodies
+from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
-from depthtrack.solver.correspondences import Cloud, Matches
+from depthtrack.solver.correspondences import Correspondences, PointCloud
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
@@ -107,19 +107,26 @@ class MeshSurface:
         count = len(self._model.rest)
         self._posed = Posed(np.empty((count, 3)), np.empty((count, 3)))
 
-    def observe(self, observation: Observation, cloud: Cloud, reach: float) -> None:
-        self._reach = reach
-        self._cells = cells_over(cloud.points, _CELL, reach)
+    def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
+        self._reach = max_distance
+        self._cells = cells_over(cloud.points, _CELL, max_distance)
 
-    def match(self, pose: Array, bodies: Bodies, cloud: Cloud, agreement: float, matches: Matches) -> None:
+    def match(
+        self,
+        pose: Array,
+        bodies: BodyPoses,
+        cloud: PointCloud,
+        min_normal_cosine: float,
+        correspondences: Correspondences,
+    ) -> None:
         skin_vertices(self._model, bodies, self._posed)
         seen = sort_seen(self._model, self._posed, self._cells, _HIDDEN)
-        closest_vertices(cloud, seen, self._cells, self._reach, agreement, matches.body)
-        take_up(self._model, self._posed, seen, matches)
+        closest_vertices(cloud, seen, self._cells, self._reach, min_normal_cosine, correspondences.body)
+        resolve_bodies(self._model, self._posed, seen, correspondences)
 
 
 @numba.njit(cache=True, nogil=True)
-def skin_vertices(model: MeshModel, bodies: Bodies, posed: Posed) -> None:
+def skin_vertices(model: MeshModel, bodies: BodyPoses, posed: Posed) -> None:
     """Pose vertices and normals by linear blend skinning."""
     A = np.empty((16, 12))
     for b in range(16):
@@ -202,12 +209,12 @@ def sort_seen(model: MeshModel, posed: Posed, cells: Cells, tolerance: float) ->
         first[c] += first[c - 1]
     total = first[-1]
     seen = Seen(first, np.empty(total, np.int64), np.full((6, total + LANES), FAR), posed.x[0].copy())
-    place = first[:-1].copy()
+    forward_kinematics = first[:-1].copy()
     for v in range(count):
         if cell[v] < 0:
             continue
-        k = place[cell[v]]
-        place[cell[v]] += 1
+        k = forward_kinematics[cell[v]]
+        forward_kinematics[cell[v]] += 1
         seen.vertex[k] = v
         for j in range(3):
             seen.table[j, k], seen.table[3 + j, k] = posed.x[v, j] - seen.origin[j], posed.n[v, j]
@@ -215,12 +222,12 @@ def sort_seen(model: MeshModel, posed: Posed, cells: Cells, tolerance: float) ->
 
 
 @numba.njit(cache=True, nogil=True)
-def take_up(model: MeshModel, posed: Posed, seen: Seen, matches: Matches) -> None:
+def resolve_bodies(model: MeshModel, posed: Posed, seen: Seen, correspondences: Correspondences) -> None:
     """Complete the matches, whose `body` tells a seen vertex as yet: it counts as fixed to the body that moves it
     most."""
-    for i in range(matches.body.shape[0]):
-        if matches.body[i] >= 0:
-            v = seen.vertex[matches.body[i]]
-            matches.body[i] = model.bodies[v, 0]
+    for i in range(correspondences.body.shape[0]):
+        if correspondences.body[i] >= 0:
+            v = seen.vertex[correspondences.body[i]]
+            correspondences.body[i] = model.bodies[v, 0]
             for j in range(3):
-                matches.x[i, j], matches.n[i, j] = posed.x[v, j], posed.n[v, j]
+                correspondences.x[i, j], correspondences.n[i, j] = posed.x[v, j], posed.n[v, j]

@@ -23,7 +23,7 @@ def new_tickets(threads: int) -> Tickets:
 
 
 @numba.njit(cache=True, nogil=True)
-def offer(tickets: Tickets, count: int) -> None:
+def submit(tickets: Tickets, count: int) -> None:
     """Begin a batch of `count`; all of the last one must be done."""
     batch = ((peek(tickets, _LIMIT) >> 32) + 1) << 32
     tickets[_DONE:] = 0
@@ -32,13 +32,13 @@ def offer(tickets: Tickets, count: int) -> None:
 
 
 @kernel_part
-def take(tickets, thread, patience):
+def pop(tickets, thread, spin_limit):
     """The next ticket; -1 for thread 0 once all are done, for others when told to leave, for any out of patience.
 
-    `patience` counts looks at a batch that has no more tickets: a hundred take a few microseconds.
+    `spin_limit` counts looks at a batch that has no more tickets: a hundred take a few microseconds.
     """
     looks = 0
-    while looks < patience:
+    while looks < spin_limit:
         limit, ticket = peek(tickets, _LIMIT), peek(tickets, _NEXT)
         if ticket < limit and ticket >> 32 == limit >> 32:
             ticket = fetch_add(tickets, _NEXT, 1)
@@ -53,7 +53,7 @@ def take(tickets, thread, patience):
 
 
 @kernel_part
-def give_back(tickets, thread):
+def done(tickets, thread):
     """Say that the work of a ticket is done."""
     place = _DONE + 8 * thread
     publish(tickets, place, tickets[place] + 1)
