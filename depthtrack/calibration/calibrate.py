@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
@@ -23,8 +22,7 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, find_pose
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 VIEWS = 16
 """Frames that sizes are measured on."""
@@ -54,7 +52,7 @@ class Found:
     energies: Array
     agreements: Array
 
-    def best(self, share: float) -> NDArray[np.int64]:
+    def best(self, share: float) -> Index:
         """The views with the lowest energies."""
         return np.argsort(self.energies, kind="stable")[: max(2, round(share * len(self.energies)))]
 

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.calibration.parameters import COUNT, hand_of, prior_covariance
 from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
 from depthtrack.hand.shape import Side
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 _SOFTNESS = (0.020, 0.006)
 """Metres, in the first and in the last round: distances from which on a residual counts less."""
@@ -102,7 +100,7 @@ def _eliminate(
     return information, gradient, steps
 
 
-def _solve(A: Array, b: Array, held: NDArray[np.bool_]) -> Array:
+def _solve(A: Array, b: Array, held: Mask) -> Array:
     """x (35,) with A x = b where sizes are not held."""
     x = np.zeros(COUNT)
     free = ~held

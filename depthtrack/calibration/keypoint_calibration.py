@@ -3,15 +3,14 @@
 from typing import get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.solver.keypoints import IN_PALM, fit_poses, is_known
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _ROUNDS = 5
 """Alignments of all palms to their median, which is then taken again."""

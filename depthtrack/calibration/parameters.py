@@ -5,14 +5,11 @@ they stay positive and equal steps mean equal shares; the offsets of the base jo
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.shape import HandShape, Side
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from depthtrack.types import Array, Index
 
 SCALE = slice(0, 1)
 LENGTHS = slice(1, 16)

@@ -9,7 +9,6 @@ alone would let a hand be too small, and depth alone sees neither how broad nor 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
@@ -21,9 +20,7 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from depthtrack.types import Array, Index, Mask
 
 _POINTS = 1200
 """Points of a view that are used, about."""
@@ -72,7 +69,7 @@ class PosedSkin:
         vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)
         return rasterise(view.observation.camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
 
-    def is_hand(self, pose: Array, points: Array) -> NDArray[np.bool_]:
+    def is_hand(self, pose: Array, points: Array) -> Mask:
         """Which points (N, 3) lie before the wrist, towards the fingers."""
         T = self.model.transforms(pose)[0]
         return np.asarray((points - T[:3, 3]) @ T[:3, 1] > self.wrist)
@@ -183,7 +180,7 @@ def _gradients(model: HandModel, pose: Array, residuals: _Residuals) -> Array:
     return a
 
 
-def _beyond(mask: NDArray[np.bool_]) -> Array:
+def _beyond(mask: Mask) -> Array:
     """(h, w) how many pixels each lies outside the mask's outline, negative inside."""
     outside, inside = (np.asarray(distance_transform_edt(part), dtype=np.float64) for part in (~mask, mask))
     return np.where(mask, 0.5 - inside, outside - 0.5)

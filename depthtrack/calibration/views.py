@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.surface_grid import disc
+from depthtrack.types import Index
 
 _LOOKED_AT = 240
 """Frames of a recording that are looked at, at most, spread over all of it."""
@@ -55,7 +55,7 @@ def finger_area(observation: Observation) -> float:
     return float(np.count_nonzero(observation.skin & (palm == 0)) * pixel**2)
 
 
-def _apart(ranked: NDArray[np.int64], count: int, gap: int) -> list[int]:
+def _apart(ranked: Index, count: int, gap: int) -> list[int]:
     """The first `count` numbers, in order, that differ by at least `gap` from those before."""
     chosen: list[int] = []
     for i in ranked.tolist():

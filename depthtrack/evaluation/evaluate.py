@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics import (
     Losses,
@@ -27,8 +26,8 @@ from depthtrack.evaluation.residuals import run_residuals
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
 """Wraps the frames as they are looked at again: a progress bar."""
 

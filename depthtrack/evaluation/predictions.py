@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import Metric, PointErrors, SuccessCurve
@@ -13,8 +12,7 @@ from depthtrack.export.benchmark_joints import Benchmark
 from depthtrack.export.uvd import read_uvd
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.recording.sequence import Sequence
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)

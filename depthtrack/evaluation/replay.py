@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
@@ -20,8 +19,6 @@ from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.pipeline import roi_prior
 from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.tracker import Estimate, Status
-
-Array = NDArray[np.float64]
 
 _SAME_TIME = 1e-6
 _LONGEST_PATH = 1024

@@ -3,15 +3,13 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
 from depthtrack.evaluation.replay import ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.hand_surface import ModelSurface
 from depthtrack.segmentation.observation import Observation
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _FINEST = 0.001
 """Metres between the points of the model's surface, at most: a distance to the nearest is one to the surface."""

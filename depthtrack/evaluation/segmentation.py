@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -14,6 +13,7 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.pipeline import follow, roi_prior
 from depthtrack.tracking.tracker import Tracker
+from depthtrack.types import Mask
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class SegmentedFrame:
 
     frame: Frame
     observation: Observation | None
-    mask: NDArray[np.bool_] | None
+    mask: Mask | None
     iou: float | None
     ms: float
 
@@ -66,7 +66,7 @@ def segment_sequence(
         yield SegmentedFrame(frame, observation, mask, None if truth is None else overlap(mask, truth), ms)
 
 
-def whole_mask(observation: Observation, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def whole_mask(observation: Observation, shape: tuple[int, ...]) -> Mask:
     """The hand's silhouette over the whole frame (h, w)."""
     mask = np.zeros(shape, dtype=np.bool_)
     left, top = observation.origin
@@ -74,7 +74,7 @@ def whole_mask(observation: Observation, shape: tuple[int, ...]) -> NDArray[np.b
     return mask
 
 
-def overlap(mask: NDArray[np.bool_] | None, truth: NDArray[np.bool_]) -> float:
+def overlap(mask: Mask | None, truth: Mask) -> float:
     """Intersection over union of two silhouettes (h, w), the Jaccard index; two empty ones agree."""
     if mask is None:
         return float(not truth.any())

@@ -8,14 +8,14 @@ joint of a finger lies at the middle knuckle, and its two wrist points beyond th
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Mixture = dict[str, float]
 """Keypoints and their weights, which sum to 1."""
 

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
+from depthtrack.types import Array, Index
 
 
 @dataclass(frozen=True)
@@ -20,13 +18,13 @@ class JointTrack:
     frame, MediaPipe's order.
     """
 
-    index: NDArray[np.int64]
-    timestamps: NDArray[np.float64]
+    index: Index
+    timestamps: Array
     status: tuple[str, ...]
-    energy: NDArray[np.float64]
-    confidence: NDArray[np.float64]
-    poses: NDArray[np.float64]
-    keypoints: NDArray[np.float64]
+    energy: Array
+    confidence: Array
+    poses: Array
+    keypoints: Array
 
     @classmethod
     def of(cls, run: Run, hand: HandShape) -> Self:

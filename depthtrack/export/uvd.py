@@ -9,7 +9,6 @@ from array import array
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.export.benchmark_joints import Benchmark
@@ -17,8 +16,7 @@ from depthtrack.export.writing import written_aside
 from depthtrack.files import read_lines
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 MAX_BYTES = 1 << 28
 """Largest file read: a hundred times the benchmarks' own."""

@@ -1,9 +1,9 @@
 """The rigid motion between corresponding points, in closed form."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def rigid_alignment(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> tuple[Array, Array]:

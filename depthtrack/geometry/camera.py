@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
+from depthtrack.types import Array
 
 MAX_SIDE = 8192
 """Largest image side accepted, in pixels: bounds the memory an absurd header can ask for."""
@@ -54,17 +55,17 @@ class Camera:
         return self.height, self.width
 
     @property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Array:
         """(3, 3) intrinsic matrix K."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], dtype=np.float64)
 
-    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+    def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2) of camera-frame points (..., 3), in metres; points with z <= 0 give NaN."""
         p = np.asarray(points, dtype=np.float64)
         z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
         return np.stack([self.fx * p[..., 0] / z + self.cx, self.fy * p[..., 1] / z + self.cy], axis=-1)
 
-    def unproject(self, pixels: ArrayLike, depth: ArrayLike) -> NDArray[np.float64]:
+    def unproject(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
         """Camera-frame points (..., 3) in metres of pixels (..., 2) at depth (...)."""
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth, dtype=np.float64)

@@ -8,11 +8,10 @@ that the mesh is a closed manifold whatever the solid.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from depthtrack.types import Array, Faces, Index, Mask
+
 Field = Callable[[Array], Array]
 """Signed values (N,), about the distance in metres near the surface, of points (N, 3)."""
 
@@ -39,7 +38,7 @@ def polygonise(field: Field, low: Array, high: Array, cell: float, rounds: int =
     return _project(field, vertices, 0.1 * cell), faces
 
 
-def surface_nets(values: Array) -> tuple[Array, NDArray[np.int64]]:
+def surface_nets(values: Array) -> tuple[Array, Index]:
     """Vertices (V, 3) in grid units and outward quads (Q, 4) around the negative nodes of a grid (nx, ny, nz)."""
     cells = _cell_values(values)
     inside = cells < 0
@@ -58,7 +57,7 @@ def surface_nets(values: Array) -> tuple[Array, NDArray[np.int64]]:
     return vertices, np.concatenate([_quads_across(values < 0, index, axis) for axis in range(3)])
 
 
-def _quads_across(inside: NDArray[np.bool_], index: NDArray[np.int64], axis: int) -> NDArray[np.int64]:
+def _quads_across(inside: Mask, index: Index, axis: int) -> Index:
     """Quads (Q, 4) of the four cells around every crossed grid edge along `axis`."""
     inside, index = np.moveaxis(inside, axis, 0), np.moveaxis(index, axis, 0)
     start, end = inside[:-1, 1:-1, 1:-1], inside[1:, 1:-1, 1:-1]
@@ -89,7 +88,7 @@ def _without_double_sheets(values: Array) -> Array:
         values[i, j, k] = np.where(values[i, j, k] < 0, values[i, j, k], -1e-3 * np.abs(values).mean())
 
 
-def _ambiguous() -> NDArray[np.bool_]:
+def _ambiguous() -> Mask:
     """(256,) whether a cell's inside or outside corners, one bit each, fall into pieces or a face is a checkerboard."""
     table = np.zeros(256, dtype=np.bool_)
     faces = [[c for c in range(8) if _CORNERS[c, axis] == side] for axis in range(3) for side in (0, 1)]
@@ -108,7 +107,7 @@ def _ambiguous() -> NDArray[np.bool_]:
 _AMBIGUOUS = _ambiguous()
 
 
-def _triangles(vertices: Array, quads: NDArray[np.int64]) -> Faces:
+def _triangles(vertices: Array, quads: Index) -> Faces:
     """Quads (Q, 4) cut along their shorter diagonal."""
     a, b, c, d = quads.T
     first = np.linalg.norm(vertices[a] - vertices[c], axis=-1) <= np.linalg.norm(vertices[b] - vertices[d], axis=-1)

@@ -3,9 +3,9 @@
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.types import Array, Mask
 
 
 class Window(NamedTuple):
@@ -22,7 +22,7 @@ class Window(NamedTuple):
         return cls(0, 0, camera.width, camera.height)
 
     @classmethod
-    def around(cls, camera: Camera, centre: NDArray[np.float64], reach: float) -> Self:
+    def around(cls, camera: Camera, centre: Array, reach: float) -> Self:
         """What may see points within `reach` metres of `centre` (3,) across the line of sight; never empty."""
         (u, v), z = camera.project(centre), float(centre[2])
         du, dv = camera.fx * reach / z, camera.fy * reach / z
@@ -52,7 +52,7 @@ class Window(NamedTuple):
             min(self.bottom + margin, camera.height),
         )
 
-    def pasted(self, mask: NDArray[np.bool_], outer: "Window") -> NDArray[np.bool_]:
+    def pasted(self, mask: Mask, outer: "Window") -> Mask:
         """`mask` (h, w) of this window as one of an `outer` window that holds it."""
         out = np.zeros((outer.height, outer.width), dtype=np.bool_)
         left, top = self.left - outer.left, self.top - outer.top

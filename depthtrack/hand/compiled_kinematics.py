@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 class Chain(NamedTuple):

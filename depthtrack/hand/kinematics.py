@@ -8,12 +8,11 @@ thumb (and, for the thumb itself, out of the palm: palmar abduction).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.pose import ANGLES, FINGERS, ORIENTATION, POSITION, TANGENT_SIZE, rotation_matrix
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 BODY_COUNT = 16
 JOINT_NAMES = ("wrist", *(f"{finger}_{k}" for finger in FINGERS for k in range(3)))
@@ -31,7 +30,7 @@ def body_of(finger: int, phalanx: int) -> int:
     return 1 + 3 * finger + phalanx
 
 
-def _moves() -> NDArray[np.bool_]:
+def _moves() -> Mask:
     """(16, 20): whether an angle moves a body. Abduction and first flexion move the whole finger."""
     moves = np.zeros((BODY_COUNT, 20), dtype=np.bool_)
     for finger in range(5):

@@ -10,9 +10,10 @@ resting one. The thumb's CMC range (Cooney et al., "The kinesiology of the thumb
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.pose import ANGLES
+from depthtrack.types import Array
 
 _DEGREES = np.array(
     [
@@ -31,13 +32,13 @@ _DEGREES = np.array(
     dtype=np.float64,
 )
 
-LOWER: NDArray[np.float64] = np.radians(_DEGREES[..., 0]).ravel()
+LOWER: Array = np.radians(_DEGREES[..., 0]).ravel()
 """Smallest value of each finger angle, (20,) radians, in the order of the pose vector."""
-UPPER: NDArray[np.float64] = np.radians(_DEGREES[..., 1]).ravel()
+UPPER: Array = np.radians(_DEGREES[..., 1]).ravel()
 """Largest value of each finger angle, (20,) radians."""
 
 
-def within_limits(pose: ArrayLike) -> NDArray[np.float64]:
+def within_limits(pose: ArrayLike) -> Array:
     """The pose (..., 27) with every finger angle moved to the nearest point of its range."""
     nearest = np.array(pose, dtype=np.float64)
     nearest[..., ANGLES] = np.clip(nearest[..., ANGLES], LOWER, UPPER)

@@ -6,7 +6,9 @@ three flexions from the palm outward. Every function broadcasts over leading axe
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from depthtrack.types import Array
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 POSE_SIZE = 27
@@ -21,8 +23,6 @@ ANGLE_NAMES = tuple(
     f"{finger}_{joint}" for finger in FINGERS for joint in (_THUMB_JOINTS if finger == "thumb" else _FINGER_JOINTS)
 )
 POSE_NAMES = ("x", "y", "z", "qw", "qx", "qy", "qz", *ANGLE_NAMES)
-
-Array = NDArray[np.float64]
 
 
 def make_pose(position: ArrayLike, quaternion: ArrayLike, angles: ArrayLike) -> Array:

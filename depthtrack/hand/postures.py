@@ -1,7 +1,8 @@
 """A few typical postures, for searches that start from nothing: finger angles (20,) in radians, within the limits."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from depthtrack.types import Array
 
 # Degrees, finger by finger: abduction, then three flexions from the palm outward. Flexions of a finger follow one
 # another as they do in natural movement (DIP about two thirds of PIP).
@@ -13,6 +14,6 @@ _POINT = [_FIST[0], (4, 5, 8, 5), *_FIST[2:]]
 _TWO = [_FIST[0], (6, 5, 8, 5), (-6, 5, 8, 5), *_FIST[3:]]
 _NAMED = {"open": _OPEN, "relaxed": _RELAXED, "grasp": _GRASP, "fist": _FIST, "point": _POINT, "two": _TWO}
 
-POSTURES: dict[str, NDArray[np.float64]] = {
+POSTURES: dict[str, Array] = {
     name: np.radians(np.array(fingers, dtype=np.float64).ravel()) for name, fingers in _NAMED.items()
 }

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.shape import HandShape
+from depthtrack.types import Array, Index
 
-Array = NDArray[np.float64]
 SPHERE, CYLINDER = 0, 1
 PRIMITIVE_COUNT = 37
 
@@ -29,8 +28,8 @@ class Primitives:
     frame in metres, projective for cones; `names` for people.
     """
 
-    kinds: NDArray[np.int64]
-    bodies: NDArray[np.int64]
+    kinds: Index
+    bodies: Index
     T_body_unit: Array
     names: tuple[str, ...]
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any, Literal, Self, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.hand.pose import FINGERS
+from depthtrack.types import Array
 
 Side = Literal["right", "left"]
 
@@ -62,11 +62,11 @@ class HandShape:
 
     side: Side = "right"
     scale: float = 1.0
-    lengths: NDArray[np.float64] = field(default_factory=lambda: _table(_LENGTHS_MM))
-    radii: NDArray[np.float64] = field(default_factory=lambda: _table(_RADII_MM))
-    bases: NDArray[np.float64] = field(default_factory=lambda: _table(_BASES_MM))
-    thumb_direction: NDArray[np.float64] = field(default_factory=lambda: _frozen([0.58, 0.73, 0.36]))
-    thumb_pad: NDArray[np.float64] = field(default_factory=lambda: _frozen([-0.75, 0.20, 0.60]))
+    lengths: Array = field(default_factory=lambda: _table(_LENGTHS_MM))
+    radii: Array = field(default_factory=lambda: _table(_RADII_MM))
+    bases: Array = field(default_factory=lambda: _table(_BASES_MM))
+    thumb_direction: Array = field(default_factory=lambda: _frozen([0.58, 0.73, 0.36]))
+    thumb_pad: Array = field(default_factory=lambda: _frozen([-0.75, 0.20, 0.60]))
     palm_breadth: float = 0.079
     palm_length: float = 0.092
     palm_thickness: float = 0.029
@@ -100,7 +100,7 @@ class HandShape:
         return 1.0 if self.side == "right" else -1.0
 
     @property
-    def wrist(self) -> NDArray[np.float64]:
+    def wrist(self) -> Array:
         """(3,) wrist joint in the palm frame, metres, scaled."""
         return np.array([0.0, -self.palm_length / 2 * self.scale, 0.0])
 
@@ -170,13 +170,13 @@ _ARRAY_SHAPES = {
 _PALM_SIZES = ("palm_breadth", "palm_length", "palm_thickness", "wrist_breadth", "wrist_thickness")
 
 
-def _frozen(values: Any) -> NDArray[np.float64]:
+def _frozen(values: Any) -> Array:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-def _table(rows_mm: Mapping[str, tuple[float, ...]]) -> NDArray[np.float64]:
+def _table(rows_mm: Mapping[str, tuple[float, ...]]) -> Array:
     return _frozen([np.array(rows_mm[finger]) / 1000 for finger in FINGERS])
 
 

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.hand.pose import FINGERS
 from depthtrack.resources import resource_folder
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 ANGLE_COUNT = 20
 _ORTHONORMAL = 1e-6

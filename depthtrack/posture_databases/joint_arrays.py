@@ -22,7 +22,8 @@ from depthtrack.files import check_size
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.shape import Side
 from depthtrack.posture_databases.joint_postures import postures_of_joints
-from depthtrack.posture_databases.posture_set import MAX_BYTES, Array, PostureSet, check_count
+from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_count
+from depthtrack.types import Array
 
 MAX_TRACKS = 10_000
 _MOST = 1 << 28

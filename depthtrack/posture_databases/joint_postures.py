@@ -9,8 +9,9 @@ from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import Side
-from depthtrack.posture_databases.posture_set import Array, PostureSet
+from depthtrack.posture_databases.posture_set import PostureSet
 from depthtrack.solver.keypoints import fit_poses, is_known
+from depthtrack.types import Array
 
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001}
 _FINGER = (0.03, 0.16)

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 MAX_POSTURES = 500_000
 """Most postures read from one file: over an hour at 100 Hz, and a bound on memory."""

@@ -18,7 +18,8 @@ from depthtrack.files import read_lines
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ANGLE_NAMES
 from depthtrack.posture_databases.joint_postures import postures_of_joints
-from depthtrack.posture_databases.posture_set import MAX_BYTES, Array, PostureSet, check_angles, check_count
+from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_angles, check_count
+from depthtrack.types import Array
 
 FILES_IN_FOLDERS = ("hand_poses.csv", "poses.csv", "joints.csv")
 """What is read of a recording or run folder: the first of these that it has."""

@@ -5,7 +5,6 @@ from array import array
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import check_size, read_lines
@@ -13,6 +12,7 @@ from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import GroundTruth
+from depthtrack.types import Array
 
 POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
 QUATERNION_TOLERANCE = 1e-3
@@ -49,7 +49,7 @@ def read_ground_truth(folder: Path) -> GroundTruth | None:
     )
 
 
-def _same_times(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+def _same_times(a: Array, b: Array) -> bool:
     return len(a) == len(b) and bool(np.all(np.abs(a - b) < 1e-6))
 
 
@@ -60,7 +60,7 @@ def _read_hand(path: Path) -> HandShape | None:
     return HandShape.from_json(path)
 
 
-def _read_table(path: Path, header: tuple[str, ...]) -> NDArray[np.float64] | None:
+def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
     """Rows (T, len(header)) of a CSV with that header, finite and in order of time; None where the file is absent."""
     if not path.exists():
         return None

@@ -15,12 +15,12 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines, read_text
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
+from depthtrack.types import Array, Index
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
 _LARGEST_TABLE = 1 << 29
@@ -43,7 +43,7 @@ class RunRow:
     status: str
     energy: float
     confidence: float
-    pose: NDArray[np.float64] | None
+    pose: Array | None
 
 
 class RunWriter:
@@ -104,13 +104,13 @@ class Run:
 
     folder: Path
     configuration: dict[str, Any]
-    index: NDArray[np.int64]
-    timestamps: NDArray[np.float64]
+    index: Index
+    timestamps: Array
     status: tuple[str, ...]
-    energy: NDArray[np.float64]
-    confidence: NDArray[np.float64]
-    poses: NDArray[np.float64]
-    stage_ms: dict[str, NDArray[np.float64]]
+    energy: Array
+    confidence: Array
+    poses: Array
+    stage_ms: dict[str, Array]
 
     @classmethod
     def load(cls, folder: Path) -> Self:
@@ -180,7 +180,7 @@ def _why_no_row(row: RunRow) -> str | None:
     return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.6g}"
 
 
-def _read_timings(path: Path, count: int) -> dict[str, NDArray[np.float64]]:
+def _read_timings(path: Path, count: int) -> dict[str, Array]:
     """Milliseconds (T,) of each stage, of at most `count` frames. Raises InputError."""
     header, *lines = _read_table(path, None)
     if header[:1] != ["index"]:

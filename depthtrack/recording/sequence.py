@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
+from depthtrack.types import Array, Depth, Image, Mask
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Frame:
 
     index: int
     timestamp: float
-    depth: NDArray[np.float32]
-    colour: NDArray[np.uint8] | None
+    depth: Depth
+    colour: Image | None
     camera: Camera
 
 
@@ -36,9 +36,9 @@ class GroundTruth:
     from the images and the other way round: look a frame up by its timestamp with `at`.
     """
 
-    timestamps: NDArray[np.float64]
-    poses: NDArray[np.float64] | None = None
-    joints: NDArray[np.float64] | None = None
+    timestamps: Array
+    poses: Array | None = None
+    joints: Array | None = None
     hand: HandShape | None = None
 
     def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
@@ -48,7 +48,7 @@ class GroundTruth:
         nearest = min(rows, key=lambda row: abs(self.timestamps[row] - timestamp), default=None)
         return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
 
-    def keypoints_at(self, timestamp: float) -> NDArray[np.float64] | None:
+    def keypoints_at(self, timestamp: float) -> Array | None:
         """The 21 keypoints (21, 3) at `timestamp`, metres: the joints as annotated, else those of the pose."""
         row = self.at(timestamp)
         if row is None:
@@ -88,7 +88,7 @@ class Sequence(Protocol):
     def camera(self) -> Camera: ...
 
     @property
-    def timestamps(self) -> NDArray[np.float64]: ...
+    def timestamps(self) -> Array: ...
 
     @property
     def ground_truth(self) -> GroundTruth | None: ...
@@ -113,10 +113,10 @@ class Sequence(Protocol):
         """Iterate over some of the frames only, damage treated alike; raises InputError if none can be read."""
         ...
 
-    def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
+    def hand_mask(self, index: int) -> Mask | None:
         """True silhouette (h, w) of the hand without its forearm, where the recording knows it."""
         ...
 
-    def exact_depth(self, index: int) -> NDArray[np.float32] | None:
+    def exact_depth(self, index: int) -> Depth | None:
         """Noise-free depth (h, w) of the whole scene in metres, 0 = none, where the recording knows it."""
         ...

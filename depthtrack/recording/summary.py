@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import DamagedFrameError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import DamagedFrame, Frame, OnDamage, Sequence
+from depthtrack.types import Array, Index
 
 GAP_FACTOR = 1.5
 """A step in time longer than this many median steps is a gap: at least one frame is missing."""
@@ -108,7 +108,7 @@ class _Counts:
     def __init__(self, sequence: Sequence, on_damage: OnDamage) -> None:
         self._sequence = sequence
         self._on_damage = on_damage
-        self._histogram: NDArray[np.int64] = np.zeros(1 << 16, dtype=np.int64)
+        self._histogram: Index = np.zeros(1 << 16, dtype=np.int64)
         self.frames = self.colours = self.masks = self.exact_depths = 0
         self.damaged: list[DamagedFrame] = []
 
@@ -142,5 +142,5 @@ class _Counts:
         return float(self._histogram[0] / max(1, self._histogram.sum()))
 
 
-def _gaps(timestamps: NDArray[np.float64], steps: NDArray[np.float64], longest: float) -> list[Gap]:
+def _gaps(timestamps: Array, steps: Array, longest: float) -> list[Gap]:
     return [Gap(float(timestamps[i]), float(steps[i])) for i in np.flatnonzero(steps > longest)]

@@ -29,6 +29,7 @@ from depthtrack.recording.ground_truth import (
 )
 from depthtrack.recording.images import write_jpeg, write_png
 from depthtrack.recording.sequences.tum import EXACT_DEPTH_SCALE
+from depthtrack.types import Array, Image, Mask
 
 ColourFormat = Literal["jpg", "png"]
 _Table = tuple[str, tuple[str, ...]]
@@ -86,9 +87,9 @@ class SequenceWriter:
         timestamp: float,
         depth: NDArray[np.floating[Any]],
         *,
-        colour: NDArray[np.uint8] | None = None,
-        mask: NDArray[np.bool_] | None = None,
-        skin_mask: NDArray[np.bool_] | None = None,
+        colour: Image | None = None,
+        mask: Mask | None = None,
+        skin_mask: Mask | None = None,
         exact_depth: NDArray[np.floating[Any]] | None = None,
         pose: ArrayLike | None = None,
         joints: ArrayLike | None = None,
@@ -162,8 +163,8 @@ class SequenceWriter:
                 raise InputError(f"a frame's colour must be 8-bit RGB, found {image.dtype}")
         return given
 
-    def _checked_truth(self, pose: ArrayLike | None, joints: ArrayLike | None) -> dict[_Table, NDArray[np.float64]]:
-        rows: dict[_Table, NDArray[np.float64]] = {}
+    def _checked_truth(self, pose: ArrayLike | None, joints: ArrayLike | None) -> dict[_Table, Array]:
+        rows: dict[_Table, Array] = {}
         for table, shape, values in (
             ((POSES_FILE, POSES_HEADER), (POSE_SIZE,), pose),
             ((JOINTS_FILE, JOINTS_HEADER), (len(KEYPOINT_NAMES), 3), joints),

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
@@ -13,8 +12,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.scene import DrawsHand, PrimitiveHand, SkinHand
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class ModelSurface:
         self.drawing.draw(camera, self.model.transforms(pose), surface)
         return surface
 
-    def silhouette(self, pose: Array, camera: Camera) -> NDArray[np.bool_]:
+    def silhouette(self, pose: Array, camera: Camera) -> Mask:
         """The pixels (h, w) that the hand in `pose` (27,) covers."""
         out = np.zeros(camera.shape, dtype=np.bool_)
         window = self.window(pose, camera)

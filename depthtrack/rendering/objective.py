@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLES
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,7 @@ def finger_crossing(poses: ArrayLike) -> Array:
     return -np.minimum(phi, 0).sum(axis=-1)
 
 
-def evaluate(
-    objective: Objective, skin: NDArray[np.bool_], observed: ArrayLike, rendered: ArrayLike
-) -> tuple[float, float, float]:
+def evaluate(objective: Objective, skin: Mask, observed: ArrayLike, rendered: ArrayLike) -> tuple[float, float, float]:
     """Sums of Eq. (2) for one rendered depth map: clamped difference (metres), o_s and r_m, o_s or r_m.
 
     All maps (h, w); depth in metres, 0 where there is no reading or nothing was drawn. A drawn pixel is matched

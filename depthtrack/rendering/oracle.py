@@ -1,7 +1,7 @@
 """The slow truth: every hypothesis through the float64 ray caster and the plain evaluation of Eq. (2)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
@@ -10,6 +10,7 @@ from depthtrack.rendering.objective import Objective, Terms, evaluate
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Depth
 
 
 class OracleScorer(ScorerBase):
@@ -24,7 +25,7 @@ class OracleScorer(ScorerBase):
     def set_target(self, target: Target) -> None:
         self._target = target
 
-    def score(self, poses: ArrayLike) -> NDArray[np.float64]:
+    def score(self, poses: ArrayLike) -> Array:
         return self.terms(poses).energy
 
     def terms(self, poses: ArrayLike) -> Terms:
@@ -33,9 +34,9 @@ class OracleScorer(ScorerBase):
         clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
         return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
 
-    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+    def render(self, pose: ArrayLike) -> Depth:
         return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)
 
-    def _depth(self, pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _depth(self, pose: Array) -> Array:
         T = self._primitives.placed(self._model.transforms(pose))
         return raycast(self.target.camera, self._primitives.kinds, T, self._primitives.bodies).depth

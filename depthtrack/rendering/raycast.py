@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.primitives import CYLINDER
 from depthtrack.rendering.surface import NEAR, Surface
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 
 def raycast(
     camera: Camera,
-    kinds: NDArray[np.int64],
+    kinds: Index,
     T_camera_unit: Array,
-    labels: NDArray[np.int64],
+    labels: Index,
     onto: Surface | None = None,
 ) -> Surface:
     """Render N unit primitives placed by `T_camera_unit` (N, 4, 4); returns the nearest hit at every pixel centre.
@@ -63,10 +62,10 @@ def _window(camera: Camera, kind: int, T: Array) -> tuple[int, int, int, int]:
 
 @numba.njit(cache=True, nogil=True)
 def _cast(
-    kinds: NDArray[np.int64],
+    kinds: Index,
     inverses: Array,
     labels: NDArray[np.int16],
-    windows: NDArray[np.int64],
+    windows: Index,
     intrinsics: tuple[float, float, float, float],
     depth: Array,
     label: NDArray[np.int16],

@@ -4,11 +4,12 @@ from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Depth
 
 
 class Scorer(Protocol):
@@ -30,7 +31,7 @@ class Scorer(Protocol):
         """Set what the next calls score against; its camera is the one hypotheses are seen with."""
         ...
 
-    def score(self, poses: ArrayLike) -> NDArray[np.float64]:
+    def score(self, poses: ArrayLike) -> Array:
         """Energies (B,) of Eq. (1)."""
         ...
 
@@ -38,7 +39,7 @@ class Scorer(Protocol):
         """Energies with the separate terms of Eq. (1) and (2)."""
         ...
 
-    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+    def render(self, pose: ArrayLike) -> Depth:
         """Depth (h, w) of one hypothesis through the observation's camera, 0 where there is no hand."""
         ...
 
@@ -77,7 +78,7 @@ class ScorerBase:
         return self._target
 
 
-def as_batch(poses: ArrayLike) -> NDArray[np.float64]:
+def as_batch(poses: ArrayLike) -> Array:
     """Poses as a contiguous (B, 27) float64 array. Raises ValueError for any other shape or non-finite numbers."""
     batch = np.ascontiguousarray(poses, dtype=np.float64)
     if batch.ndim != 2 or batch.shape[1] != POSE_SIZE:

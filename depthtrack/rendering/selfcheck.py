@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import DepthtrackError
 from depthtrack.geometry.camera import PRESETS
@@ -22,6 +21,7 @@ from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array
 
 HYPOTHESES, SIDE = 64, 64
 _SEED = 11
@@ -56,7 +56,7 @@ class SelfCheck:
         )
 
 
-def scene() -> tuple[HandShape, Target, NDArray[np.float64]]:
+def scene() -> tuple[HandShape, Target, Array]:
     """A hand half a metre away, seen at 64 x 64 pixels, and 64 hypotheses around it."""
     shape = HandShape()
     truth = within_limits(make_pose([0, 0, 0.5], [0.1, 1, 0.2, 0.1], np.full(20, 0.3)))
@@ -92,7 +92,7 @@ def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
         )
 
 
-def _speed(scorer: Scorer, poses: NDArray[np.float64], seconds: float) -> float:
+def _speed(scorer: Scorer, poses: Array, seconds: float) -> float:
     """Hypotheses a second, by the best of the calls that fit: others' work on the machine only ever slows one."""
     best, end = np.inf, time.perf_counter() + seconds
     while (start := time.perf_counter()) < end:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.types import Array
 
 NEAR = 1e-3
 """Nothing closer to the lens than this (metres) is seen."""
@@ -20,9 +21,9 @@ class Surface:
     nothing; `normal` (h, w, 3) unit, towards the camera, camera frame.
     """
 
-    depth: NDArray[np.float64]
+    depth: Array
     label: NDArray[np.int16]
-    normal: NDArray[np.float64]
+    normal: Array
 
     @classmethod
     def empty(cls, camera: Camera) -> Self:

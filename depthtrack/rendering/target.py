@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.types import Depth, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -18,8 +19,8 @@ class Target:
     """
 
     camera: Camera
-    skin: NDArray[np.bool_]
-    depth: NDArray[np.float32]
+    skin: Mask
+    depth: Depth
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "skin", np.ascontiguousarray(self.skin, dtype=np.bool_))
@@ -54,5 +55,5 @@ class Target:
         return type(self)(camera, self.skin[pick], self.depth[pick])
 
 
-def _nearest(position: NDArray[np.floating], size: int) -> NDArray[np.int64]:
+def _nearest(position: NDArray[np.floating], size: int) -> Index:
     return np.clip(np.rint(position).astype(np.int64), 0, size - 1)

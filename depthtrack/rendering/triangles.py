@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.surface import NEAR, Surface
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 
 def rasterise(
     camera: Camera,
     vertices: Array,
-    faces: NDArray[np.int64],
+    faces: Index,
     vertex_normals: Array,
-    labels: NDArray[np.int64],
+    labels: Index,
     onto: Surface | None = None,
 ) -> Surface:
     """Render triangles; both sides are seen, and triangles that reach in front of the lens (z < NEAR) are dropped.
@@ -42,7 +41,7 @@ def rasterise(
 @numba.njit(cache=True, nogil=True)
 def _rasterise(
     vertices: Array,
-    faces: NDArray[np.int64],
+    faces: Index,
     normals: Array,
     labels: NDArray[np.int16],
     intrinsics: tuple[float, float, float, float],

@@ -12,7 +12,8 @@ import numpy as np
 from PIL import Image as Pictures
 
 from depthtrack.recording.sequence import Frame
-from depthtrack.report.pictures import Image, SideBySide
+from depthtrack.report.pictures import SideBySide
+from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import evenly_chosen
 
 FASTEST = 15.0

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.compare.results import figures_of
 from depthtrack.evaluation.evaluate import Evaluation
@@ -17,6 +16,7 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.surface import Surface
 from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import TrackerSeries
+from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
@@ -24,9 +24,6 @@ from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
 from depthtrack.viewing.panels import captioned, paint, tile_grid
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import Rgb
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 _TRUE: Rgb = (255, 255, 255)
 _SIDE_ROOM = 1.15
@@ -135,7 +132,7 @@ def _panel(shown: TrackerSeries, metric: str, sequence: Path | None) -> _Panel:
     return _Panel(shown, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
 
 
-def _narrowed(windows: list[Window], camera: Camera, keypoints: Array, known: NDArray[np.bool_]) -> list[Window]:
+def _narrowed(windows: list[Window], camera: Camera, keypoints: Array, known: Mask) -> list[Window]:
     """The windows (N) without what the hand leaves empty at both sides, though never higher than wide."""
     width, height = windows[0][2:]
     if not known.any() or width <= height:

@@ -4,13 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.compare.results import Line, figures_of
 from depthtrack.evaluation.metrics.success import LIMIT_MM, share_within
 from depthtrack.hand.pose import FINGERS
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 POINTS = 900
 """A curve over time has at most so many points: more than a page is wide in."""

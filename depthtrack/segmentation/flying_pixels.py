@@ -6,15 +6,14 @@ cameras: a survey", IEEE Sensors Journal 2011): fingers get rims, and wisps reac
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Mask = NDArray[np.bool_]
+from depthtrack.types import Depth, Mask
 
 STEEPEST = 6.0
 """Tangent of the angle to the image plane beyond which no surface returns enough light: 80 degrees."""
 
 
-def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
+def flying_pixels(depth: Depth, focal: float) -> Mask:
     """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, behind
     a neighbour by more than a surface of STEEPEST slope would be, and not within that of the one on the other side."""
     out = np.zeros(depth.shape, dtype=np.bool_)
@@ -23,7 +22,7 @@ def flying_pixels(depth: NDArray[np.float32], focal: float) -> Mask:
 
 
 @numba.njit(cache=True, nogil=True)
-def mark_flying(depth: NDArray[np.float32], slope: float, out: Mask) -> None:
+def mark_flying(depth: Depth, slope: float, out: Mask) -> None:
     """True into `out` (h, w) where a reading is farther than `slope` times its depth from all readings beside it in its
     row, or in its column, and behind one of them."""
     height, width = depth.shape

@@ -10,11 +10,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.segmentation.grid import Depth, Grid, Mask
-from depthtrack.segmentation.palm import Nodes, Palm
-
-Array = NDArray[np.float64]
-Values = NDArray[np.float32]
+from depthtrack.segmentation.grid import Grid
+from depthtrack.segmentation.palm import Palm
+from depthtrack.types import Array, Array32, Depth, Index, Mask
 
 ARM_AREA = 3e-4
 """Square metres of an arm beyond the hand's reach that are seen at least; little, for it may point straight away."""
@@ -55,7 +53,7 @@ class Arm:
     the nodes where it goes on beyond the hand's reach, or leaves what is seen."""
 
     direction: Array
-    exits: Nodes
+    exits: Index
 
 
 def find_arm(grid: Grid, palm: Palm, wrist_distance: float, expected: Array | None = None) -> Arm | None:
@@ -93,7 +91,7 @@ def breadth(grid: Grid, palm: Palm, arm: Arm) -> Array:
 
 
 @numba.njit(cache=True)
-def area_along(points: Array, areas: Values, reached: Values, centre: Array, direction: Array, total: Array) -> None:
+def area_along(points: Array, areas: Array32, reached: Array32, centre: Array, direction: Array, total: Array) -> None:
     """Area (m^2) of the nodes (N,) that are `reached` (finite), by their distance from `centre` (3,) along the unit
     `direction` (3,), added to `total` (bins + 4 MARGIN,); the first 2 MARGIN bins lie before the centre.
 
@@ -124,7 +122,7 @@ def section(grid: Grid, palm: Palm, arm: Arm, distance: float, half_width: float
 
 @numba.njit(cache=True)
 def middle_of_section(
-    points: Array, reached: Values, centre: Array, direction: Array, distance: float, half_width: float, middle: Array
+    points: Array, reached: Array32, centre: Array, direction: Array, distance: float, half_width: float, middle: Array
 ) -> bool:
     """Mean (3,), into `middle`, of the points (N, 3) that are `reached` (finite) within ARM_HALF_BREADTH of a line
     from `centre` (3,) along the unit `direction` (3,), `distance` from the centre; whether there are any."""
@@ -145,7 +143,7 @@ def middle_of_section(
     return count > 0
 
 
-def _leaving(grid: Grid, palm: Palm, border: Mask) -> list[Nodes]:
+def _leaving(grid: Grid, palm: Palm, border: Mask) -> list[Index]:
     """Where an arm leaves what is seen, through `border` (rows, columns), before it has left the hand's reach."""
     leaving = border & palm.paths.reached() & (palm.paths.distance > NEAREST_BORDER)
     labels, areas = grid.within(leaving).surfaces()
@@ -154,7 +152,7 @@ def _leaving(grid: Grid, palm: Palm, border: Mask) -> list[Nodes]:
     return [part for part in parts if len(part) * cell > SMALLEST_BORDER]
 
 
-def _chosen(grid: Grid, palm: Palm, exits: list[Nodes], wrist_distance: float, expected: Array | None) -> Arm | None:
+def _chosen(grid: Grid, palm: Palm, exits: list[Index], wrist_distance: float, expected: Array | None) -> Arm | None:
     arms = [Arm(_direction(grid, palm, nodes, wrist_distance + FOREARM_START), nodes) for nodes in exits]
     if expected is not None:
         arms = [arm for arm in arms if float(arm.direction @ expected) > SAME_ARM]
@@ -162,7 +160,7 @@ def _chosen(grid: Grid, palm: Palm, exits: list[Nodes], wrist_distance: float, e
     return max(arms, key=lambda arm: len(arm.exits), default=None)
 
 
-def _direction(grid: Grid, palm: Palm, exits: Nodes, start: float) -> Array:
+def _direction(grid: Grid, palm: Palm, exits: Index, start: float) -> Array:
     """Unit vector from the palm's centre to where the forearm is `start` metres away, on the way to `exits`."""
     forearm = np.empty(exits.size, dtype=np.int64)
     walk_back(palm.paths.distance, palm.paths.parent, exits, start, forearm)
@@ -171,7 +169,7 @@ def _direction(grid: Grid, palm: Palm, exits: Nodes, start: float) -> Array:
 
 
 @numba.njit(cache=True)
-def walk_back(distance: Depth, parent: NDArray[np.int32], nodes: Nodes, until: float, out: Nodes) -> None:
+def walk_back(distance: Depth, parent: NDArray[np.int32], nodes: Index, until: float, out: Index) -> None:
     """For each node, the first on its path whose distance is at most `until`, into `out`."""
     far, before = distance.ravel(), parent.ravel()
     for n in range(nodes.size):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Window
+from depthtrack.types import Array, Array32, Depth, Index, Mask
 
 MAX_JUMP = 0.03
 """Metres of depth between neighbouring nodes of one surface. A node is about 5 mm wide, so that surfaces turned 80
@@ -22,10 +23,6 @@ degrees away from the camera still hold together."""
 
 BUCKET = 0.002
 """Metres; how finely the queue of the shortest-path search is sorted. It affects speed, never the result."""
-
-Depth = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ class Grid:
         return cls(nodes, points, (camera.fx / stride, camera.fy / stride), stride)
 
     @cached_property
-    def areas(self) -> NDArray[np.float32]:
+    def areas(self) -> Array32:
         """(rows, columns) square metres that a node's block spans across the line of sight; 0 without a surface."""
         return self.depth * self.depth * np.float32(1 / (self.focal[0] * self.focal[1]))
 
@@ -208,7 +205,7 @@ def label_surfaces(depth: Depth, labels: NDArray[np.int32], squares: Array) -> i
 def spread(
     depth: Depth,
     points: Array,
-    sources: NDArray[np.int64],
+    sources: Index,
     limit: float,
     distance: Depth,
     parent: NDArray[np.int32],

@@ -1,15 +1,13 @@
 """Which of the palms that are seen is the hand's: anywhere in the view at first, then near where it was."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.segmentation.forearm import find_arm
 from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.palm import SMALLEST_AREA, Palm, find_palms, finger_area
 from depthtrack.segmentation.wrist import narrowest_place
 from depthtrack.segmentation.wrist_filter import anatomical_guess
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 SLICE, SLICE_STEP = 0.35, 0.2
 """Metres: a start looks at the nearest things first, in slices this thick: a hand and a forearm that points away."""

@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import MAX_SIDE
 from depthtrack.recording import open_sequence
 from depthtrack.recording.images import read_colour, read_header, read_mask
+from depthtrack.types import Labels, Mask
 
-Labelled = tuple[NDArray[np.uint8], NDArray[np.bool_]]
+Labelled = tuple[Labels, Mask]
 
 _PICTURES = (".png", ".jpg", ".jpeg")
 

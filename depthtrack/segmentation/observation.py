@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import Frame, Sequence
@@ -14,8 +13,7 @@ from depthtrack.segmentation.point_cloud import point_cloud
 from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior
 from depthtrack.segmentation.segmenter import HandLocator, Segmentation
 from depthtrack.segmentation.skin_colour import SkinColourModel
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Depth, Mask
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,8 @@ class Observation:
     timestamp: float
     camera: Camera
     origin: tuple[int, int]
-    skin: NDArray[np.bool_]
-    depth: NDArray[np.float32]
+    skin: Mask
+    depth: Depth
     centre: Array
     palm_radius: float
     arm_direction: Array | None = None

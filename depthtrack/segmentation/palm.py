@@ -10,12 +10,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.segmentation.grid import Grid, Paths
-
-Array = NDArray[np.float64]
-Nodes = NDArray[np.int64]
+from depthtrack.types import Array, Index
 
 # Lengths along the surface are measured from node to node, which makes them some 8 % longer than they are.
 HAND_REACH = 0.17
@@ -66,7 +63,7 @@ class Palm:
     radius: float
     tip_distance: float
     paths: Paths
-    limbs: tuple[Nodes, ...]
+    limbs: tuple[Index, ...]
 
 
 def find_palms(grid: Grid, surface: Grid) -> Iterator[Palm]:
@@ -125,7 +122,7 @@ def palm_near(grid: Grid, surface: Grid, tip: int) -> Palm | None:
     return Palm(node, points[middle], widest, float(from_tip.distance.flat[node]), paths, limbs)
 
 
-def _limbs(grid: Grid, paths: Paths) -> tuple[Nodes, ...] | None:
+def _limbs(grid: Grid, paths: Paths) -> tuple[Index, ...] | None:
     """What goes on beyond the reach of the hand from whose palm the paths come, towards the body if anything does, or
     None where that is nothing that a hand could be the end of. What a hand holds ends within EXIT_REACH."""
     near, edge = paths.reached(HAND_REACH), grid.edge

@@ -3,15 +3,13 @@
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.rectangle import Window
-from depthtrack.segmentation.grid import MAX_JUMP, Depth, Mask
+from depthtrack.segmentation.grid import MAX_JUMP
 from depthtrack.segmentation.palm import HAND_REACH, TIP_TO_WRIST, Palm
 from depthtrack.segmentation.surface_grid import SurfaceGrid, dilated, disc, eroded
 from depthtrack.segmentation.wrist import WristPlane
-
-Labels = NDArray[np.uint8]
+from depthtrack.types import Depth, Labels, Mask
 
 ELSEWHERE, HAND, ARM, BESIDE = 0, 1, 2, 4
 """Labels of nodes, one bit each; BESIDE is what hangs together with the hand and is neither hand nor arm."""
@@ -82,7 +80,7 @@ def hand_masks(view: SurfaceGrid, labels: Labels, wrist: WristPlane | None) -> t
     return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
 
 
-def _silhouette(kinds: NDArray[np.uint8], coloured: Mask, missing: Mask, r: int) -> Mask:
+def _silhouette(kinds: Labels, coloured: Mask, missing: Mask, r: int) -> Mask:
     """The hand's silhouette (h, w) from the kinds of its pixels, where they are `coloured` like skin, and where
     readings are `missing`."""
     readings = kinds == READING
@@ -133,7 +131,7 @@ def sort_pixels(
     stride: int,
     lens: tuple[float, float, float, float],
     plane: tuple[float, float, float, float],
-    out: NDArray[np.uint8],
+    out: Labels,
 ) -> None:
     """Kind of every pixel in the window `roi` of a depth image (h, w; metres), into `out`.
 

@@ -4,11 +4,9 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Depth, Index
 
 SPACING = 2
 """Pixels between the nine samples that a normal is fitted to."""
@@ -17,7 +15,7 @@ SAME_SURFACE = 0.015
 """Metres in depth beyond which a neighbour belongs to another surface: a finger's breadth."""
 
 
-def point_cloud(camera: Camera, depth: NDArray[np.float32]) -> tuple[Array, Array]:
+def point_cloud(camera: Camera, depth: Depth) -> tuple[Array, Array]:
     """Points (N, 3) in metres and unit normals (N, 3) towards the camera, row by row, of a depth map (h, w).
 
     A plane's inverse depth is linear in the pixel, so each normal comes from a linear fit of the inverse depth to a
@@ -32,9 +30,9 @@ def point_cloud(camera: Camera, depth: NDArray[np.float32]) -> tuple[Array, Arra
 
 @numba.njit(cache=True, nogil=True)
 def _fit(
-    depth: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
+    depth: Depth,
+    rows: Index,
+    columns: Index,
     intrinsics: tuple[float, float, float, float],
     points: Array,
     normals: Array,

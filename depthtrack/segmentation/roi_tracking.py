@@ -9,16 +9,13 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.rectangle import Window
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.skin_colour import AdaptiveSkin
 from depthtrack.segmentation.surface_grid import dilated, disc
 from depthtrack.segmentation.wrist import WristPlane
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from depthtrack.types import Array, Depth, Labels, Mask
 
 ROOM = 0.04
 """Metres around the hand that the region of interest leaves for hypotheses to move in."""
@@ -87,13 +84,13 @@ def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> Roi
 
 @numba.njit(cache=True, nogil=True)
 def _reachable(
-    depth: NDArray[np.float32],
+    depth: Depth,
     lens: tuple[float, float, float, float],
     centre: Array,
     reach: float,
     wrist: Array,
     towards_arm: Array,
-    out: NDArray[np.uint8],
+    out: Labels,
 ) -> None:
     """_READING where a point lies within `reach` of the centre and before the wrist, _MISSING where there is no
     reading but a point as far away as the centre would, into `out` (h, w)."""

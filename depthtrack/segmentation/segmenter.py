@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.rectangle import Window
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.flying_pixels import flying_pixels
 from depthtrack.segmentation.forearm import Arm, find_arm, find_vanishing_arm
-from depthtrack.segmentation.grid import Mask
 from depthtrack.segmentation.hand_detection import find_start, nearest_palm
 from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.pixel_labels import hand_masks, label_hand
@@ -18,8 +16,7 @@ from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinColourModel
 from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
 from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
 from depthtrack.segmentation.wrist_filter import WristFilter
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 DEPTH_WINDOW = 0.25
 """Metres around the last position that are searched (ibid.)."""

@@ -21,6 +21,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.geometry.rectangle import Window
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
+from depthtrack.types import Array, Image, Index, Labels, Mask
 
 BINS, LEVELS = 64, 32
 """Bins along U and along V, and steps of R, G and B by which a colour's bin is looked up."""
@@ -40,7 +41,6 @@ DARKEST, BRIGHTEST = 20, 250
 
 NOT_SKIN, MAYBE_SKIN, SURELY_SKIN = 0, 1, 2
 
-Array = NDArray[np.float64]
 
 _LARGEST_FILE = 4 << 20
 # Rows Y, U and V of the full-range YUV of JPEG (ITU-R BT.601); U and V are 0 for greys.
@@ -75,7 +75,7 @@ class SkinColourModel:
         return _default_model()
 
     @classmethod
-    def train(cls, labelled: Iterable[tuple[NDArray[np.uint8], NDArray[np.bool_]]]) -> Self:
+    def train(cls, labelled: Iterable[tuple[Labels, Mask]]) -> Self:
         """Learn from pairs of an RGB image (h, w, 3) and a mask (h, w) that is true on skin.
 
         The prior is the share of skin among all pixels. Raises InputError without both skin and other pixels.
@@ -169,7 +169,7 @@ class AdaptiveSkin:
         self._total = np.zeros((2, BINS, BINS))
         self._classes = class_of_colour(self._offline)
 
-    def learn(self, image: NDArray[np.uint8], window: Window, skin: NDArray[np.uint8], hand: NDArray[np.bool_]) -> None:
+    def learn(self, image: Image, window: Window, skin: Labels, hand: Mask) -> None:
         """Take in a window of an RGB image: its `skin` (h, w; not 0) that is `hand` (h, w), and what is neither.
 
         Skin elsewhere, as a face's or the arm's, and what the hand has that is no skin, are left out.
@@ -189,9 +189,7 @@ class AdaptiveSkin:
         blended[known] = OFFLINE_WEIGHT * blended[known] + (1 - OFFLINE_WEIGHT) * skin[known] / seen[known]
         return blended
 
-    def find(
-        self, image: NDArray[np.uint8], window: Window, blocks: NDArray[np.uint8], stride: int
-    ) -> NDArray[np.uint8]:
+    def find(self, image: Image, window: Window, blocks: Labels, stride: int) -> Labels:
         """1 on skin, over a window of an RGB image (h, w, 3), found with hysteresis.
 
         Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are looked at.
@@ -208,7 +206,7 @@ class AdaptiveSkin:
         return skin
 
 
-def class_of_colour(posterior: Array) -> NDArray[np.uint8]:
+def class_of_colour(posterior: Array) -> Labels:
     """NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of every colour, for P(skin | colour) (64, 64)."""
     classes = np.append((posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX), np.uint8(NOT_SKIN))
     return classes.take(_place_of_colour())
@@ -221,9 +219,7 @@ def _place_of_colour() -> NDArray[np.intp]:
     return np.where(bins < 0, BINS * BINS, bins)
 
 
-def _count(
-    image: NDArray[np.uint8], window: Window, skin: NDArray[np.uint8], hand: NDArray[np.bool_], step: int
-) -> Array:
+def _count(image: Image, window: Window, skin: Labels, hand: Mask, step: int) -> Array:
     """Pixels (2, 64, 64) of neither skin nor hand, and of both, by U and V bin; every `step`-th both ways."""
     counts = np.zeros((2, BINS * BINS))
     count_colours(image, tuple(window), skin, hand, step, _bin_of_colour(), counts)
@@ -231,16 +227,16 @@ def _count(
 
 
 @numba.njit(cache=True, inline="always")
-def _colour_index(image: NDArray[np.uint8], y: int, x: int) -> int:
+def _colour_index(image: Image, y: int, x: int) -> int:
     return (int(image[y, x, 0]) >> 3) << 10 | (int(image[y, x, 1]) >> 3) << 5 | int(image[y, x, 2]) >> 3
 
 
 @numba.njit(cache=True)
 def count_colours(
-    image: NDArray[np.uint8],
+    image: Image,
     window: tuple[int, int, int, int],
-    skin: NDArray[np.uint8],
-    hand: NDArray[np.bool_],
+    skin: Labels,
+    hand: Mask,
     step: int,
     bin_of_colour: NDArray[np.int16],
     counts: Array,
@@ -257,13 +253,13 @@ def count_colours(
 
 @numba.njit(cache=True)
 def classify(
-    image: NDArray[np.uint8],
+    image: Image,
     left: int,
     top: int,
-    classes: NDArray[np.uint8],
-    blocks: NDArray[np.uint8],
+    classes: Labels,
+    blocks: Labels,
     stride: int,
-    out: NDArray[np.uint8],
+    out: Labels,
 ) -> None:
     """Class of the pixels of an RGB image (h, w, 3) from (left, top) on, looked up in `classes` (32768,), into `out`;
     NOT_SKIN where `blocks` (rows, columns) of `stride` x `stride` pixels is 0."""
@@ -280,7 +276,7 @@ def classify(
                     out[v, u] = NOT_SKIN
 
 
-def grow_skin(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def grow_skin(classes: Labels) -> Labels:
     """Hysteresis: 1 where `classes` (h, w) is SURELY_SKIN, or MAYBE_SKIN and joined to that, 8-connected."""
     grown = (classes == SURELY_SKIN).view(np.uint8)
     beside = cv2.dilate(grown, np.ones((3, 3), np.uint8)).view(np.bool_)
@@ -290,7 +286,7 @@ def grow_skin(classes: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 @numba.njit(cache=True)
-def grow_into(classes: NDArray[np.uint8], seeds: NDArray[np.int64], most: int, grown: NDArray[np.uint8]) -> None:
+def grow_into(classes: Labels, seeds: Index, most: int, grown: Labels) -> None:
     """Add to `grown` (h, w), in place, the `seeds` (flat indices of MAYBE_SKIN) and all MAYBE_SKIN joined to them, of
     which there are at `most` so many."""
     rows, columns = classes.shape

@@ -7,9 +7,8 @@ CRL 98/11, 1998 (IJCV 46, 2002): fitted to about 80 million skin and 850 million
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 class Mixture(NamedTuple):

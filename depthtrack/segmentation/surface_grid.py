@@ -6,12 +6,12 @@ from functools import cache
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.rectangle import Window
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.grid import Grid, Mask
+from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.skin_colour import AdaptiveSkin
+from depthtrack.types import Array32, Labels, Mask
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class SurfaceGrid:
     window: Window
     grid: Grid
     surface: Grid
-    skin: NDArray[np.uint8] | None
+    skin: Labels | None
 
 
 def build_grid(
@@ -51,7 +51,7 @@ def blind_skin(view: SurfaceGrid, skin: AdaptiveSkin) -> Mask:
 
 
 @cache
-def disc(radius: int) -> NDArray[np.uint8]:
+def disc(radius: int) -> Labels:
     """A round structuring element."""
     y, x = np.ogrid[-radius : radius + 1, -radius : radius + 1]
     # Half a pixel more, so that small discs are not pointed.
@@ -72,7 +72,7 @@ def eroded(mask: Mask, radius: int) -> Mask:
 
 
 @cache
-def _parts_of_disc(radius: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+def _parts_of_disc(radius: int) -> tuple[Labels, Labels]:
     """A square and a diamond that make `disc(radius)` when used one after the other, at half the cost.
 
     They do so exactly up to 5 pixels; beyond, they make an octagon.
@@ -87,7 +87,7 @@ def _closed(nodes: Mask) -> Mask:
     return np.asarray(cv2.morphologyEx(nodes.astype(np.uint8), cv2.MORPH_CLOSE, disc(2)) > 0)
 
 
-def _covered(mask: NDArray[np.uint8], stride: int, share: float, blocks: NDArray[np.uint8]) -> Mask:
+def _covered(mask: Labels, stride: int, share: float, blocks: Labels) -> Mask:
     """Those of `blocks` (rows, columns; not 0) that `mask` (h, w) covers to at least `share`."""
     shares = np.zeros(blocks.shape, dtype=np.float32)
     share_of_blocks(mask, stride, blocks, shares)
@@ -95,9 +95,7 @@ def _covered(mask: NDArray[np.uint8], stride: int, share: float, blocks: NDArray
 
 
 @numba.njit(cache=True)
-def share_of_blocks(
-    mask: NDArray[np.uint8], stride: int, blocks: NDArray[np.uint8], share: NDArray[np.float32]
-) -> None:
+def share_of_blocks(mask: Labels, stride: int, blocks: Labels, share: Array32) -> None:
     """Share of each of `blocks` (rows, columns; not 0) that `mask` (h, w) covers, into `share` (rows, columns).
 
     Looks at every second pixel both ways where blocks are large enough.

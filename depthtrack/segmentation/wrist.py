@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.segmentation.forearm import BIN, BIN_MIDDLES, Arm, breadth, section
-from depthtrack.segmentation.grid import Grid, Mask
+from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.palm import Palm
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 WRIST_TO_PALM = 0.046
 """Metres from the wrist to the palm's centre: half the palm's length of `HandShape`."""

@@ -1,13 +1,11 @@
 """Where the wrist is over time: seen in some frames, remembered in others, guessed from anatomy at first."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.segmentation.forearm import Arm
 from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.wrist import WRIST_TO_PALM
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 BROAD_PALM = 0.025
 """Metres; an inscribed circle of this radius is the palm's: a hand that shows its edge has none as large."""

@@ -3,15 +3,15 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.simd.functions import lowest_of_halves
 from depthtrack.simd.vectors import F32X16, both, filler, kernel_part, loader, select
+from depthtrack.types import Array32
 
 LANES = F32X16.lanes
 FAR = np.float32(1e6)
 """Metres: where nothing is."""
-_LANE: NDArray[np.float32] = np.arange(LANES, dtype=np.float32)
+_LANE: Array32 = np.arange(LANES, dtype=np.float32)
 
 _load = loader(F32X16)
 _fill = filler(F32X16)

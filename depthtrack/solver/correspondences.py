@@ -3,13 +3,10 @@
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from depthtrack.types import Array, Index
 
 
 class PointCloud(NamedTuple):

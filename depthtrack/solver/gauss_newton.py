@@ -7,13 +7,11 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics, retract
 from depthtrack.solver.normal_equations import NormalEquations, energy, normal_equations
 from depthtrack.solver.subspace import PostureSubspace
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _ENOUGH = 3e-5
 """Metres or radians below which a step is the last one on these correspondences."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics
@@ -16,8 +15,7 @@ from depthtrack.solver.normal_equations import NormalEquations, clear
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.residuals import Residual, add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _COARSE = 4
 """The whole hand is aligned by every so many-th point of the cloud."""

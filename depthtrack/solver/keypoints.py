@@ -13,8 +13,7 @@ from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel, body_of
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, POSE_SIZE, TANGENT_SIZE, make_pose, quaternion_from_matrix, retract
 from depthtrack.hand.postures import POSTURES
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 KEYPOINT_BODIES = np.array(
     [0, *(body_of(finger, phalanx) for finger in range(5) for phalanx in (0, 0, 1, 2))], dtype=np.int64
@@ -65,14 +64,12 @@ def fit_poses(model: HandModel, keypoints: ArrayLike, iterations: int = 60) -> F
     return FittedPoses(poses, residuals)
 
 
-def is_known(points: Array) -> NDArray[np.bool_]:
+def is_known(points: Array) -> Mask:
     """Which points (..., 3) have all their coordinates (...)."""
     return np.asarray(np.isfinite(points).all(axis=-1), dtype=np.bool_)
 
 
-def _fit(
-    model: HandModel, start: Array, targets: Array, known: NDArray[np.bool_], iterations: int
-) -> tuple[Array, Array]:
+def _fit(model: HandModel, start: Array, targets: Array, known: Mask, iterations: int) -> tuple[Array, Array]:
     """Poses (B, 27) and the error term of Eq. (3) (B,), from finger angles `start` (20,)."""
     poses = _first_poses(model, start, targets, known)
     costs = _cost(model, poses, targets, known)
@@ -86,7 +83,7 @@ def _fit(
     return poses, costs
 
 
-def _first_poses(model: HandModel, start: Array, targets: Array, known: NDArray[np.bool_]) -> Array:
+def _first_poses(model: HandModel, start: Array, targets: Array, known: Mask) -> Array:
     """The hand with these angles, brought to the targets by its palm alone as far as they show it."""
     upright = make_pose(np.zeros(3), (1, 0, 0, 0), start)
     weights = np.full(len(KEYPOINT_NAMES), _FINGERS_SAY)
@@ -95,7 +92,7 @@ def _first_poses(model: HandModel, start: Array, targets: Array, known: NDArray[
     return make_pose(t, quaternion_from_matrix(R), start)
 
 
-def _newton_steps(model: HandModel, poses: Array, targets: Array, known: NDArray[np.bool_]) -> Array:
+def _newton_steps(model: HandModel, poses: Array, targets: Array, known: Mask) -> Array:
     """Steps (B, 26) of Eq. (4); an angle at its limit that would leave it stays out of the system."""
     points = model.keypoints(poses)
     J = (model.point_jacobian(poses, KEYPOINT_BODIES, points) * known[..., None, None]).reshape(len(poses), -1, 26)
@@ -118,8 +115,8 @@ def _walk(
     steps: Array,
     active: NDArray[np.intp],
     targets: Array,
-    known: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+    known: Mask,
+) -> Mask:
     """Take each step, halved until the error decreases; poses and costs change in place. Returns who gets on."""
     before = costs[active].copy()
     waiting = np.arange(len(active))
@@ -135,6 +132,6 @@ def _walk(
     return before - costs[active] > _GAIN * before + _EXACT
 
 
-def _cost(model: HandModel, poses: Array, targets: Array, known: NDArray[np.bool_]) -> Array:
+def _cost(model: HandModel, poses: Array, targets: Array, known: Mask) -> Array:
     """Half the sum of squared distances (B,), m^2, over the known keypoints."""
     return 0.5 * np.sum(((model.keypoints(poses) - targets) * known[..., None]) ** 2, axis=(-2, -1))

@@ -12,13 +12,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.kinematics import BODY_COUNT
-
-Array = NDArray[np.float64]
-
+from depthtrack.types import Array
 
 ROW = 8
 """Places of a row of the sums: six of a a^T, one of a e, and one to spare."""

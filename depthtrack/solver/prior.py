@@ -3,11 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.synergies import Synergies
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _RESIDUAL_SPREAD = np.radians(2.0)
 """How far postures usually lie from what a few synergies make of them: standard deviation of an angle."""

@@ -3,15 +3,11 @@
 import math
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from depthtrack.simd.functions import eight
 from depthtrack.simd.vectors import F64X8, kernel_part, loader, store
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.normal_equations import ROW, NormalEquations
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _load = loader(F64X8)
 

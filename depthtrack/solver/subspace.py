@@ -3,12 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.synergies import Synergies
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 class PostureSubspace(NamedTuple):

@@ -10,11 +10,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def constriction(cognitive: float, social: float) -> float:

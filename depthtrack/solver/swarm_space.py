@@ -4,12 +4,10 @@ from typing import Protocol
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, tangent_between
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 POSITION_RANGE = 0.5
 """Half side of the box of positions (metres): wide enough that only a lost swarm meets it."""

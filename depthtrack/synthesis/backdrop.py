@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 import trimesh
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from depthtrack.geometry.camera import Camera
@@ -19,8 +19,7 @@ from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.colour import linear_from_srgb, smooth_field
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 FOREARM = BODY_COUNT
 """Label of the forearm, after the 16 bodies of the hand."""

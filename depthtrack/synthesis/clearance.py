@@ -8,12 +8,11 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 
 class Clearance:
@@ -36,7 +35,7 @@ class Clearance:
         return self._shape.radii * self._shape.scale
 
     @cached_property
-    def _pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _pairs(self) -> tuple[Index, Index]:
         """Phalanges (finger * 3 + k) that can meet; knuckles of neighbours share their flesh and are left out."""
         pairs = [
             (3 * f + i, 3 * g + j)

@@ -2,9 +2,8 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def linear_from_srgb(srgb: Array) -> Array:

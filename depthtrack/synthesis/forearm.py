@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 LENGTH = 0.257
 """Wrist to elbow, metres, of a hand of scale 1."""
@@ -38,7 +36,7 @@ class Forearm:
     shape: HandShape
 
     @cached_property
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Index:
         """(F, 3) triangles: the rings' walls, and a fan at either end."""
         here = np.arange(_SECTIONS)
         there = np.roll(here, -1)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack import __version__
 from depthtrack.errors import InputError
@@ -26,8 +25,8 @@ from depthtrack.synthesis.scene_frame import mirrored
 from depthtrack.synthesis.sensors import Sensor, make_sensor
 from depthtrack.synthesis.sensors.ideal import with_gaussian_noise
 from depthtrack.synthesis.viewpoint import Viewpoint
+from depthtrack.types import Array, Image, Mask
 
-Array = NDArray[np.float64]
 BackgroundKind = Literal["none", "wall", "room"]
 SensorName = Literal["ideal", "kinect1", "kinect2", "realsense"]
 
@@ -83,9 +82,9 @@ class SyntheticFrame:
 
     timestamp: float
     depth: Array
-    colour: NDArray[np.uint8]
-    mask: NDArray[np.bool_]
-    skin: NDArray[np.bool_]
+    colour: Image
+    mask: Mask
+    skin: Mask
     exact_depth: Array
     pose: Array
     joints: Array

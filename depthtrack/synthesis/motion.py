@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from depthtrack.errors import InputError
@@ -13,8 +13,7 @@ from depthtrack.hand.pose import FINGERS, make_pose
 from depthtrack.synthesis import motion_file
 from depthtrack.synthesis.random_motion import RandomMotion
 from depthtrack.synthesis.scene_frame import orientation
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 MAX_DURATION = 3600.0
 """Longest motion, in seconds: an hour at 30 Hz is 100,000 frames."""

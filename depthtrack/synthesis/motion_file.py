@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLE_NAMES, FINGERS
 from depthtrack.resources import resource_folder
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 POSTURES_FILE = "postures.toml"
 

@@ -9,13 +9,11 @@ from functools import cached_property, lru_cache
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 ROOM = 0.04
 """Metres around the hand's silhouette that the region of interest takes in."""

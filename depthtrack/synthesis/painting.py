@@ -14,9 +14,7 @@ from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
 from depthtrack.synthesis.randomness import coarse_normal_noise
 from depthtrack.synthesis.scene import View
-
-Array = NDArray[np.float64]
-Colour = NDArray[np.uint8]
+from depthtrack.types import Array, Image, Mask
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ class Painter:
         light = self._light.on(backdrop.albedo(rng), still.normal) * (still.depth > 0)[..., None]
         self._background = np.rint(255 * srgb_from_linear(light)).astype(np.uint8)
 
-    def paint(self, view: View, rng: np.random.Generator) -> Colour:
+    def paint(self, view: View, rng: np.random.Generator) -> Image:
         """RGB (h, w, 3) of a view."""
         surface = view.surface
         picture = self._background.copy()
@@ -119,8 +117,8 @@ class Painter:
 
 
 def flip_skin(
-    colour: Colour, label: NDArray[np.int16], share: float, tone: SkinTone, rng: np.random.Generator
-) -> tuple[Colour, NDArray[np.bool_]]:
+    colour: Image, label: NDArray[np.int16], share: float, tone: SkinTone, rng: np.random.Generator
+) -> tuple[Image, Mask]:
     """Skin labels (h, w) with a share of all pixels flipped, and RGB (h, w, 3) in which they look flipped.
 
     Oikonomidis et al. 2011, Fig. 2c: each pixel flips by itself. Flipped skin takes on the colour of something else,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from depthtrack.errors import InputError
@@ -21,8 +21,7 @@ from depthtrack.synthesis import motion_file
 from depthtrack.synthesis.clearance import Clearance
 from depthtrack.synthesis.randomness import Stream, generator
 from depthtrack.synthesis.scene_frame import orientation
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _LARGEST_OVERLAP = 0.003
 _TRIES = 20

@@ -1,11 +1,9 @@
 """A wall, or a cluttered room with a bystander's face and things whose colours are close to skin, behind the hand."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.synthesis.backdrop import Backdrop
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def put_wall(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> None:

@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
@@ -17,8 +16,8 @@ from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.backdrop import FOREARM, Backdrop
 from depthtrack.synthesis.forearm import Forearm
+from depthtrack.types import Array, Mask
 
-Array = NDArray[np.float64]
 HandKind = Literal["primitives", "skin"]
 
 
@@ -84,7 +83,7 @@ class Scene:
             rasterise(self.camera, vertices, faces, normals, np.full(len(faces), FOREARM), surface)
         return View(surface, transforms)
 
-    def hand_mask(self, view: View) -> NDArray[np.bool_]:
+    def hand_mask(self, view: View) -> Mask:
         """Pixels (h, w) of a view that see the hand, up to the wrist: the plane across the palm through
         `HandShape.wrist`.
 

@@ -5,10 +5,10 @@ palm: x right, y down, z away from that camera, metres. At rest the palm faces t
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def orientation(tilt: ArrayLike, nod: ArrayLike, turn: ArrayLike) -> Array:

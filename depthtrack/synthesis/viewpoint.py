@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ORIENTATION, POSITION, make_pose, quaternion_from_matrix, quaternion_product
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 # Degrees away from the front, and which way: 0 to the right of the scene, 90 above it. Frontal, four oblique, three
 # nearly from the side; none from straight below, where the forearm is.

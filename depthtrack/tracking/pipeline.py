@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION, rotation_matrix
@@ -15,6 +14,7 @@ from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
+from depthtrack.types import Array
 
 _REACH_MARGIN = 0.03
 """Metres that a hand may have moved since it was last seen, beyond its prediction."""
@@ -63,7 +63,7 @@ def follow(tracker: Tracker, observation: Observation | None) -> Estimate:
     return ABSENT
 
 
-def roi_prior(model: HandModel, pose: NDArray[np.float64] | None) -> RoiPrior | None:
+def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
     """Where a hand in this pose is: around its palm, as far as its fingers reach, up to its wrist."""
     if pose is None:
         return None

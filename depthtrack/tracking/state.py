@@ -4,12 +4,10 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.tracking.tracker import Estimate, Status
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _MEDIAN_FRAMES, _RECENT_FRAMES = 30, 15
 """Frames over which the energy's median is what is usual, and for which a lost hand's last pose is remembered."""

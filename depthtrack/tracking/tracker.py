@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.segmentation.observation import Observation
+from depthtrack.types import Array
 
 
 class Status(StrEnum):
@@ -33,7 +33,7 @@ class Estimate:
     `stage_ms` milliseconds spent in each stage of the tracker.
     """
 
-    pose: NDArray[np.float64] | None
+    pose: Array | None
     energy: float
     confidence: float
     status: Status
@@ -66,7 +66,7 @@ class Tracker(Protocol):
         ...
 
     @property
-    def predicted_pose(self) -> NDArray[np.float64] | None:
+    def predicted_pose(self) -> Array | None:
         """Where the hand should be in the next frame, as a pose (27,); None where that is not known well."""
         ...
 

@@ -2,11 +2,12 @@
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
+
+from depthtrack.types import Array, Depth
 
 
 @numba.njit(cache=True)
-def visible_centroid(depth: NDArray[np.float32], intrinsics: tuple[float, float, float, float]) -> NDArray[np.float64]:
+def visible_centroid(depth: Depth, intrinsics: tuple[float, float, float, float]) -> Array:
     """Mean point (3,), metres, camera frame, of a depth map (h, w) with 0 for no reading; NaN without any reading.
 
     `intrinsics` are fx, fy, cx, cy.

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
+from depthtrack.types import Array, Mask
 from depthtrack.viewing.depth_colours import depth_range
 
 Pixel = TypeVar("Pixel", bound=np.generic)
 
-MaskEstimator = Callable[[Frame], NDArray[np.bool_] | None]
+MaskEstimator = Callable[[Frame], Mask | None]
 """Finds the hand's silhouette (h, w) in a frame, or None where it sees no hand. Called on frames in their order."""
 
 
@@ -25,9 +26,9 @@ class AnnotatedFrame:
     """
 
     frame: Frame
-    mask: NDArray[np.bool_] | None = None
+    mask: Mask | None = None
     mask_is_true: bool = False
-    keypoints: NDArray[np.float64] | None = None
+    keypoints: Array | None = None
 
     @classmethod
     def of(cls, sequence: Sequence, frame: Frame, estimate: MaskEstimator | None = None) -> Self:
@@ -87,7 +88,7 @@ def moments(
         yield AnnotatedFrame.of(sequence, frame, estimate)
 
 
-def true_keypoints(truth: GroundTruth | None, timestamp: float) -> NDArray[np.float64] | None:
+def true_keypoints(truth: GroundTruth | None, timestamp: float) -> Array | None:
     """The 21 keypoints (21, 3) known at `timestamp`, metres."""
     return None if truth is None else truth.keypoints_at(timestamp)
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.geometry.camera import Camera
@@ -13,15 +12,13 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
+from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed
 from depthtrack.viewing.panels import beside, captioned, stacked
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import BACKGROUND, TRUE_MASK
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 _HEIGHT = 300
 _ROWS = 4
@@ -61,7 +58,7 @@ def _square(camera: Camera) -> Camera:
     return camera.crop((camera.width - side) // 2, (camera.height - side) // 2, side, side)
 
 
-def _ground(o: Observation, camera: Camera) -> tuple[Image, NDArray[np.bool_]]:
+def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
     """The observed depth in colours, and the outline of the silhouette (h, w)."""
     side, (h, w) = max(o.depth.shape), o.depth.shape
     top, left = -((h - side) // 2), -((w - side) // 2)

@@ -1,12 +1,11 @@
 """Where to look closely: a window that follows the hand of a run as a steady hand would hold a camera."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.types import Array, Mask
 
-Array = NDArray[np.float64]
 Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels; it may reach outside the image."""
 
@@ -17,7 +16,7 @@ _ROOM = 1.35
 _LEAST = 24
 
 
-def close_ups(camera: Camera, keypoints: Array, trusted: NDArray[np.bool_]) -> list[Window]:
+def close_ups(camera: Camera, keypoints: Array, trusted: Mask) -> list[Window]:
     """A window a frame, all of one size and the image's shape; the whole image where no frame has a trusted pose.
 
     `keypoints` (T, 21, 3) metres, NaN without a pose; `trusted` (T,) frames whose pose may lead the window.

@@ -1,11 +1,11 @@
 """The hand as segmentation finds it, for pictures of recordings that know no true silhouette."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.segmenter import HandLocator
 from depthtrack.segmentation.skin_colour import SkinColourModel
+from depthtrack.types import Mask
 from depthtrack.viewing.annotated_frame import MaskEstimator
 
 
@@ -13,7 +13,7 @@ def mask_estimator() -> MaskEstimator:
     """An estimator for one pass over one recording, frames in their order: it follows the hand from frame to frame."""
     segmenter = HandLocator(SkinColourModel.default())
 
-    def estimate(frame: Frame) -> NDArray[np.bool_] | None:
+    def estimate(frame: Frame) -> Mask | None:
         found = segmenter.locate(frame)
         if found is None:
             return None

@@ -1,17 +1,16 @@
 """A hand in a posture, shaded, its fingers in their colours."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.pose import make_pose, quaternion_exp, quaternion_product
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.triangles import rasterise
+from depthtrack.types import Array, Image
 from depthtrack.viewing.panels import blank, smaller
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import SURFACE
-
-Image = NDArray[np.uint8]
 
 _DISTANCE = 1.0
 """Metres to the hand: far enough that a picture shows little perspective."""
@@ -35,7 +34,7 @@ def hand_picture(skin: Skin, angles: ArrayLike, size: int) -> Image:
     return smaller(draw_surface(blank(side, side, SURFACE), surface), size, size)
 
 
-def _orientation(mirror: float) -> NDArray[np.float64]:
+def _orientation(mirror: float) -> Array:
     """Quaternion of a palm with the fingers up, turned from facing the camera towards the thumb's side."""
     facing = quaternion_exp([np.pi, 0, 0])
     return quaternion_product(quaternion_exp([0, _TURN * mirror, 0]), facing)

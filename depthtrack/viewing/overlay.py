@@ -2,11 +2,12 @@
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS
+from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.theme import FINGER_COLOURS, OUTLINE, PALM, TRUE_MASK, Rgb
 
 Bone = tuple[int, int]
@@ -32,9 +33,7 @@ _SUBPIXEL_BITS = 4
 _FARTHEST_PIXEL = 1 << 20
 
 
-def overlay_mask(
-    image: NDArray[np.uint8], mask: NDArray[np.bool_], colour: Rgb = TRUE_MASK, opacity: float = 0.4
-) -> NDArray[np.uint8]:
+def overlay_mask(image: Image, mask: Mask, colour: Rgb = TRUE_MASK, opacity: float = 0.4) -> Image:
     """`image` (h, w, 3) tinted where `mask` (h, w) is set, with a solid contour just inside it."""
     out = image.copy()
     out[mask] = np.rint(image[mask] * (1 - opacity) + np.array(colour, dtype=np.float32) * opacity)
@@ -42,24 +41,24 @@ def overlay_mask(
     return out
 
 
-def spotlight(image: NDArray[np.uint8], mask: NDArray[np.bool_], brightness: float = 0.25) -> NDArray[np.uint8]:
+def spotlight(image: Image, mask: Mask, brightness: float = 0.25) -> Image:
     """`image` (h, w, 3) as it is inside `mask` (h, w), grey and dimmed outside."""
     return np.where(mask[..., None], image, dimmed(image, brightness))
 
 
-def dimmed(image: NDArray[np.uint8], brightness: float = 0.45) -> NDArray[np.uint8]:
+def dimmed(image: Image, brightness: float = 0.45) -> Image:
     """`image` (h, w, 3) in darker, paler colours, as a ground for bright marks."""
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)[..., None]
     return np.rint((0.35 * image + 0.65 * grey) * brightness).astype(np.uint8)
 
 
 def draw_skeleton(
-    image: NDArray[np.uint8],
+    image: Image,
     camera: Camera,
     keypoints: ArrayLike,
     thickness: int | None = None,
     colours: dict[str, Rgb] | None = None,
-) -> NDArray[np.uint8]:
+) -> Image:
     """`image` with the 21 keypoints (21, 3), metres in the camera frame, as bones and joints, a colour per finger.
 
     `camera` is the image's own (resized and cropped with it). Nearer bones cover farther ones. Keypoints that are
@@ -79,7 +78,7 @@ def draw_skeleton(
     return out
 
 
-def _far_to_near(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> list[tuple[Bone, str]]:
+def _far_to_near(points: Array, seen: Mask) -> list[tuple[Bone, str]]:
     """Bones with both ends seen, and the part whose colour they take; the farthest first."""
     bones = [(bone, "palm") for bone in PALM_BONES]
     bones += [(bone, finger) for finger, chain in FINGER_BONES.items() for bone in chain]
@@ -87,9 +86,7 @@ def _far_to_near(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> list[t
     return sorted(visible, key=lambda entry: -float(points[list(entry[0]), 2].sum()))
 
 
-def _draw_bone(
-    image: NDArray[np.uint8], start: NDArray[np.float64], end: NDArray[np.float64], colour: Rgb, thickness: int
-) -> None:
+def _draw_bone(image: Image, start: Array, end: Array, colour: Rgb, thickness: int) -> None:
     """A line with a dark rim and a dot at both ends, in place."""
     a, b = _fixed_point(start), _fixed_point(end)
     rim = max(1, thickness // 2)
@@ -101,26 +98,26 @@ def _draw_bone(
         cv2.circle(image, centre, radius, colour, -1, cv2.LINE_AA, _SUBPIXEL_BITS)
 
 
-def _fixed_point(pixel: NDArray[np.float64]) -> tuple[int, int]:
+def _fixed_point(pixel: Array) -> tuple[int, int]:
     """OpenCV's fixed-point coordinates; far outside the image they are held back from overflowing."""
     x, y = np.rint(np.clip(pixel, -_FARTHEST_PIXEL, _FARTHEST_PIXEL) * (1 << _SUBPIXEL_BITS)).astype(int)
     return int(x), int(y)
 
 
-def _inner_contour(mask: NDArray[np.bool_], width: int) -> NDArray[np.bool_]:
+def _inner_contour(mask: Mask, width: int) -> Mask:
     """Pixels of `mask` within `width` of its edge; the image's border is no edge."""
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * width + 1, 2 * width + 1))
     inner = cv2.erode(mask.astype(np.uint8), element, borderType=cv2.BORDER_CONSTANT, borderValue=1)
     return mask & (inner == 0)
 
 
-def _bone_thickness(image: NDArray[np.uint8], camera: Camera, depths: NDArray[np.float64]) -> int:
+def _bone_thickness(image: Image, camera: Camera, depths: Array) -> int:
     """Pixels that BONE_BREADTH takes at the hand's distance, within what the image's size makes readable."""
     thinnest = _line_width(image)
     apparent = BONE_BREADTH * camera.fx / float(np.median(depths)) if len(depths) else 0.0
     return round(min(max(apparent, thinnest), 3 * thinnest))
 
 
-def _line_width(image: NDArray[np.uint8]) -> int:
+def _line_width(image: Image) -> int:
     """Pixels; a line that looks the same at any resolution."""
     return max(1, round(image.shape[0] / 160))

@@ -5,16 +5,15 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.recording.sequence import Sequence
+from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator, evenly_chosen, moments
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, SURFACE, TEXT, TRUE_MASK, Rgb
 
-Image = NDArray[np.uint8]
 Layer = Literal["colour", "depth", "mask", "hand", "skeleton", "overview"]
 
 GAP = 6
@@ -148,6 +147,6 @@ def _scaled(image: Image, width: int, height: int) -> Image:
     return cv2.resize(image, (width, height), interpolation=cv2.INTER_CUBIC).astype(np.uint8, copy=False)
 
 
-def _scaled_mask(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:
+def _scaled_mask(mask: Mask, width: int, height: int) -> Mask:
     method = cv2.INTER_AREA if height < mask.shape[0] else cv2.INTER_LINEAR
     return cv2.resize(mask.astype(np.float32), (width, height), interpolation=method) >= 0.5

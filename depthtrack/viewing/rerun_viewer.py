@@ -6,8 +6,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from depthtrack.types import Array, Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES
@@ -114,7 +114,7 @@ class RerunViewer(MomentStream[AnnotatedFrame]):
         return self._blueprint(rrb.Horizontal(self._scene(FLAT_IMAGES), images, column_shares=[3, 2]))
 
 
-def jpeg(rr: Any, image: NDArray[np.uint8], draw_order: float) -> Any:
+def jpeg(rr: Any, image: Image, draw_order: float) -> Any:
     """A picture over rerun's depth images (order -20) and under its masks (0)."""
     _, data = cv2.imencode(".jpg", np.ascontiguousarray(image[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 90])
     # Where one image lies on another, rerun makes it half clear unless told otherwise.
@@ -128,9 +128,7 @@ def _mask_image(rr: Any, moment: AnnotatedFrame) -> Any | None:
     return rr.SegmentationImage(moment.mask.astype(np.uint8) * np.uint8(label), opacity=0.4)
 
 
-def bones(
-    strips: Any, points: NDArray[np.float64] | None, radius: float, colours: dict[str, Rgb] = FINGER_COLOURS
-) -> Any | None:
+def bones(strips: Any, points: Array | None, radius: float, colours: dict[str, Rgb] = FINGER_COLOURS) -> Any | None:
     """Keypoints (21, 2 or 3) as line strips, coloured by finger; bones with an end that is unknown are left out."""
     if points is None:
         return None

@@ -4,10 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.types import Image, Mask
 from depthtrack.viewing.theme import ESTIMATED_MASK, NO_READING
-
-Image = NDArray[np.uint8]
-Depth = NDArray[np.floating]
 
 LARGEST = 0.02
 """Metres at the ends of the scale."""
@@ -17,7 +15,9 @@ UNEXPLAINED = ESTIMATED_MASK
 """An observed hand where the hypothesis has none."""
 
 
-def residual_to_rgb(measured: Depth, rendered: Depth, observed: NDArray[np.bool_] | None = None) -> Image:
+def residual_to_rgb(
+    measured: NDArray[np.floating], rendered: NDArray[np.floating], observed: Mask | None = None
+) -> Image:
     """Colours (h, w, 3) of the difference of two depth maps (h, w), metres, 0 = none, where there is a hypothesis.
 
     White where they agree, red where the sensor saw something nearer than the hypothesis, blue where farther.
@@ -47,7 +47,7 @@ def _palette(difference: NDArray[np.floating]) -> Image:
     return np.rint(255 + (towards - 255) * np.sqrt(np.abs(position))).astype(np.uint8)
 
 
-def enlarged(depth: Depth, width: int, height: int) -> NDArray[np.float32]:
+def enlarged(depth: NDArray[np.floating], width: int, height: int) -> Depth:
     """A depth map at another size, its readings picked, never averaged."""
     return cv2.resize(depth.astype(np.float32), (width, height), interpolation=cv2.INTER_NEAREST_EXACT).astype(
         np.float32, copy=False

@@ -4,12 +4,12 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.rendering.surface import Surface
+from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import Window, close_ups
 from depthtrack.viewing.depth_colours import depth_range
@@ -21,7 +21,6 @@ from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, FINGER_TRUTH, OUTLINE, STATUS_COLOURS, TEXT
 from depthtrack.viewing.timeline import Timeline
 
-Image = NDArray[np.uint8]
 RunLayer = Literal["recording", "overlay", "hypothesis", "residual", "skeleton"]
 LAYERS: tuple[RunLayer, ...] = ("recording", "hypothesis", "residual", "skeleton")
 """The views of `RunPainter.picture`."""
@@ -142,7 +141,7 @@ def hand_range(replay: Replay, room: float = 0.06) -> tuple[float, float]:
     return max(near - 0.06, 0.05), far + room
 
 
-def _trusted(replay: Replay) -> NDArray[np.bool_]:
+def _trusted(replay: Replay) -> Mask:
     return np.array([status in ("tracked", "started") for status in replay.run.status], dtype=np.bool_)
 
 

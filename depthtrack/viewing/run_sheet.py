@@ -3,10 +3,10 @@
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.replay import Replay
+from depthtrack.types import Image
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale
@@ -14,8 +14,6 @@ from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, STATUS_COLOURS
 from depthtrack.viewing.timeline import Timeline
-
-Image = NDArray[np.uint8]
 
 
 def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns: int = 3) -> Image:

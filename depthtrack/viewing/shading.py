@@ -1,13 +1,11 @@
 """A rendered hand in the colours of its fingers, lit from the upper left."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.pose import FINGERS
 from depthtrack.rendering.surface import Surface
+from depthtrack.types import Image
 from depthtrack.viewing.theme import FINGER_COLOURS, PALM
-
-Image = NDArray[np.uint8]
 
 _LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
 _AMBIENT = 0.3

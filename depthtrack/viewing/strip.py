@@ -3,16 +3,14 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.panels import Layer, beside, blank, mask_colour, paint, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, Rgb
-
-Image = NDArray[np.uint8]
 
 ROWS: tuple[Layer, ...] = ("colour", "depth", "hand", "skeleton")
 LABEL_WIDTH = 30

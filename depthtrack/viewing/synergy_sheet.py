@@ -1,18 +1,16 @@
 """What each of the first synergies does to the hand, on one page (as Fig. 6 of Schroeder et al. 2014)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.hand.synergies import Synergies
+from depthtrack.types import Image
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.hand_picture import hand_picture
 from depthtrack.viewing.panels import beside, blank, captioned, stacked
 from depthtrack.viewing.text import put_text
 from depthtrack.viewing.theme import FAINT_TEXT, TEXT
-
-Image = NDArray[np.uint8]
 
 STEPS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 """Standard deviations from the mean posture."""

@@ -2,13 +2,11 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from depthtrack.types import Array, Image
 from depthtrack.viewing.panels import blank
 from depthtrack.viewing.text import put_text
 from depthtrack.viewing.theme import BACKGROUND, FAINT_TEXT, STATUS_COLOURS, SURFACE, TEXT
-
-Image = NDArray[np.uint8]
 
 HEIGHT = 84
 _TOP, _BOTTOM = 24, 12
@@ -18,7 +16,7 @@ _SUBPIXEL_BITS = 4
 class Timeline:
     """`image` (HEIGHT, width, 3), drawn once, is what all frames of a run share; `at` adds the cursor."""
 
-    def __init__(self, energy: NDArray[np.float64], status: tuple[str, ...], width: int) -> None:
+    def __init__(self, energy: Array, status: tuple[str, ...], width: int) -> None:
         """`energy` (T,), NaN where there is none, and `status` (T,) of a run."""
         self._width, self._count = width, len(energy)
         self.image = blank(width, HEIGHT, SURFACE)
@@ -44,7 +42,7 @@ class Timeline:
     def _x(self, row: float) -> int:
         return round(np.clip((row + 0.5) / max(self._count, 1), 0, 1) * (self._width - 1))
 
-    def _draw_curve(self, energy: NDArray[np.float64]) -> None:
+    def _draw_curve(self, energy: Array) -> None:
         height = HEIGHT - _TOP - _BOTTOM
         y = _TOP + height * (1 - np.clip(energy / self._top, 0, 1))
         x = (np.arange(self._count) + 0.5) / max(self._count, 1) * (self._width - 1)

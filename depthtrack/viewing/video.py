@@ -10,9 +10,9 @@ from typing import Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.types import Image
 
 QUICK_CODECS = ("avc1", "mp4v")
 """H.264 where OpenCV brings it (macOS, distributions), else MPEG-4 part 2: fast, plays in every video player."""
@@ -46,7 +46,7 @@ class VideoWriter:
         self._shape: tuple[int, ...] = ()
         self._encoder: cv2.VideoWriter | None = None
 
-    def write(self, image: NDArray[np.uint8]) -> None:
+    def write(self, image: Image) -> None:
         """Append one image. Raises InputError when no codec works or the size differs from the first image's."""
         if self._encoder is None:
             self._shape = image.shape

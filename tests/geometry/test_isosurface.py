@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from trimesh import Trimesh
 
-from depthtrack.geometry.isosurface import Array, _without_double_sheets, polygonise, surface_nets
+from depthtrack.geometry.isosurface import _without_double_sheets, polygonise, surface_nets
+from depthtrack.types import Array
 
 
 def test_a_torus_is_met_exactly_with_its_topology() -> None:

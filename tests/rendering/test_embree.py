@@ -17,10 +17,9 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
+from depthtrack.types import Array
 
 pytest.importorskip("embreex", reason="no outside witness: pip install 'depthtrack[witness]'")
-
-Array = NDArray[np.float64]
 
 
 def embree_depth(camera: Camera, vertices: Array, faces: NDArray[np.int64]) -> Array:

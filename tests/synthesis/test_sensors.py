@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
@@ -13,8 +12,8 @@ from depthtrack.synthesis.randomness import Stream, generator, normal_noise
 from depthtrack.synthesis.sensors import SENSOR_NAMES, kinect1, kinect2, make_sensor, realsense
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 from depthtrack.synthesis.sensors.ideal import with_gaussian_noise
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 SMALL = Camera(160, 120, 525.0, 525.0, 79.5, 59.5)
 
 

@@ -16,6 +16,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
+from depthtrack.types import Image
 from depthtrack.viewing.close_ups import close_ups
 from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale, residual_to_rgb
 from depthtrack.viewing.run_film import write_run_film
@@ -28,8 +29,6 @@ from tests.run_samples import synthesise, true_poses, write_run
 FRAMES = 6
 STATUS = {2: "absent", 4: "lost"}
 needs_rerun = pytest.mark.skipif(find_spec("rerun") is None, reason="rerun-sdk is not installed (the extra 'view')")
-
-Image = NDArray[np.uint8]
 
 
 @pytest.fixture(scope="module")

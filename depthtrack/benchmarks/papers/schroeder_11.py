@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from depthtrack.benchmarks.papers import synergy_sources as bases
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
@@ -22,8 +21,8 @@ from depthtrack.solver.icp import PAPER_ICP, IcpOptions
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film, film
 from depthtrack.tracking.stages.coarse_to_fine import DIRECT, PAPER_COARSE_TO_FINE, CoarseToFine, SingleFrameFitter
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Way = Literal["hierarchical", "all angles at once"]
 
 MOTION = "signs"

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from depthtrack.benchmarks.papers import synergy_sources as bases
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
@@ -14,8 +13,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 COUNTS, QUICK_COUNTS = tuple(range(1, 21)), (1, 2, 3, 4, 6, 8, 10, 12, 16, 20)
 SETS = (("signs", "signs"), ("leap", "signs"), ("leap-grasps", "grasp"))

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLES
@@ -13,8 +12,7 @@ from depthtrack.hand.synergies import Synergies, load_synergies, synergy_names
 from depthtrack.posture_databases.registry import read_postures
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.synthesis.motion_file import motion_names
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _LABEL = 16
 """Characters."""

@@ -19,8 +19,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, Terms, evaluate
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Array32, Depth
 
-Array = NDArray[np.float64]
 INSTALL = {
     "pyrender": "pip install pyrender && pip install --upgrade PyOpenGL",  # it pins a PyOpenGL too old for numpy 2
     "open3d": "pip install open3d",
@@ -64,7 +64,7 @@ class Rival(ScorerBase):
         clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
         return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
 
-    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+    def render(self, pose: ArrayLike) -> Depth:
         batch = as_batch(np.asarray(pose)[None])
         return self._depth(self._model.transforms(batch[0])).astype(np.float32, copy=False)
 
@@ -116,7 +116,7 @@ class PyrenderScorer(Rival):
     def _depth(self, transforms: Array) -> NDArray[np.floating]:
         for node, T in zip(self._nodes, transforms, strict=True):
             self._scene.set_pose(node, T)
-        depth: NDArray[np.float32] = self._renderer.render(self._scene, self._pyrender.RenderFlags.DEPTH_ONLY)
+        depth: Depth = self._renderer.render(self._scene, self._pyrender.RenderFlags.DEPTH_ONLY)
         return depth
 
     def close(self) -> None:
@@ -152,7 +152,7 @@ class Open3DScorer(RayCaster):
     def _depth(self, transforms: Array) -> NDArray[np.floating]:
         scene = self._new_scene()
         scene.add_triangles(self._core.Tensor(self._mesh.posed(transforms).astype(np.float32)), self._faces)
-        distance: NDArray[np.float32] = scene.cast_rays(self._tensor)["t_hit"].numpy()
+        distance: Array32 = scene.cast_rays(self._tensor)["t_hit"].numpy()
         return np.where(np.isfinite(distance), distance, 0)
 
 
@@ -172,7 +172,7 @@ class EmbreeScorer(RayCaster):
     def _depth(self, transforms: Array) -> NDArray[np.floating]:
         scene = self._new_scene()
         self._add_triangles(scene, self._mesh.posed(transforms).astype(np.float32), self._faces)
-        distance: NDArray[np.float32] = scene.run(np.zeros_like(self._flat), self._flat, query="DISTANCE")
+        distance: Array32 = scene.run(np.zeros_like(self._flat), self._flat, query="DISTANCE")
         return np.where(distance < 1e30, distance, 0).reshape(self._rays.shape[:2])
 
 

@@ -13,7 +13,6 @@ from itertools import product
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.benchmarks.speed.timing import time_calls
 from depthtrack.benchmarks.speed.workload import FRAME_TIMES
@@ -32,8 +31,8 @@ from depthtrack.text_table import aligned
 from depthtrack.tracking.surfaces.registry import Model, make_surface
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Freedom = Literal["26", "6+6"]
 
 DISTANCE = 0.59

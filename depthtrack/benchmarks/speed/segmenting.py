@@ -13,7 +13,6 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.segmentation import overlap, whole_mask
@@ -24,9 +23,7 @@ from depthtrack.segmentation.observation import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.text_table import aligned
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from depthtrack.types import Array, Mask
 
 FRAMES = 12
 """Consecutive frames that are gone through again and again."""

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from trimesh.creation import icosphere
 
 from depthtrack.hand.primitives import SPHERE, Primitives
-
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from depthtrack.types import Array, Faces, Index
 
 
 @dataclass(frozen=True)
@@ -21,7 +18,7 @@ class Tessellation:
     """
 
     vertices: Array
-    bodies: NDArray[np.int64]
+    bodies: Index
     faces: Faces
 
     @classmethod

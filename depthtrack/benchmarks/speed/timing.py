@@ -4,10 +4,11 @@ from collections.abc import Callable
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
+
+from depthtrack.types import Array
 
 
-def time_calls(call: Callable[[], object], seconds: float) -> NDArray[np.float64]:
+def time_calls(call: Callable[[], object], seconds: float) -> Array:
     """Durations (N,) in seconds of calls made one after another until `seconds` have passed; at least one."""
     durations, end = [], perf_counter() + seconds
     while True:

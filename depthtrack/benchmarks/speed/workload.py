@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import PRESETS
 from depthtrack.hand.limits import within_limits
@@ -15,8 +14,8 @@ from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.motion import load_motion
 from depthtrack.synthesis.viewpoint import Viewpoint
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Roi = Literal["native", "96", "64"]
 ROIS: tuple[Roi, ...] = ("native", "96", "64")
 """Regions of interest: the sensor's own pixels, or reduced to so many a side."""

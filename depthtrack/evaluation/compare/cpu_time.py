@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.tracker import Estimate, Tracker
+from depthtrack.types import Array
 
 
 class CpuTimed:
@@ -31,7 +31,7 @@ class CpuTimed:
         self._tracker.restore(estimates)
 
     @property
-    def predicted_pose(self) -> NDArray[np.float64] | None:
+    def predicted_pose(self) -> Array | None:
         return self._tracker.predicted_pose
 
     def close(self) -> None:

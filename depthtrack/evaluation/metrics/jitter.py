@@ -1,11 +1,9 @@
 """How much a track trembles."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.metric import Metric
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _LONGEST_STEP = 1.5
 """Usual intervals between frames; across a longer gap, and beside it, nothing is said."""

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.metric import Metric
 from depthtrack.tracking.tracker import Status
+from depthtrack.types import Array, Mask
 
 _TRUSTED = (Status.TRACKED, Status.STARTED)
 
@@ -36,8 +36,8 @@ class Losses:
     by the share of frames within 10 to 40 mm.
     """
 
-    lost: NDArray[np.bool_]
-    absent: NDArray[np.bool_]
+    lost: Mask
+    absent: Mask
     losses: tuple[Loss, ...]
     first_trusted: int | None
 
@@ -62,7 +62,7 @@ class Losses:
         }
 
 
-def find_losses(status: Sequence[str], timestamps: NDArray[np.float64]) -> Losses:
+def find_losses(status: Sequence[str], timestamps: Array) -> Losses:
     """The losses of a run with a `status` (T,) at each of `timestamps` (T,), seconds."""
     lost = np.array([s == Status.LOST for s in status], dtype=np.bool_)
     absent = np.array([s == Status.ABSENT for s in status], dtype=np.bool_)

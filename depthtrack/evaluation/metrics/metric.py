@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 Statistics = dict[str, float | None]
 """Keys "mean", "median", "p95" and "max", or "p05" and "min" where higher is better; None without a judged frame."""

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.evaluation.metrics.metric import Metric
 from depthtrack.hand.kinematics import ENDPOINT_NAMES, KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import ANGLES, FINGERS
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class PointErrors:
     metric: str
     names: tuple[str, ...]
     mm: Array
-    known: NDArray[np.bool_]
+    known: Mask
 
     @classmethod
     def between(cls, metric: str, names: tuple[str, ...], points: ArrayLike, true_points: ArrayLike) -> Self:

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from depthtrack.evaluation.metrics.metric import Metric
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from depthtrack.types import Array, Mask
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.points import PointErrors
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 LIMIT_MM = 50.0
 """Upper end of the curve, and of the area under it."""

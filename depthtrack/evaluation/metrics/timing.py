@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.evaluation.metrics.metric import Metric
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 def frame_time(stage_ms: Mapping[str, Array], frames: int) -> Metric:

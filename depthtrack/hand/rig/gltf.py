@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from depthtrack.errors import DepthtrackError, InputError, MissingExtraError
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Index
 
 MAX_BYTES = 256 * 2**20
 """Largest file or buffer read."""
@@ -42,12 +41,12 @@ class Rig:
     """
 
     names: tuple[str, ...]
-    parents: NDArray[np.int64]
+    parents: Index
     joints: Array
     ends: dict[int, Array]
     vertices: Array
-    faces: NDArray[np.int64]
-    bound: NDArray[np.int64]
+    faces: Index
+    bound: Index
     weights: Array
 
 
@@ -166,7 +165,7 @@ class _Document:
             raise InputError(f"{self.path}: its nodes form a circle instead of a tree")
         return world, above
 
-    def _primitive(self, primitive: Any, joint_count: int) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+    def _primitive(self, primitive: Any, joint_count: int) -> tuple[Array, Index, Index, Array]:
         """Vertices (V, 3), faces (F, 3), joints and weights (V, K) of one part of a mesh."""
         attributes = primitive.attributes
         vertices = self._accessor(attributes.POSITION, "VEC3").astype(np.float64)

@@ -15,7 +15,8 @@ from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import BODY_COUNT, JOINT_NAMES, HandModel, body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig.gltf import gltf_library
-from depthtrack.hand.skin.mesh import Array, Skin
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.types import Array
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
 _VERTEX_DATA, _INDEX_DATA = 34962, 34963

@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
@@ -21,9 +20,8 @@ from depthtrack.hand.rig.gltf import Rig, read_rigs
 from depthtrack.hand.rig.rig_joints import finger_joints, mapped_joints, side_of
 from depthtrack.hand.rig.rig_measurement import bone_frames, measured_shape
 from depthtrack.hand.shape import Side
-from depthtrack.hand.skin.mesh import Array, Skin
-
-Indices = NDArray[np.int64]
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.types import Array, Index
 
 
 def load_skin(
@@ -58,7 +56,7 @@ def _read_mapping(path: Path) -> Mapping[str, str]:
     return mapping
 
 
-def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, str] | None) -> tuple[Rig, Indices]:
+def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, str] | None) -> tuple[Rig, Index]:
     """The first rig with five fingers, and its phalanges (5, 3)."""
     for rig in rigs:
         try:
@@ -71,7 +69,7 @@ def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, s
     raise last
 
 
-def _wrist(rig: Rig, phalanges: Indices, mapping: Mapping[str, str] | None) -> int:
+def _wrist(rig: Rig, phalanges: Index, mapping: Mapping[str, str] | None) -> int:
     """The joint at the wrist: as mapped, or the last one that all fingers hang on, or by name in a flat rig."""
     if mapping is not None and "wrist" in mapping:
         return rig.names.index(mapping["wrist"])
@@ -108,7 +106,7 @@ def _hand_alone(rig: Rig, wrist: int) -> Rig:
     )
 
 
-def _side(rig: Rig, phalanges: Indices, wrist: int) -> Side:
+def _side(rig: Rig, phalanges: Index, wrist: int) -> Side:
     """From the names; else from the way the fingers bend and the thumb stands out, both towards the palm."""
     named = {side for joint in phalanges.ravel() if (side := side_of(rig.names[joint])) is not None}
     if len(named) == 1:
@@ -122,7 +120,7 @@ def _side(rig: Rig, phalanges: Indices, wrist: int) -> Side:
     return "right" if evidence > 0 else "left"
 
 
-def _skin(rig: Rig, phalanges: Indices, wrist: int, side: Side, unit: float, source: str) -> Skin:
+def _skin(rig: Rig, phalanges: Index, wrist: int, side: Side, unit: float, source: str) -> Skin:
     weights = _body_weights(rig, phalanges)
     points = np.empty((5, 4, 3))
     points[:, :3] = rig.joints[phalanges]
@@ -140,7 +138,7 @@ def _skin(rig: Rig, phalanges: Indices, wrist: int, side: Side, unit: float, sou
     return Skin(shape.with_(side=side), vertices, rig.faces, weights, np.asarray(np.linalg.inv(T_palm_body)))
 
 
-def _body_weights(rig: Rig, phalanges: Indices) -> Array:
+def _body_weights(rig: Rig, phalanges: Index) -> Array:
     """(V, 16): each joint's weight goes to the phalanx that it is or hangs on, else to the palm."""
     body = {int(joint): 1 + i for i, joint in enumerate(phalanges.ravel())}
     bodies = np.array(

@@ -11,12 +11,12 @@ import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import JOINT_NAMES
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.shape import Side
+from depthtrack.types import Array, Index
 
 _FINGER_WORDS = (("thumb",), ("index", "forefinger"), ("middle",), ("ring",), ("little", "pinky", "pinkie"))
 _PHALANX_WORDS = {"meta": 0, "carpal": 0, "prox": 1, "inter": 2, "medial": 2, "dist": 3}
@@ -25,9 +25,7 @@ _TIP_WORDS = ("tip", "end", "nub", "null", "effector")
 _NOT_A_HAND = ("toe", "foot", "leg")
 
 
-def finger_joints(
-    names: Sequence[str], parents: NDArray[np.int64], loads: NDArray[np.float64], side: Side | None
-) -> NDArray[np.int64]:
+def finger_joints(names: Sequence[str], parents: Index, loads: Array, side: Side | None) -> Index:
     """(5, 3) joints of the phalanges, from the palm outward.
 
     `names` and `parents` (J,) describe the rig, `loads` (J,) how much skin each joint moves: a last joint that moves
@@ -60,7 +58,7 @@ def finger_joints(
     return found
 
 
-def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> NDArray[np.int64]:
+def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> Index:
     """(5, 3) joints of the phalanges as a user names them, keyed by `kinematics.JOINT_NAMES`.
 
     Raises InputError for keys that are missing or unknown and for joints that the rig does not have.
@@ -105,7 +103,7 @@ def _is_tip(name: str) -> bool:
     return any(word in words for word in _TIP_WORDS)
 
 
-def _depth(parents: NDArray[np.int64], joint: int) -> int:
+def _depth(parents: Index, joint: int) -> int:
     depth = 0
     while (joint := int(parents[joint])) >= 0:
         depth += 1

@@ -5,14 +5,12 @@ of each finger, `vertices` (V, 3) the skin, `weights` (V, 16) its bodies.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _BENT = 0.25
 """A thumb whose bones lean this far (sine) from one line shows the plane it bends in."""

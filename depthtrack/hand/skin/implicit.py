@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _FLEXION = np.radians([(0, 12, 18), (22, 34, 20), (22, 36, 20), (22, 36, 20), (22, 34, 20)])
 _SPREAD = np.radians(10.0)

@@ -4,19 +4,18 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from trimesh import Trimesh
 
 from depthtrack.errors import InputError
-from depthtrack.geometry.isosurface import Faces, neighbour_average, polygonise
+from depthtrack.geometry.isosurface import neighbour_average, polygonise
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
 from depthtrack.hand.skin.weights import skin_weights
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Faces, Index
 
 _VERTICES = 7000
 """About how many vertices a hand of usual proportions gets."""
@@ -77,7 +76,7 @@ class Skin:
         return Trimesh(vertices, self.faces, process=False)
 
     @cached_property
-    def face_bodies(self) -> NDArray[np.int64]:
+    def face_bodies(self) -> Index:
         """(F,) body that moves each face most."""
         return np.asarray(self.weights[self.faces].sum(axis=1).argmax(axis=-1), dtype=np.int64)
 

@@ -5,13 +5,11 @@ Across the hand it goes by distance to the flesh of each finger, so that webs fo
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from depthtrack.geometry.isosurface import Faces, neighbour_average
+from depthtrack.geometry.isosurface import neighbour_average
 from depthtrack.hand.kinematics import BODY_COUNT, body_of
 from depthtrack.hand.skin.implicit import ImplicitHand
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Faces
 
 _BLEND = (1.4, 1.0, 1.0)
 """Half the width of the passage at each joint of a finger, in radii; the skin over a knuckle slides furthest."""

@@ -25,6 +25,7 @@ from depthtrack.recording.ground_truth import read_ground_truth
 from depthtrack.recording.images import read_colour, read_depth, read_header, read_mask
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.recording.sequences.tum_lists import associate, is_inside, read_list
+from depthtrack.types import Array, Depth, Image, Mask
 
 EXACT_DEPTH_SCALE = 0.00005
 """Metres per unit of `exact_depth/`: steps of 0.05 mm up to 3.27 m. `sequence.json` may state another."""
@@ -46,7 +47,7 @@ class FolderSequence:
         self._depth = read_list(folder, "depth.txt")
         self._colour = read_list(folder, "rgb.txt") if (folder / "rgb.txt").exists() else []
         self._partner = associate([file.timestamp for file in self._depth], [file.timestamp for file in self._colour])
-        self.timestamps: NDArray[np.float64] = np.array([file.timestamp for file in self._depth])
+        self.timestamps: Array = np.array([file.timestamp for file in self._depth])
         self.ground_truth: GroundTruth | None = read_ground_truth(folder)
         self._exact_scale = _exact_depth_scale(self.description, folder)
         self._on_damage = on_damage
@@ -96,12 +97,12 @@ class FolderSequence:
         if last_error is not None and not readable:
             raise InputError(f"{self.folder}: not one frame can be read; the last: {last_error}") from last_error
 
-    def hand_mask(self, index: int) -> NDArray[np.bool_] | None:
+    def hand_mask(self, index: int) -> Mask | None:
         """See `Sequence`. Raises DamagedFrameError where the mask is there and cannot be read."""
         path = self._beside(index, "hand_mask")
         return None if path is None else read_mask(path, self.camera.shape)
 
-    def skin_mask(self, index: int) -> NDArray[np.bool_] | None:
+    def skin_mask(self, index: int) -> Mask | None:
         """Skin labels (h, w), right or wrong, that a synthetic recording brings in place of a colour segmentation's.
 
         Raises DamagedFrameError where the mask is there and cannot be read.
@@ -109,12 +110,12 @@ class FolderSequence:
         path = self._beside(index, "skin_mask")
         return None if path is None else read_mask(path, self.camera.shape)
 
-    def exact_depth(self, index: int) -> NDArray[np.float32] | None:
+    def exact_depth(self, index: int) -> Depth | None:
         """See `Sequence`. Raises DamagedFrameError where the image is there and cannot be read."""
         path = self._beside(index, "exact_depth")
         return None if path is None else _metres(read_depth(path, self.camera.shape), self._exact_scale)
 
-    def _read_colour(self, index: int) -> NDArray[np.uint8] | None:
+    def _read_colour(self, index: int) -> Image | None:
         if index not in self._partner:
             return None
         return read_colour(self.folder / self._colour[self._partner[index]].name, self.camera.shape)
@@ -141,7 +142,7 @@ def image_size(folder: Path) -> tuple[int, int]:
     raise InputError(f"{folder}: none of the depth images can be read")
 
 
-def _metres(stored: NDArray[np.uint16], scale: float) -> NDArray[np.float32]:
+def _metres(stored: NDArray[np.uint16], scale: float) -> Depth:
     return stored.astype(np.float32) * np.float32(scale)
 
 

@@ -11,15 +11,12 @@ from typing import NamedTuple, Self
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.primitives import CYLINDER, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.surface import NEAR
-
-Array = NDArray[np.float64]
-Window = NDArray[np.int64]
+from depthtrack.types import Array, Array32, Index
 
 VECTORS = 6
 """An impostor is six 4-vectors: its rectangle in the atlas (left, top, right, bottom edges, pixels); the columns of
@@ -37,8 +34,8 @@ class HandTable(NamedTuple):
     base_positions: Array
     lengths: Array
     mirror: float
-    kinds: NDArray[np.int64]
-    bodies: NDArray[np.int64]
+    kinds: Index
+    bodies: Index
     T_body_unit: Array
     T_unit_body: Array
 
@@ -65,8 +62,8 @@ def place_impostors(
     intrinsics: tuple[float, float, float, float],
     tile: tuple[int, int],
     columns: int,
-    instances: NDArray[np.float32],
-    windows: Window,
+    instances: Array32,
+    windows: Index,
 ) -> int:
     """Write the impostors of all poses (B, 27), tile by tile from the atlas' first corner; returns how many.
 
@@ -171,7 +168,7 @@ def _uncompose(T_unit_body: Array, R: Array, t: Array, M: Array) -> None:
 
 @numba.njit(cache=True)
 def _bounds(
-    T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], window: Window
+    T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], window: Index
 ) -> float:
     """Pixels (u0, u1, v0, v1; ends excluded) of the tile that a placed primitive may cover.
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.rendering.opengl.context import Context, Device, Platform
@@ -14,8 +13,7 @@ from depthtrack.rendering.opengl.impostors import VECTORS
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.programs import Program
 from depthtrack.rendering.surface import NEAR
-
-Array32 = NDArray[np.float32]
+from depthtrack.types import Array, Array32
 
 _BLOCK = 4
 """Side of the blocks that one level of the pyramid sums; the shaders say the same."""
@@ -119,7 +117,7 @@ class Renderer:
 
     def sum(
         self, gl: Any, which: int, grid: Grid, count: int, observation: int, match_depth: float, clamp_depth: float
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Sums of Eq. (2) over the tiles of atlas `which`: (count, 3).
 
         `observation` is a texture filled by `upload`. The first level of the pyramid compares, the next ones add, until

@@ -4,7 +4,7 @@ import weakref
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.primitives import PRIMITIVE_COUNT
@@ -16,8 +16,8 @@ from depthtrack.rendering.opengl.renderer import Grid, Renderer, shared_renderer
 from depthtrack.rendering.opengl.sums import sum_tiles
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Array32, Depth, Index
 
-Array = NDArray[np.float64]
 Sums = Literal["gpu", "cpu"]
 
 _PARTS, _SMALLEST_PART = 2, 16
@@ -90,7 +90,7 @@ class OpenGLScorer(ScorerBase):
                 self._sum(gl, turn % 2, grid, windows[drawn], sums[drawn])
         return Terms.of_sums(self._objective, batch, *sums.T)
 
-    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+    def render(self, pose: ArrayLike) -> Depth:
         batch, renderer = as_batch(np.asarray(pose)[None]), self._open
         with renderer.context as gl:
             grid = renderer.grid(gl, *self.target.camera.shape)
@@ -112,14 +112,14 @@ class OpenGLScorer(ScorerBase):
         wanted = max(-(-count // _PARTS), _SMALLEST_PART) if self.software else count
         return max(min(wanted, grid.capacity), 1)
 
-    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, windows: NDArray[np.int64]) -> None:
+    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, windows: Index) -> None:
         if len(self._instances) < len(poses) * PRIMITIVE_COUNT:
             self._instances = np.empty((len(poses) * PRIMITIVE_COUNT, VECTORS, 4), np.float32)
         tile = grid.height, grid.width
         count = place_impostors(poses, self._hand, self._intrinsics, tile, grid.columns, self._instances, windows)
         self._open.draw(gl, which, grid, len(poses), self._instances[:count])
 
-    def _read(self, gl: Any, which: int, grid: Grid, count: int) -> NDArray[np.float32]:
+    def _read(self, gl: Any, which: int, grid: Grid, count: int) -> Array32:
         height, width = grid.extent(count)
         if self._pixels.size < height * width:
             self._pixels = np.empty(height * width, np.float32)
@@ -127,7 +127,7 @@ class OpenGLScorer(ScorerBase):
         self._open.read(gl, which, pixels)
         return pixels
 
-    def _sum(self, gl: Any, which: int, grid: Grid, windows: NDArray[np.int64], sums: Array) -> None:
+    def _sum(self, gl: Any, which: int, grid: Grid, windows: Index, sums: Array) -> None:
         o, target = self._objective, self.target
         limits = o.match_depth, o.clamp_depth
         if self.sums == "gpu":

@@ -2,9 +2,8 @@
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Array32 = NDArray[np.float32]
+from depthtrack.types import Array, Array32, Index
 
 
 # Sums may be reordered, so that they vectorise; 0 and infinity behave as IEEE says.
@@ -12,13 +11,13 @@ Array32 = NDArray[np.float32]
 def sum_tiles(
     inverse_depth: Array32,
     columns: int,
-    windows: NDArray[np.int64],
+    windows: Index,
     depth: Array32,
     skin: Array32,
     empty: tuple[float, float, float],
     match_depth: float,
     clamp_depth: float,
-    sums: NDArray[np.float64],
+    sums: Array,
 ) -> None:
     """Write (B, 3) `sums`: min(|o_d - r_d|, d_M) in metres, o_s and r_m, o_s or r_m, over each of B tiles.
 

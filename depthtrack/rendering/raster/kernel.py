@@ -7,7 +7,6 @@ empty image would cost is known beforehand.
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster import quadrics as q
@@ -33,9 +32,7 @@ from depthtrack.simd.vectors import (
     store,
     vmin,
 )
-
-Array = NDArray[np.float64]
-Array32 = NDArray[np.float32]
+from depthtrack.types import Array, Array32, Index
 
 _load = loader(F32X16)
 _fill = filler(F32X16)
@@ -146,7 +143,7 @@ def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth
 @numba.njit(cache=True, nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
-    tickets: NDArray[np.int64],
+    tickets: Index,
     thread: int,
     spin_limit: int,
     hand: Array,
@@ -158,10 +155,10 @@ def score_poses(
     scratch: Array,
     table: Array32,
     buffer: Array32,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
+    first: Index,
+    last: Index,
+    low: Index,
+    high: Index,
     sums: Array,
     energies: Array,
 ) -> None:
@@ -207,10 +204,10 @@ def draw_pose(
     scratch: Array,
     table: Array32,
     buffer: Array32,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    low: NDArray[np.int64],
-    high: NDArray[np.int64],
+    first: Index,
+    last: Index,
+    low: Index,
+    high: Index,
 ) -> None:
     """Leave the inverse depth of one pose in the buffer, for the caller to clear; arrays as in `score_poses`."""
     blocks = _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high)

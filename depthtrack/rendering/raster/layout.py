@@ -6,14 +6,13 @@ The sizes are read back from the matrices of `hand.primitives`, which stay the o
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
+from depthtrack.types import Array, Index
 
-Array = NDArray[np.float64]
 LANES = 8
 SPHERES, CONES, GENERAL, SLOTS = 0, 32, 56, 64
 """First slot of each group, and how many slots there are."""
@@ -23,7 +22,7 @@ BASE_ROTATION, BASE_POSITION, LENGTH, MIRROR = 0, 9, 12, 15
 SPHERE_RADIUS, TIP_LENGTH, CONE_RADIUS, CONE_SLOPE, CONE_LENGTH = 16, 20, 21, 24, 27
 GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH, IS_THUMB, REACH, ROWS = 30, 33, 36, 39, 40, 41, 42
 
-ACTIVE: NDArray[np.int64] = np.array(
+ACTIVE: Index = np.array(
     [GENERAL + k for k in range(4)]
     + [SPHERES + LANES * k + f for k in range(4) for f in range(5) if (k, f) != (0, 0)]
     + [CONES + LANES * k + f for k in range(3) for f in range(5) if (k, f) != (0, 0)]

@@ -2,22 +2,18 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from depthtrack.rendering.raster import layout
-from depthtrack.rendering.raster.quadrics import Coefficients, span, write_cones, write_general, write_spheres
+from depthtrack.rendering.raster.quadrics import span, write_cones, write_general, write_spheres
 from depthtrack.simd.functions import first, vfloor
 from depthtrack.simd.vectors import F64X8, filler, kernel_part, loader, select
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Array32
 
 _load = loader(F64X8)
 _fill = filler(F64X8)
 
 
 @kernel_part
-def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Coefficients) -> None:
+def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array32) -> None:
     """Fill the coefficient table for one pose.
 
     `pose` (27,), `hand` from `layout.constants`, `camera` (8,): fx, fy, cx, cy, 1/fx, 1/fy, width, height; `scratch`

@@ -5,17 +5,12 @@ pixel, B is linear and A quadratic in it, so the face seen from outside is w = b
 linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is computed in float64, a lane a primitive.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster import tiles as tiles
 from depthtrack.rendering.surface import NEAR
 from depthtrack.simd.functions import narrow, vabs, vfloor, vsqrt
 from depthtrack.simd.vectors import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
-
-Array = NDArray[np.float64]
-Coefficients = NDArray[np.float32]
+from depthtrack.types import Array32
 
 _load = loader(F64X8)
 _fill = filler(F64X8)
@@ -37,7 +32,7 @@ STEEP = 1e20
 
 
 @kernel_part
-def _put(table: Coefficients, row: int, slot: int, value) -> None:
+def _put(table: Array32, row: int, slot: int, value) -> None:
     store(table, row * SLOTS + slot, narrow(value))
 
 

@@ -19,8 +19,8 @@ from depthtrack.rendering.raster.work_queue.queue import Tickets, is_done, new_t
 from depthtrack.rendering.raster.work_queue.worker import Helper
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Array32, Depth, Index
 
-Array = NDArray[np.float64]
 _PATIENCE = 4000
 """Looks at an exhausted batch before a thread goes to sleep: some 0.2 ms, enough for a swarm to be moved."""
 
@@ -29,15 +29,13 @@ _PATIENCE = 4000
 class _Workspace:
     """One thread's own arrays: see `kernel.score_poses`."""
 
-    buffer: NDArray[np.float32]
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
-    low: NDArray[np.int64]
-    high: NDArray[np.int64]
+    buffer: Depth
+    first: Index
+    last: Index
+    low: Index
+    high: Index
     scratch: Array = field(default_factory=lambda: np.zeros(4 * layout.LANES))
-    table: NDArray[np.float32] = field(
-        default_factory=lambda: np.zeros(quadrics.COEFFICIENT_ROWS * quadrics.SLOTS, np.float32)
-    )
+    table: Array32 = field(default_factory=lambda: np.zeros(quadrics.COEFFICIENT_ROWS * quadrics.SLOTS, np.float32))
 
     @classmethod
     def of(cls, shape: tuple[int, int]) -> Self:
@@ -95,7 +93,7 @@ class RasterScorer(ScorerBase):
         clamped, matched_skin, union = self._sums_and_energies(batch)[0].T
         return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
 
-    def render(self, pose: ArrayLike) -> NDArray[np.float32]:
+    def render(self, pose: ArrayLike) -> Depth:
         shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
         space = self._workspaces[0]
         kernel.draw_pose(batch[0], self._hand, self._camera, *space.arrays)

@@ -5,15 +5,15 @@ closed form, for sixteen columns at once.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster import tiles as tiles
 from depthtrack.simd.functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
 from depthtrack.simd.vectors import F32X16, kernel_part, loader, select, vmax, vmin
+from depthtrack.types import Array32
 
 _load = loader(F32X16)
-_COLUMNS: NDArray[np.float32] = np.arange(16, dtype=np.float32)
+_COLUMNS: Array32 = np.arange(16, dtype=np.float32)
 _SLACK = np.float32(0.25)
 """Rows; the float32 roots are good to a hundredth, and the lanes decide exactly."""
 

@@ -7,6 +7,8 @@ parts of a hand fill such blocks better than sixteen pixels of a row, and a walk
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.types import Array32
+
 COLUMNS, ROWS = 8, 2
 BLOCK = COLUMNS * ROWS
 """Pixels of a block."""
@@ -18,7 +20,7 @@ def stripe_counts(shape: tuple[int, int]) -> tuple[int, int]:
     return -(-shape[1] // COLUMNS), -(-shape[0] // ROWS)
 
 
-def new_stripes(shape: tuple[int, int]) -> NDArray[np.float32]:
+def new_stripes(shape: tuple[int, int]) -> Array32:
     """Zeros (stripes * blocks * BLOCK,) for an image of (height, width), aligned to cache lines."""
     tiles, blocks = stripe_counts(shape)
     size = tiles * blocks * BLOCK
@@ -27,7 +29,7 @@ def new_stripes(shape: tuple[int, int]) -> NDArray[np.float32]:
     return memory[start : start + size]
 
 
-def write_stripes(image: NDArray[np.generic], beyond: float, stored: NDArray[np.float32]) -> None:
+def write_stripes(image: NDArray[np.generic], beyond: float, stored: Array32) -> None:
     """Store an image (h, w); what the last blocks hold beyond it becomes `beyond`."""
     (height, width), (tiles, blocks) = image.shape, stripe_counts(image.shape)
     rows = np.full((blocks * ROWS, tiles * COLUMNS), beyond, np.float32)
@@ -35,7 +37,7 @@ def write_stripes(image: NDArray[np.generic], beyond: float, stored: NDArray[np.
     stored.reshape(tiles, blocks * ROWS, COLUMNS)[:] = rows.reshape(-1, tiles, COLUMNS).swapaxes(0, 1)
 
 
-def read_stripes(stored: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.float32]:
+def read_stripes(stored: Array32, shape: tuple[int, int]) -> Array32:
     """The image (h, w) of that shape."""
     tiles, blocks = stripe_counts(shape)
     rows = stored.reshape(tiles, blocks * ROWS, COLUMNS).swapaxes(0, 1).reshape(-1, tiles * COLUMNS)

@@ -3,13 +3,12 @@
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.surface import Surface
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 SENSOR_NAMES = ("ideal", "kinect1", "kinect2", "realsense")
 
 

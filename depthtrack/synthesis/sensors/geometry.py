@@ -4,12 +4,10 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.surface import Surface
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Mask
 
 JUMP = 0.02
 """Neighbouring depths that differ by more than this share of themselves are two surfaces, not one."""
@@ -22,14 +20,14 @@ def incidence(surface: Surface, camera: Camera) -> Array:
     return out
 
 
-def edges(depth: Array, radius: int = 1) -> NDArray[np.bool_]:
+def edges(depth: Array, radius: int = 1) -> Mask:
     """Pixels (h, w) of a surface that ends, or jumps in depth, within `radius` pixels in a row or column."""
     out = np.zeros(depth.shape, dtype=np.bool_)
     _edges(depth, radius, JUMP, out)
     return out
 
 
-def shadow(depth: Array, camera: Camera, baseline: float) -> NDArray[np.bool_]:
+def shadow(depth: Array, camera: Camera, baseline: float) -> Mask:
     """Pixels (h, w) of the surface that a second viewpoint, `baseline` metres to the right (+x), does not see.
 
     A row of the image is a row of the second one too. There, the surface is drawn into a buffer of inverse depth,
@@ -54,7 +52,7 @@ def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, floa
 
 
 @numba.njit(cache=True, nogil=True)
-def _edges(depth: Array, radius: int, jump: float, out: NDArray[np.bool_]) -> None:
+def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
@@ -70,7 +68,7 @@ def _edges(depth: Array, radius: int, jump: float, out: NDArray[np.bool_]) -> No
 
 
 @numba.njit(cache=True, nogil=True)
-def _shadow(depth: Array, focal_baseline: float, jump: float, out: NDArray[np.bool_]) -> None:
+def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None:
     height, width = depth.shape
     inverse = np.empty(width)
     for v in range(height):

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import normal_noise
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,11 @@ class Ideal:
     usual_distance: float = 0.5
     colour_noise: float = 0.0
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> NDArray[np.float64]:
+    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
         return surface.depth.copy()
 
 
-def with_gaussian_noise(depth: NDArray[np.float64], deviation: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def with_gaussian_noise(depth: Array, deviation: float, rng: np.random.Generator) -> Array:
     """Depth (h, w) with independent normal errors of `deviation` metres (Oikonomidis et al. 2011, Fig. 2c)."""
     noisy = depth + deviation * normal_noise(rng, depth.shape)
     return np.where(depth > 0, np.maximum(noisy, 0), 0)

@@ -18,14 +18,12 @@ from dataclasses import dataclass, field
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Array32, Mask
 
 BASELINE = 0.075
 """Metres from the infrared camera to the projector."""
@@ -85,11 +83,11 @@ def lateral_noise(theta: float) -> float:
 def _read(
     depth: Array,
     theta: Array,
-    edge: NDArray[np.bool_],
-    dark: NDArray[np.bool_],
-    wander: NDArray[np.float32],
-    error: NDArray[np.float32],
-    uniform: NDArray[np.float32],
+    edge: Mask,
+    dark: Mask,
+    wander: Array32,
+    error: Array32,
+    uniform: Array32,
     reach: tuple[float, float],
     out: Array,
 ) -> None:

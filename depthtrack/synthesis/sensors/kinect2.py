@@ -17,14 +17,12 @@ from dataclasses import dataclass, field
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Array32, Mask
 
 _EDGE_DROPOUT = 0.5
 _GRAZING = (math.radians(75), math.radians(86))
@@ -67,9 +65,9 @@ def axial_noise(z: float, theta: float) -> float:
 def _read(
     depth: Array,
     theta: Array,
-    edge: NDArray[np.bool_],
-    error: NDArray[np.float32],
-    uniform: NDArray[np.float32],
+    edge: Mask,
+    error: Array32,
+    uniform: Array32,
     reach: tuple[float, float],
     out: Array,
 ) -> None:

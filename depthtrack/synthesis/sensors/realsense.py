@@ -19,14 +19,12 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.surface import Surface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array, Array32, Mask
 
 BASELINE = 0.050
 """Metres between the imagers."""
@@ -71,7 +69,7 @@ class RealSense:
         return np.where((depth > 0) & ~failed & (read >= self.nearest) & (read <= self.farthest), read, 0)
 
 
-def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float32]:
+def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> Array32:
     """(h, w) normal noise of unit variance, alike over a matching window."""
     white = normal_noise(rng, shape)
     size = 2 * math.ceil(3 * _WINDOW) + 1
@@ -80,7 +78,7 @@ def _smooth_noise(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[n
     return np.asarray(cv2.sepFilter2D(white, cv2.CV_32F, kernel, kernel / np.sum(kernel**2)), dtype=np.float32)
 
 
-def _fattened(depth: Array, where: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+def _fattened(depth: Array, where: Mask) -> tuple[Array, Mask]:
     """Depth whose nearer surfaces have grown over farther ones, and the pixels that they took."""
     far = np.where(depth > 0, depth, np.inf)
     window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _FATTENING + 1, 2 * _FATTENING + 1))

@@ -1,14 +1,12 @@
 """Poses to begin a search with: any orientation that the forearm allows, about where the hand is seen."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, make_pose, quaternion_log, quaternion_product
 from depthtrack.hand.postures import POSTURES
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _PLACE = (0.025, 0.025, 0.012)
 """Metres: how far the palm may be from the observed centre, standard deviations along the camera's axes."""

@@ -5,7 +5,6 @@ one, or for the next, stays so for many frames. What other postures would look l
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.hand.kinematics import HandModel
@@ -22,8 +21,7 @@ from depthtrack.hand.pose import (
 )
 from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.scorer import Scorer
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _HOOKED = np.radians([[0, 20, 40, 60], *([0, 10, 95, 60] for _ in range(4))])
 _LOWERED = np.radians([[10, 20, 10, 5], *([0, 70, 15, 10] for _ in range(4))])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES
@@ -24,8 +24,7 @@ from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.surfaces.registry import Model, make_surface
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _LONGEST_SIDE = 128
 """Pixels of the longest side at which poses are rendered to compare them."""

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
@@ -15,8 +14,7 @@ from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.prior import Prior
 from depthtrack.tracking.proposals.local import finger_shift_proposals, local_proposals, search_one_finger
 from depthtrack.tracking.stages.coarse_to_fine import Stage, run_stages, sort_by_energy
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 _ROUGH = 96
 """Longest side, pixels, at which postures of single fingers are looked at."""

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.synergies import Synergies
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.tracking.proposals.global_ import apart, hypotheses, typical_angles
 from depthtrack.tracking.stages.coarse_to_fine import Stage, postures, run_stages, sort_by_energy
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)

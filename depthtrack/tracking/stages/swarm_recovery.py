@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -12,8 +11,7 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.tracking.proposals.local import finger_shift_proposals, local_proposals, search_one_finger
 from depthtrack.tracking.stages.swarm_search import Polish, SearchOptions, find_candidates
 from depthtrack.tracking.state import TrackingThresholds
-
-Array = NDArray[np.float64]
+from depthtrack.types import Array
 
 
 class RecoveryOptions(NamedTuple):

@@ -4,14 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.swarm import SwarmOptions, minimise
 from depthtrack.solver.swarm_space import TangentSpace
 from depthtrack.tracking.proposals.global_ import apart, hypotheses, typical_angles
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Polish = Callable[[Array], Array]
 """Moves a pose (27,) to the nearest one that agrees better with the observation, by whatever measure."""
 

@@ -7,15 +7,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from depthtrack.types import Array, Index
 
 _POINTS = 240
 """About how many vertices a capsule is fitted to."""

@@ -18,9 +18,7 @@ from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
-
-Array = NDArray[np.float64]
-Array32 = NDArray[np.float32]
+from depthtrack.types import Array, Array32, Depth
 
 _HIDDEN = 0.006
 """Metres behind the rendered hand at which a point counts as hidden: pixels are coarse, and surfaces slanted."""
@@ -52,7 +50,7 @@ class Distances(NamedTuple):
 class View(NamedTuple):
     """The hand as rendered: `depth` (h, w) metres, 0 for none, and the lens (fx, fy, cx, cy)."""
 
-    depth: NDArray[np.float32]
+    depth: Depth
     lens: tuple[float, float, float, float]
 
 

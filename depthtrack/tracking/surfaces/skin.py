@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
@@ -18,11 +17,7 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
 from depthtrack.solver.correspondences import Correspondences, PointCloud
-
-Array = NDArray[np.float64]
-Array32 = NDArray[np.float32]
-Index = NDArray[np.int64]
-
+from depthtrack.types import Array, Array32, Index
 
 _SPACING = 0.026
 """Least distance between the vertices used, in lengths of the palm: 2.4 mm on a usual hand. All of them, 1.8 mm apart,

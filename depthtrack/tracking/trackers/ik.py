@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.limits import within_limits
@@ -28,8 +28,8 @@ from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.surfaces.registry import Model, make_surface
 from depthtrack.tracking.timing import StageClock
 from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 
 

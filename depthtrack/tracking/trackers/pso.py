@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLES, POSITION, retract
@@ -27,8 +27,8 @@ from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.tracking.timing import StageClock
 from depthtrack.tracking.tracker import Estimate, Status
 from depthtrack.tracking.visible_centroid import visible_centroid
+from depthtrack.types import Array
 
-Array = NDArray[np.float64]
 Variant = Literal["default", "paper"]
 Finish = Literal["none", "skin"]
 

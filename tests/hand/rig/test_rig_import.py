@@ -18,7 +18,8 @@ from depthtrack.hand.kinematics import JOINT_NAMES, HandModel, body_of
 from depthtrack.hand.pose import FINGERS, make_pose, quaternion_from_matrix
 from depthtrack.hand.rig.rig_joints import finger_joints, finger_of, side_of
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.skin.mesh import Array, Skin
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.types import Array
 
 pygltflib = pytest.importorskip("pygltflib", reason="rigged hands need the extra: pip install 'depthtrack[gltf]'")
 

@@ -13,7 +13,8 @@ from depthtrack.hand.pose import make_pose
 from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.implicit import rest_pose
-from depthtrack.hand.skin.mesh import Array, Skin
+from depthtrack.hand.skin.mesh import Skin
+from depthtrack.types import Array
 
 DEFAULT = HandShape()
 FIST = np.radians([(12, 22, 45, 45), (4, 80, 100, 60), (0, 85, 100, 60), (-4, 85, 100, 60), (-8, 85, 100, 60)])

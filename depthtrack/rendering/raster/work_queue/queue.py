@@ -6,12 +6,12 @@ looking and taking can never mistake a ticket of one batch for one of another.
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.rendering.raster.work_queue.atomics import fetch_add, peek, publish, relax
 from depthtrack.simd.vectors import kernel_part
+from depthtrack.types import Index
 
-Tickets = NDArray[np.int64]
+Tickets = Index
 
 # A cache line each: what one thread writes often must not slow another's reading.
 _NEXT, _LIMIT, _LEAVE, _DONE = 0, 8, 16, 24
