@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.types import Image, Mask
+from depthtrack.types import Depth, Image, Mask
 from depthtrack.viewing.theme import ESTIMATED_MASK, NO_READING
 
 LARGEST = 0.02
