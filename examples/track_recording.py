@@ -6,9 +6,9 @@ from contextlib import closing
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Segmenter
 from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.tracker import Status
 
 
 def main(path: str, tracker_name: str = "ik") -> int:

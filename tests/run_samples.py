@@ -13,6 +13,7 @@ from depthtrack.cli import main
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import RunRow, RunWriter
+from depthtrack.recording.status import Status
 
 STAGES = ("segment", "swarm")
 
@@ -56,5 +57,7 @@ def write_run(
             seen = said != "absent"
             energy, confidence = (2.0 + row, 0.9) if seen else (float("nan"), 0.0)
             time = float(sequence.timestamps[row])
-            run.append(RunRow(row, time, said, energy, confidence, pose if seen else None), {"segment": 4, "swarm": 16})
+            run.append(
+                RunRow(row, time, Status(said), energy, confidence, pose if seen else None), {"segment": 4, "swarm": 16}
+            )
     return folder

@@ -91,7 +91,7 @@ class Command:
             for row in track_sequence(sequence, segmenter, tracker, HandModel(hand), run, start_pose, count):
                 bar.update()
                 bar.set_postfix_str(row.status)
-        lost = sum(row.status in ("lost", "absent") for row in run.rows)
+        lost = sum(not row.status.is_trusted for row in run.rows)
         print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
         print(f"see how good they are:  depthtrack evaluate {self.out}")
         truth = sequence.ground_truth

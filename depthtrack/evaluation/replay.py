@@ -18,7 +18,7 @@ from depthtrack.rendering.hand_surface import ModelSurface
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.pipeline import roi_prior
 from depthtrack.tracking.state import TrackingThresholds, TrackState
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.tracker import Estimate
 
 _SAME_TIME = 1e-6
 _LONGEST_PATH = 1024
@@ -88,7 +88,7 @@ def estimate_of(run: Run, row: int) -> Estimate:
         pose if np.isfinite(pose).all() else None,
         float(run.energy[row]),
         float(run.confidence[row]),
-        Status(run.status[row]),
+        run.status[row],
         {stage: float(values[row]) for stage, values in run.stage_ms.items() if row < len(values)},
     )
 

@@ -6,6 +6,7 @@ from typing import Self
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
+from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
 
 
@@ -13,14 +14,17 @@ from depthtrack.types import Array, Index
 class JointTrack:
     """Poses and keypoints (T rows), NaN where no hand was observed.
 
-    `index` (T,) in the recording, `timestamps` (T,) seconds, `status` (T,) "tracked", "started", "lost" (a pose not to
-    be trusted) or "absent"; `energy`, `confidence` (T,); `poses` (T, 27); `keypoints` (T, 21, 3) metres in the camera
-    frame, MediaPipe's order.
+    `index` (T,): frame of the recording.
+    `timestamps` (T,): seconds.
+    `status` (T,): what became of each frame.
+    `energy`, `confidence` (T,): of the pose.
+    `poses` (T, 27): metres, quaternion and radians, camera frame.
+    `keypoints` (T, 21, 3): metres, camera frame, in MediaPipe's order.
     """
 
     index: Index
     timestamps: Array
-    status: tuple[str, ...]
+    status: tuple[Status, ...]
     energy: Array
     confidence: Array
     poses: Array

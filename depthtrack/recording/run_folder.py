@@ -20,13 +20,12 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_lines, read_text
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
+from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
 _LARGEST_TABLE = 1 << 29
 """Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
-STATUSES = ("tracked", "started", "lost", "absent")
-"""What may become of a frame."""
 _LARGEST = 100.0
 """Metres and radians that no pose reaches."""
 _LATEST = 1e12
@@ -40,7 +39,7 @@ class RunRow:
 
     index: int
     timestamp: float
-    status: str
+    status: Status
     energy: float
     confidence: float
     pose: Array | None
@@ -106,7 +105,7 @@ class Run:
     configuration: dict[str, Any]
     index: Index
     timestamps: Array
-    status: tuple[str, ...]
+    status: tuple[Status, ...]
     energy: Array
     confidence: Array
     poses: Array
@@ -156,7 +155,7 @@ def read_rows(folder: Path) -> list[RunRow]:
             numbers = np.array([float(x) for x in pose]) if any(pose) else None
             if not 0 <= int(index) < MAX_FRAMES:
                 raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
-            rows.append(RunRow(int(index), float(timestamp), status, float(energy), float(confidence), numbers))
+            rows.append(RunRow(int(index), float(timestamp), Status(status), float(energy), float(confidence), numbers))
         except (ValueError, IndexError) as error:
             raise InputError(
                 f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error!s:.120}"
@@ -168,8 +167,6 @@ def read_rows(folder: Path) -> list[RunRow]:
 
 def _why_no_row(row: RunRow) -> str | None:
     """What keeps a row from being one that a tracker writes."""
-    if row.status not in STATUSES:
-        return f"the status must be one of {', '.join(STATUSES)}, found '{row.status[:40]}'"
     if not abs(row.timestamp) < _LATEST:  # false for NaN
         return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
     if row.pose is None:

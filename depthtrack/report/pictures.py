@@ -13,6 +13,7 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.rendering.surface import Surface
 from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import TrackerSeries
@@ -70,10 +71,11 @@ class SideBySide:
 
     def _tile(self, k: int, frame: Frame) -> Image:
         panel, row = self._panels[k], self._panels[k].row_of.get(frame.index)
-        status = "not tracked" if row is None else panel.replay.run.status[row]
+        status = None if row is None else panel.replay.run.status[row]
+        note = "not tracked" if status is None else "" if status.is_trusted else status
         value = np.nan if row is None else panel.values[row]
         told = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
-        remark = "  ·  ".join(filter(None, (told, status if status not in ("tracked", "started") else "")))
+        remark = "  ·  ".join(filter(None, (told, note)))
         colour = tracker_colour(panel.shown.number).rgb
         close = AnnotatedFrame(frame).cropped(*self._windows[frame.index])
         image = paint(close, "colour", self._height, *self._range)
@@ -113,7 +115,7 @@ class SideBySide:
         for k, panel in enumerate(self._panels):
             run = panel.replay.run
             keypoints = HandModel(panel.replay.hand).keypoints(run.poses)
-            keypoints[[status == "lost" for status in run.status]] = np.nan
+            keypoints[[status is Status.LOST for status in run.status]] = np.nan
             places = np.array([place[int(index)] for index in run.index], dtype=np.intp)
             found[places, k] = np.where(untold[places, None, None], keypoints, found[places, k])
         out = np.full((len(self.indices), 21, 3), np.nan)

@@ -13,7 +13,7 @@ from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.wrist import WristPlane
-from depthtrack.tracking.tracker import ABSENT, Estimate, Status, Tracker
+from depthtrack.tracking.tracker import ABSENT, Estimate, Tracker
 from depthtrack.types import Array
 
 _REACH_MARGIN = 0.03
@@ -74,4 +74,4 @@ def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
 
 
 def _estimate(row: RunRow) -> Estimate:
-    return Estimate(row.pose, row.energy, row.confidence, Status(row.status))
+    return Estimate(row.pose, row.energy, row.confidence, row.status)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.recording.status import Status
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
 _MEDIAN_FRAMES, _RECENT_FRAMES = 30, 15

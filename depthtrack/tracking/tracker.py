@@ -2,26 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
-
-
-class Status(StrEnum):
-    """What became of a frame."""
-
-    TRACKED = "tracked"
-    """Followed from the frame before."""
-    STARTED = "started"
-    """Found by searching, or set by a given pose."""
-    LOST = "lost"
-    """The best pose found does not explain the observation; the tracker starts again on the next frame."""
-    ABSENT = "absent"
-    """No hand was observed."""
 
 
 @dataclass(frozen=True)

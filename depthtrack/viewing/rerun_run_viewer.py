@@ -62,7 +62,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
             values["error_mm"] = float(self._error[item.row])
         for name, value in values.items():
             self._log_or_clear(f"run/{name}", rr.Scalars(value) if np.isfinite(value) else None)
-        status = str(estimate.status.value)
+        status = estimate.status
         stream.log("run/status", rr.TextLog(f"frame {item.frame.index}: {status}", color=STATUS_COLOURS[status]))
 
     def _points(self, surface: Surface) -> Any:

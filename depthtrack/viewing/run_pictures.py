@@ -114,7 +114,7 @@ class RunPainter:
         told = "" if estimate.pose is None else f"energy {estimate.energy:.2f}  ·  confidence {estimate.confidence:.2f}"
         x = width - 4 - text_width(told, 15)
         put_text(bar, told, (x, 17), 15, FAINT_TEXT)
-        status = str(estimate.status.value)
+        status = estimate.status
         put_text(bar, status, (x - 16 - text_width(status, 17), 17), 17, STATUS_COLOURS[status])
         return bar
 
@@ -142,7 +142,7 @@ def hand_range(replay: Replay, room: float = 0.06) -> tuple[float, float]:
 
 
 def _trusted(replay: Replay) -> Mask:
-    return np.array([status in ("tracked", "started") for status in replay.run.status], dtype=np.bool_)
+    return np.array([status.is_trusted for status in replay.run.status], dtype=np.bool_)
 
 
 def _of_width(image: Image, width: int) -> Image:

@@ -27,7 +27,7 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
         if seen.row in rows:
             views = [painter.view(seen, layer) for layer in ("overlay", "residual")]
             small = [smaller(view, view.shape[1] // 2, height) for view in views]
-            status = str(seen.estimate.status.value)
+            status = seen.estimate.status
             told = f"{seen.frame.timestamp:.2f} s  ·  {status}"
             tiles.append(captioned(beside(small, gap=0), f"frame {seen.frame.index}", told, STATUS_COLOURS[status]))
         if seen.row >= last:
@@ -63,7 +63,7 @@ def _title(replay: Replay, width: int) -> Image:
     bar, run = blank(width, 34), replay.run
     name = f"{run.folder.resolve().name[:40]}: {str(run.configuration.get('tracker', 'track'))[:20]}"
     put_text(bar, name, (0, 17), 24)
-    lost = sum(status in ("lost", "absent") for status in run.status)
+    lost = sum(not status.is_trusted for status in run.status)
     told = f"{len(run.index)} frames of {replay.sequence.name[:40]}  ·  {lost} without a trusted pose"
     start = text_width(name, 24) + 18
     if start + text_width(told, 14) <= width:

@@ -1,5 +1,7 @@
 """The look of every picture: colours as RGB, chosen to read on a dark ground and to be told apart by most eyes."""
 
+from depthtrack.recording.status import Status
+
 Rgb = tuple[int, int, int]
 
 BACKGROUND: Rgb = (13, 17, 23)
@@ -27,10 +29,10 @@ FINGER_TRUTH: dict[str, Rgb] = dict.fromkeys(("palm", *FINGER_COLOURS), TRUE_MAS
 OUTLINE: Rgb = (10, 12, 18)
 """Dark rim around lines and joints, so that they show on bright images too."""
 
-STATUS_COLOURS: dict[str, Rgb] = {
-    "tracked": (74, 222, 128),
-    "started": (56, 189, 248),
-    "lost": (251, 113, 133),
-    "absent": FAINT_TEXT,
+STATUS_COLOURS: dict[Status, Rgb] = {
+    Status.TRACKED: (74, 222, 128),
+    Status.STARTED: (56, 189, 248),
+    Status.LOST: (251, 113, 133),
+    Status.ABSENT: FAINT_TEXT,
 }
 """What became of a frame of a run."""

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from depthtrack.recording.status import Status
 from depthtrack.types import Array, Image
 from depthtrack.viewing.panels import blank
 from depthtrack.viewing.text import put_text
@@ -16,17 +17,17 @@ _SUBPIXEL_BITS = 4
 class Timeline:
     """`image` (HEIGHT, width, 3), drawn once, is what all frames of a run share; `at` adds the cursor."""
 
-    def __init__(self, energy: Array, status: tuple[str, ...], width: int) -> None:
+    def __init__(self, energy: Array, status: tuple[Status, ...], width: int) -> None:
         """`energy` (T,), NaN where there is none, and `status` (T,) of a run."""
         self._width, self._count = width, len(energy)
         self.image = blank(width, HEIGHT, SURFACE)
         known = energy[np.isfinite(energy)]
         # A lost frame's energy must not flatten all others.
         self._top = float(max(1.2 * np.percentile(known, 98), 1e-6)) if len(known) else 1.0
-        for row, said in enumerate(status):
-            if said in ("lost", "absent"):
+        for row, found in enumerate(status):
+            if not found.is_trusted:
                 left, right = self._x(row - 0.5), self._x(row + 0.5)
-                colour = np.array(STATUS_COLOURS[said]) * 0.35 + np.array(SURFACE) * 0.65
+                colour = np.array(STATUS_COLOURS[found]) * 0.35 + np.array(SURFACE) * 0.65
                 self.image[_TOP:, left : max(right, left + 1)] = np.rint(colour)
         self._draw_curve(energy)
         put_text(self.image, f"energy, 0 to {self._top:.3g}", (8, _TOP // 2), 13, FAINT_TEXT)

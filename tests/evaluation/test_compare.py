@@ -25,7 +25,8 @@ from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
 from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.recording.run_folder import Run
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.recording.status import Status
+from depthtrack.tracking.tracker import Estimate
 from tests.evaluation.test_sweep import dask_scheduler, dask_workers
 
 FRAMES = 8

@@ -27,6 +27,7 @@ from depthtrack.evaluation.metrics.success import LIMIT_MM
 from depthtrack.hand.kinematics import ENDPOINT_NAMES, KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.status import Status
 
 MODEL = HandModel(HandShape())
 POSE = make_pose([0, 0, 0.5], [0, 1, 0, 0], np.full(20, 0.1))
@@ -131,7 +132,7 @@ def test_losses_and_the_time_to_recovery() -> None:
     begun = ["absent", "absent", "started", "tracked"]
     status = [*begun, "lost", "lost", "started", "tracked", "absent", "tracked", "lost"]
     times = np.arange(11) / 10
-    losses = find_losses(status, times)
+    losses = find_losses([Status(each) for each in status], times)
     assert losses.first_trusted == 2
     assert [(loss.first, loss.frames, loss.seen) for loss in losses.losses] == [
         (4, 2, True),
@@ -150,7 +151,7 @@ def test_losses_and_the_time_to_recovery() -> None:
 
 @pytest.mark.parametrize("status", [[], ["absent", "lost"], ["started", "tracked"]])
 def test_a_track_that_was_never_lost_or_never_began_has_no_losses(status: list[str]) -> None:
-    losses = find_losses(status, np.arange(len(status), dtype=np.float64))
+    losses = find_losses([Status(each) for each in status], np.arange(len(status), dtype=np.float64))
     assert losses.losses == ()
     assert losses.time_to_recovery().statistics()["mean"] is None
 

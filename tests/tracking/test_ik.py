@@ -10,12 +10,13 @@ from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
+from depthtrack.recording.status import Status
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stages.coarse_to_fine import DIRECT, CoarseToFine, SingleFrameFitter
 from depthtrack.tracking.state import TrackingThresholds
 from depthtrack.tracking.surfaces.registry import Model
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 from tests.synthetic_observations import observe
 

@@ -11,9 +11,10 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run, RunWriter
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.pipeline import track_sequence
-from depthtrack.tracking.tracker import ABSENT, Estimate, Status
+from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker, Variant
 from tests.synthetic_observations import observe
 

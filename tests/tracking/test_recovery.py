@@ -14,6 +14,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES, POSITION, rotation_matrix
 from depthtrack.hand.postures import POSTURES
+from depthtrack.recording.status import Status
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.solver.swarm import SwarmOptions
@@ -23,7 +24,6 @@ from depthtrack.tracking.proposals.local import finger_shift_proposals, local_pr
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, refine
 from depthtrack.tracking.state import TrackingThresholds, TrackState
-from depthtrack.tracking.tracker import Status
 from depthtrack.tracking.trackers.pso import PsoOptions
 from tests.synthetic_observations import observe
 

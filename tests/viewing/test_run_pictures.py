@@ -16,6 +16,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
+from depthtrack.recording.status import Status
 from depthtrack.types import Image
 from depthtrack.viewing.close_ups import close_ups
 from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale, residual_to_rgb
@@ -70,7 +71,7 @@ def test_pictures_of_all_frames_have_one_size_whatever_became_of_them(run: Path)
     assert painter.picture(replay.at(3)).shape == pictures[0].shape
     for seen in replay:
         assert {painter.view(seen, layer).shape for layer in (*LAYERS, "overlay")} == {(121, 161, 3)}
-        shows_status = is_colour(painter.picture(seen)[:34], STATUS_COLOURS[seen.estimate.status.value])
+        shows_status = is_colour(painter.picture(seen)[:34], STATUS_COLOURS[seen.estimate.status])
         assert shows_status.any()
 
 
@@ -137,13 +138,14 @@ def test_close_ups_follow_the_hand_in_windows_of_one_size() -> None:
 
 def test_the_timeline_marks_where_we_are_and_what_was_lost() -> None:
     energy = np.array([1.0, 2.0, np.nan, 2.0, 50.0, 1.0])
-    timeline = Timeline(energy, ("started", "tracked", "absent", "tracked", "lost", "tracked"), 600)
+    status = tuple(map(Status, ("started", "tracked", "absent", "tracked", "lost", "tracked")))
+    timeline = Timeline(energy, status, 600)
     marked = timeline.at(3)
     assert (marked[40:, 345:353] == TEXT).all(axis=-1).any(axis=1).all()
     assert np.array_equal(marked[:, :330], timeline.image[:, :330])
     red = timeline.image[-2].astype(int)
     assert red[450, 0] > red[150, 0] + 20  # the lost frame has its colour below the curve
-    assert Timeline(np.full(2, np.nan), ("absent", "absent"), 300).at(0).shape[1] == 300
+    assert Timeline(np.full(2, np.nan), (Status.ABSENT,) * 2, 300).at(0).shape[1] == 300
 
 
 # Films and pages
@@ -171,7 +173,7 @@ def test_a_film_that_fails_leaves_nothing(run: Path, out: Path) -> None:
 
 def test_a_page_shows_the_frames_asked_for(run: Path) -> None:
     page = run_sheet(opened(run), (1, 2, 4), height=96, columns=3)
-    for status in ("tracked", "absent", "lost"):
+    for status in (Status.TRACKED, Status.ABSENT, Status.LOST):
         assert is_colour(page, STATUS_COLOURS[status]).any()
     assert page.shape[1] > 3 * 2 * 128
 

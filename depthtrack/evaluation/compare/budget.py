@@ -12,6 +12,7 @@ import numpy as np
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Sequence as Recording
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Estimate
@@ -111,7 +112,7 @@ def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dic
             timed.restore([first])
             # The first frame after a recall also warms up caches; it counts for nothing.
             estimates = [timed.track(observation) for observation in following][1:]
-            spent += [sum(estimate.stage_ms.values()) for estimate in estimates if estimate.status == "tracked"]
+            spent += [sum(estimate.stage_ms.values()) for estimate in estimates if estimate.status is Status.TRACKED]
     return float(np.median(spent)) if spent else float("inf")
 
 
@@ -130,6 +131,6 @@ def _stretches(
             if len(seen) < 3:
                 continue
             start = finder.start(seen[0])
-            if start.status != "lost":
+            if start.status.is_trusted:
                 found.append((start, seen[1:]))
     return found

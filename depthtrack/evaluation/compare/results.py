@@ -14,6 +14,7 @@ from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.evaluation.metrics import Metric
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Workers
+from depthtrack.recording.status import Status
 from depthtrack.text_table import aligned
 from depthtrack.tracking.registry import TRACKERS, complete_options
 
@@ -100,7 +101,7 @@ def _tracker_time(evaluation: Evaluation) -> Metric:
     """Milliseconds of followed frames without segmentation: what a tracker's budget is about."""
     stages = [metric.values for stage, metric in evaluation.stage_ms.items() if stage != "segment"]
     total = np.sum(stages, axis=0) if stages else np.full(evaluation.frames, np.nan)
-    followed = np.array([status == "tracked" for status in evaluation.run.status], dtype=np.bool_)
+    followed = np.array([status is Status.TRACKED for status in evaluation.run.status], dtype=np.bool_)
     return Metric(TRACKER_MS, "ms", np.where(followed, total, np.nan))
 
 

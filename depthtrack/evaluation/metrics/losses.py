@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 
 from depthtrack.evaluation.metrics.metric import Metric
-from depthtrack.tracking.tracker import Status
+from depthtrack.recording.status import Status
 from depthtrack.types import Array, Mask
-
-_TRUSTED = (Status.TRACKED, Status.STARTED)
 
 
 @dataclass(frozen=True)
@@ -62,11 +60,11 @@ class Losses:
         }
 
 
-def find_losses(status: Sequence[str], timestamps: Array) -> Losses:
+def find_losses(status: Sequence[Status], timestamps: Array) -> Losses:
     """The losses of a run with a `status` (T,) at each of `timestamps` (T,), seconds."""
-    lost = np.array([s == Status.LOST for s in status], dtype=np.bool_)
-    absent = np.array([s == Status.ABSENT for s in status], dtype=np.bool_)
-    trusted = [row for row, s in enumerate(status) if s in _TRUSTED]
+    lost = np.array([s is Status.LOST for s in status], dtype=np.bool_)
+    absent = np.array([s is Status.ABSENT for s in status], dtype=np.bool_)
+    trusted = [row for row, s in enumerate(status) if s.is_trusted]
     ends = [*trusted[1:], None] if trusted else []
     losses = []
     for before, after in zip(trusted, ends, strict=True):

@@ -12,6 +12,7 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, POSITION, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
+from depthtrack.recording.status import Status
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
@@ -27,7 +28,7 @@ from depthtrack.tracking.stages.fit_search import SearchOptions, find_pose
 from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.surfaces.registry import Model, make_surface
 from depthtrack.tracking.timing import StageClock
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
 Variant = Literal["default", "paper"]

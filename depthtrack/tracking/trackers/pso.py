@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLES, POSITION, retract
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.status import Status
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.target import Target
@@ -25,7 +26,7 @@ from depthtrack.tracking.stages.swarm_search import Polish, SearchOptions, find_
 from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.tracking.timing import StageClock
-from depthtrack.tracking.tracker import Estimate, Status
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.visible_centroid import visible_centroid
 from depthtrack.types import Array
 
