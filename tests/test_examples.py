@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from depthtrack.hand.synergies import load_synergies
-from tests.run_samples import synthesise
+from tests.support.runs import synthesise
 
 FOLDER = Path(__file__).parent.parent / "examples"
 MOST_LINES = 40

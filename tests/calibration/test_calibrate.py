@@ -36,7 +36,7 @@ from depthtrack.solver.keypoints import KEYPOINT_BODIES
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.trackers.ik import IkTracker
 from depthtrack.viewing.calibration_picture import shown_views
-from tests.synthetic_observations import observe
+from tests.support.observations import observe
 
 
 def _rendered(pose: np.ndarray) -> Observation:

@@ -15,7 +15,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import read_configuration
 from depthtrack.segmentation.observation import Observation
-from tests.run_samples import synthesise
+from tests.support.runs import synthesise
 
 
 def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from depthtrack.viewing.annotated_frame import AnnotatedFrame, moments
 from depthtrack.viewing.rerun_viewer import RerunViewer
 from depthtrack.viewing.theme import ESTIMATED_MASK
 from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, WEBM_CODECS, VideoWriter
-from tests.recording_samples import CAMERA, TIMES, write_sample
+from tests.support.recordings import CAMERA, TIMES, write_sample
 
 needs_rerun = pytest.mark.skipif(find_spec("rerun") is None, reason="rerun-sdk is not installed (the extra 'view')")
 

@@ -27,7 +27,7 @@ from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.status import Status
 from depthtrack.tracking.tracker import Estimate
-from tests.evaluation.test_sweep import dask_scheduler, dask_workers
+from tests.support.dask import dask_scheduler, dask_workers
 
 FRAMES = 8
 QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"

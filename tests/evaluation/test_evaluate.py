@@ -17,7 +17,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.rendering.hand_surface import ModelSurface
-from tests.run_samples import synthesise, true_poses, write_run
+from tests.support.runs import synthesise, true_poses, write_run
 
 FRAMES = 6
 

@@ -11,7 +11,7 @@ from depthtrack.evaluation.predictions import evaluate_predictions
 from depthtrack.export.benchmark_joints import BENCHMARKS
 from depthtrack.export.uvd import write_uvd
 from depthtrack.recording import open_sequence
-from tests.run_samples import synthesise, true_poses, write_run
+from tests.support.runs import synthesise, true_poses, write_run
 
 MSRA = BENCHMARKS["msra"]
 TRUTH = np.random.default_rng(3).uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6], (4, 21, 3))

@@ -22,7 +22,7 @@ from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
-from tests.run_samples import synthesise, true_poses, write_run
+from tests.support.runs import synthesise, true_poses, write_run
 
 DOCUMENTATION = Path(__file__).parents[2] / "docs" / "joints.md"
 STATUS = {1: "absent", 3: "lost"}

@@ -8,15 +8,11 @@ from hypothesis import strategies as st
 from depthtrack.hand import compiled_kinematics
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import make_pose, retract, tangent_between
+from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.hand.shape import HandShape, Side
+from tests.support.hands import random_pose
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def random_pose(rng: np.random.Generator) -> np.ndarray:
-    return make_pose(rng.normal([0, 0, 0.5], 0.1), rng.normal(size=4), rng.uniform(LOWER, UPPER))
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -9,17 +9,9 @@ from depthtrack.hand.kinematics import BODY_COUNT, ENDPOINT_NAMES, KEYPOINT_NAME
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, make_pose, retract, rotation_matrix
 from depthtrack.hand.shape import HandShape, Side
+from tests.support.hands import random_pose_in_view
 
 SIDES: tuple[Side, Side] = ("right", "left")
-
-
-def random_pose(seed: int, *batch: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    return make_pose(
-        rng.uniform([-0.3, -0.3, 0.3], [0.3, 0.3, 0.9], (*batch, 3)),
-        rng.normal(size=(*batch, 4)),
-        rng.uniform(LOWER, UPPER, (*batch, 20)),
-    )
 
 
 def angles(**degrees: float) -> np.ndarray:
@@ -33,7 +25,7 @@ def angles(**degrees: float) -> np.ndarray:
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.5, 1.5))
 def test_jacobian_equals_finite_differences(side: Side, seed: int, scale: float) -> None:
     rng = np.random.default_rng(seed)
-    model, pose = HandModel(HandShape(side=side, scale=scale)), random_pose(seed)
+    model, pose = HandModel(HandShape(side=side, scale=scale)), random_pose_in_view(seed)
     bodies, local = rng.integers(0, BODY_COUNT, 12), rng.normal(scale=0.03, size=(12, 3))
     J = model.point_jacobian(pose, bodies, model.transform_points(pose, bodies, local))
     step = 1e-6
@@ -46,7 +38,7 @@ def test_jacobian_equals_finite_differences(side: Side, seed: int, scale: float)
 
 
 def test_batches_equal_single_poses() -> None:
-    model, poses = HandModel(HandShape()), random_pose(1, 2, 3)
+    model, poses = HandModel(HandShape()), random_pose_in_view(1, 2, 3)
     bodies = np.arange(BODY_COUNT)
     local = np.random.default_rng(0).normal(size=(BODY_COUNT, 3))
     points = model.transform_points(poses, bodies, local)
@@ -59,7 +51,7 @@ def test_batches_equal_single_poses() -> None:
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_left_hand_is_the_mirror_of_the_right(seed: int) -> None:
-    finger_angles = random_pose(seed)[ANGLES]
+    finger_angles = random_pose_in_view(seed)[ANGLES]
     identity = make_pose(np.zeros(3), [1, 0, 0, 0], finger_angles)
     right, left = (HandModel(HandShape(side=side)).keypoints(identity) for side in SIDES)
     np.testing.assert_allclose(left, right * [-1, 1, 1], atol=1e-15)
@@ -68,13 +60,13 @@ def test_left_hand_is_the_mirror_of_the_right(seed: int) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_bones_keep_their_length(seed: int) -> None:
     shape = HandShape(scale=1.1)
-    points = HandModel(shape).endpoints(random_pose(seed)).reshape(5, 4, 3)
+    points = HandModel(shape).endpoints(random_pose_in_view(seed)).reshape(5, 4, 3)
     np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=1), axis=-1), shape.lengths * 1.1, atol=1e-12)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
 def test_endpoints_and_joints_agree_with_the_transforms(seed: int) -> None:
-    model, pose = HandModel(HandShape()), random_pose(seed)
+    model, pose = HandModel(HandShape()), random_pose_in_view(seed)
     T, keypoints, joints = model.transforms(pose), model.keypoints(pose), model.joints(pose)
     np.testing.assert_allclose(
         T[:, :3, :3] @ np.swapaxes(T[:, :3, :3], -1, -2), np.tile(np.eye(3), (16, 1, 1)), atol=1e-12

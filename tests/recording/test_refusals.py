@@ -13,7 +13,7 @@ from depthtrack.errors import InputError
 from depthtrack.recording import ground_truth as truth
 from depthtrack.recording import open_sequence
 from depthtrack.recording.sequences import tum_lists as lists
-from tests.recording_samples import write_sample
+from tests.support.recordings import write_sample
 
 Change = Callable[[Path], object]
 

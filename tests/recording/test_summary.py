@@ -14,7 +14,7 @@ from depthtrack.cli.recording_options import PresetName, RecordingOptions
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.summary import field_of_view
-from tests.recording_samples import CAMERA, TIMES, depth_at, write_plain_tum, write_sample
+from tests.support.recordings import CAMERA, TIMES, depth_at, write_plain_tum, write_sample
 
 
 @pytest.fixture

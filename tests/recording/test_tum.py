@@ -15,7 +15,7 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording import GroundTruth, SequenceWriter, image_size, open_sequence
 from depthtrack.recording.sequences.tum_lists import associate
-from tests.recording_samples import CAMERA, TIMES, colour_at, depth_at, write_plain_tum, write_sample
+from tests.support.recordings import CAMERA, TIMES, colour_at, depth_at, write_plain_tum, write_sample
 
 TUM_CAMERA = Camera(CAMERA.width, CAMERA.height, 30.0, 30.0, 15.5, 11.5, 1 / 5000)
 milliseconds = st.lists(st.integers(0, 400), unique=True, max_size=40).map(sorted)

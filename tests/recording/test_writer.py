@@ -13,7 +13,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import SequenceWriter, open_sequence, writer
-from tests.recording_samples import (
+from tests.support.recordings import (
     CAMERA,
     TIMES,
     colour_at,

@@ -23,8 +23,8 @@ from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.opengl.sums import sum_tiles
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.target import Target
-from tests import opengl_views as views
-from tests.rendering.test_raster import KINECT, random_poses, random_shape, target_of, window_on
+from tests.support import opengl_views as views
+from tests.support.rendering import KINECT, random_poses, random_shape, target_of, window_on
 
 Run = Callable[..., Any]
 

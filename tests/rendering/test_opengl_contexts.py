@@ -14,18 +14,13 @@ import numpy as np
 import pytest
 
 from depthtrack.errors import InputError
-from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.opengl import context, opening, programs
 from depthtrack.rendering.opengl.context import OpenGLError
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.renderer import release_renderers, shared_renderer
 from depthtrack.rendering.opengl.scorer import OpenGLScorer
-from depthtrack.rendering.target import Target
-from tests.opengl_views import energies_and_depth
-from tests.rendering.test_raster import random_poses
-
-CAMERA = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
+from tests.support.opengl_views import energies_and_depth, scene
 
 
 @pytest.fixture(autouse=True)
@@ -34,12 +29,6 @@ def _egl() -> None:
         open_context("egl").close()
     except OpenGLError as error:
         pytest.skip(str(error))
-
-
-def scene(seed: int = 0) -> tuple[Target, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    depth = rng.uniform(0.3, 0.5, CAMERA.shape).astype(np.float32)
-    return Target(CAMERA, rng.random(CAMERA.shape) < 0.5, depth), random_poses(rng, 9, (0, 0, 0.4), 0.05)
 
 
 def resident_mb() -> float:
@@ -186,7 +175,7 @@ def test_a_forked_child_is_told_rather_than_left_to_hang() -> None:
 import os
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.opengl.scorer import OpenGLScorer
-from tests.rendering.test_opengl_contexts import scene
+from tests.support.opengl_views import scene
 scorer = OpenGLScorer(HandShape())
 target, poses = scene()
 scorer.set_target(target)

@@ -7,77 +7,12 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-
-OBJECTIVE = Objective()
-KINECT = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
-
-
-def random_shape(rng: np.random.Generator) -> HandShape:
-    default = HandShape()
-    return default.with_(
-        side="left" if rng.random() < 0.5 else "right",
-        scale=rng.uniform(0.7, 1.3),
-        lengths=default.lengths * rng.uniform(0.85, 1.15, (5, 3)),
-        radii=default.radii * rng.uniform(0.85, 1.15, (5, 4)),
-        palm_breadth=default.palm_breadth * rng.uniform(0.9, 1.1),
-        palm_thickness=default.palm_thickness * rng.uniform(0.8, 1.2),
-    )
-
-
-def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, float, float], spread: float) -> np.ndarray:
-    return make_pose(
-        np.asarray(centre) + rng.uniform(-spread, spread, (count, 3)),
-        rng.normal(size=(count, 4)),
-        rng.uniform(LOWER, UPPER, (count, 20)),
-    )
-
-
-def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
-    """An imperfect observation of a pose: holes in the depth, and skin labels that are wrong here and there."""
-    empty = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
-    oracle = OracleScorer(shape)
-    oracle.set_target(empty)
-    depth = oracle.render(pose)
-    skin = (depth > 0) ^ (rng.random(camera.shape) < 0.02)
-    return Target(camera, skin, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
-
-
-def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
-    """A square window of the Kinect's image, `side` pixels wide, centred on the hand."""
-    uv = KINECT.project(HandModel(shape).keypoints(pose)).mean(axis=0)
-    return KINECT.crop(int(uv[0]) - side // 2, int(uv[1]) - side // 2, side, side)
-
-
-def agree(shape: HandShape, target: Target, poses: np.ndarray, objective: Objective = OBJECTIVE) -> None:
-    """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3 but for pixels whose
-    match hangs on the last bit of a depth."""
-    fast, oracle = RasterScorer(shape, objective), OracleScorer(shape, objective)
-    fast.set_target(target)
-    oracle.set_target(target)
-    terms, expected = fast.terms(poses), oracle.terms(poses)
-    np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
-    np.testing.assert_allclose(fast.score(poses), terms.energy, rtol=1e-12)
-    for i, pose in enumerate(poses):
-        ours, theirs = fast.render(pose), oracle.render(pose)
-        drawn, truth = ours > 0, theirs > 0
-        assert np.count_nonzero(drawn != truth) <= 1e-3 * np.count_nonzero(truth)
-        assert np.abs(ours - theirs)[drawn & truth].max(initial=0) < 1e-4
-        # One pixel that changes sides moves the skin term by about 2 lambda over the union's size.
-        difference = np.abs(theirs - target.depth)
-        undecided = np.count_nonzero(truth & (np.abs(difference - objective.match_depth) < 5e-6))
-        undecided += np.count_nonzero(drawn != truth)
-        pixel = (2 * objective.skin_weight + objective.clamp_depth / objective.depth_unit) / (
-            1 + np.count_nonzero(target.skin | truth)
-        )
-        assert abs(terms.energy[i] - expected.energy[i]) < 1e-3 + undecided * pixel
+from tests.support.rendering import KINECT, assert_agrees, random_poses, random_shape, target_of, window_on
 
 
 @given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
@@ -86,7 +21,7 @@ def test_agrees_with_the_oracle_in_a_window_on_the_hand(seed: int, reduced: int 
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
-    agree(shape, target if reduced is None else target.reduced(reduced), poses)
+    assert_agrees(shape, target if reduced is None else target.reduced(reduced), poses)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -97,7 +32,7 @@ def test_agrees_with_the_oracle_through_any_camera(seed: int) -> None:
     focal = rng.uniform(0.5, 2) * max(width, height)
     camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *rng.uniform(-0.5, 1.5, 2) * [width, height])
     shape, poses = random_shape(rng), random_poses(rng, 4, (0, 0, rng.uniform(0.3, 2.5)), 0.2)
-    agree(shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
+    assert_agrees(shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -123,7 +58,7 @@ def test_agrees_with_the_oracle_where_views_are_absurd(
         fast = RasterScorer(shape)
         fast.set_target(target)
         assert not any(fast.render(pose).any() for pose in poses)
-    agree(shape, target, poses)
+    assert_agrees(shape, target, poses)
 
 
 def test_regions_beyond_the_image_observe_nothing_there() -> None:
@@ -134,7 +69,7 @@ def test_regions_beyond_the_image_observe_nothing_there() -> None:
     window = full.window(500, 380, 300, 300)
     assert not window.depth[100:].any()
     assert not window.skin[:, 140:].any()
-    agree(shape, window, poses)
+    assert_agrees(shape, window, poses)
 
 
 def test_the_best_pose_is_the_observed_one() -> None:
@@ -152,19 +87,6 @@ def test_the_best_pose_is_the_observed_one() -> None:
     assert terms.skin[4] == 0
 
 
-@pytest.mark.parametrize("threads", [2, 3])
-def test_the_same_bits_for_any_number_of_threads(threads: int) -> None:
-    rng = np.random.default_rng(11)
-    shape, poses = HandShape(), random_poses(rng, 301, (0, 0, 0.5), 0.1)
-    target = target_of(shape, poses[0], window_on(shape, poses[0], 96), rng)
-    with RasterScorer(shape) as one, RasterScorer(shape, threads=threads) as many:
-        one.set_target(target)
-        many.set_target(target)
-        np.testing.assert_array_equal(one.score(poses), many.score(poses))
-        np.testing.assert_array_equal(one.score(poses[:1]), many.score(poses[:1]))
-        assert one.score(poses[:0]).shape == (0,)
-
-
 def test_scores_do_not_depend_on_what_was_scored_before() -> None:
     """The buffer is left clean, whatever was drawn and however the region changes."""
     rng = np.random.default_rng(5)
@@ -177,15 +99,6 @@ def test_scores_do_not_depend_on_what_was_scored_before() -> None:
         used.set_target(target)
         fresh.set_target(target)
         np.testing.assert_array_equal([used.score(p[None])[0] for p in poses], fresh.score(poses))
-
-
-def test_many_scorers_leave_no_threads_behind() -> None:
-    import threading
-
-    before = threading.active_count()
-    for _ in range(50):
-        RasterScorer(HandShape(), threads=3).close()
-    assert threading.active_count() == before
 
 
 @pytest.mark.parametrize("poses", [np.zeros(27), np.zeros((2, 26)), np.full((1, 27), np.nan)])
@@ -204,7 +117,7 @@ def test_poses_of_the_wrong_form_are_refused(poses: np.ndarray) -> None:
 
 
 def test_scoring_before_observing_is_an_error() -> None:
-    with pytest.raises(RuntimeError, match="observe"):
+    with pytest.raises(RuntimeError, match="set_target"):
         RasterScorer(HandShape()).score(np.zeros((1, 27)))
 
 
@@ -235,4 +148,4 @@ def test_a_hand_that_nobody_sees_scores_the_same_everywhere() -> None:
     camera = KINECT.resized(0.1)
     nothing = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
     pose = random_poses(np.random.default_rng(0), 1, (0, 0, -1), 0)
-    agree(HandShape(), nothing, pose)
+    assert_agrees(HandShape(), nothing, pose)

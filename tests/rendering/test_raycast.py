@@ -13,7 +13,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.surface import NEAR
 from depthtrack.rendering.triangles import rasterise
-from tests.hand.test_kinematics import random_pose
+from tests.support.hands import random_pose_in_view
 
 CAMERA = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
 
@@ -78,7 +78,7 @@ def test_cone_hits_lie_on_the_cone(seed: int) -> None:
 def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: int, scale: float) -> None:
     """Finely tessellated primitives in our z-buffer come within the tessellation's error of the exact surface."""
     shape = HandShape(scale=scale)
-    primitives, pose = Primitives.of(shape), random_pose(seed)
+    primitives, pose = Primitives.of(shape), random_pose_in_view(seed)
     pose[:3] = [0, 0, 0.3]
     T = primitives.placed(HandModel(shape).transforms(pose))
     exact = raycast(CAMERA, primitives.kinds, T, primitives.bodies)
@@ -101,7 +101,10 @@ def test_normals_are_unit_and_face_the_camera() -> None:
     shape = HandShape()
     primitives = Primitives.of(shape)
     surface = raycast(
-        CAMERA, primitives.kinds, primitives.placed(HandModel(shape).transforms(random_pose(3))), primitives.bodies
+        CAMERA,
+        primitives.kinds,
+        primitives.placed(HandModel(shape).transforms(random_pose_in_view(3))),
+        primitives.bodies,
     )
     seen = surface.depth > 0
     np.testing.assert_allclose(np.linalg.norm(surface.normal[seen], axis=-1), 1, atol=1e-9)
@@ -111,7 +114,7 @@ def test_normals_are_unit_and_face_the_camera() -> None:
 
 @pytest.mark.parametrize("z", [-0.5, 0.0, 0.01])
 def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
-    shape, pose = HandShape(), random_pose(5)
+    shape, pose = HandShape(), random_pose_in_view(5)
     pose[:3] = [0, 0, z]
     primitives = Primitives.of(shape)
     depth = raycast(

@@ -9,7 +9,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster.tiles import BLOCK, new_stripes, read_stripes, stripe_counts, write_stripes
-from tests.rendering.test_raster import KINECT, agree, random_poses, random_shape, target_of
+from tests.support.rendering import KINECT, assert_agrees, random_poses, random_shape, target_of
 
 
 @given(height=st.integers(1, 70), width=st.integers(1, 70), seed=st.integers(0, 99))
@@ -39,7 +39,7 @@ def test_large_hands_lose_no_block(seed: int) -> None:
     """A hand that fills the image: all its parts are large, at every angle."""
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 2, (0, 0, rng.uniform(0.2, 0.4)), 0.03)
-    agree(shape, target_of(shape, poses[0], KINECT, rng), poses)
+    assert_agrees(shape, target_of(shape, poses[0], KINECT, rng), poses)
 
 
 @pytest.mark.parametrize("scale", [0.7, 1.3])

@@ -14,7 +14,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.raster.work_queue.queue import done, is_done, new_tickets, pop, submit, tell_to_leave
 from depthtrack.rendering.raster.work_queue.worker import Helper
-from tests.rendering.test_raster import random_poses, target_of, window_on
+from tests.support.rendering import random_poses, target_of, window_on
 
 
 @numba.njit(nogil=True)

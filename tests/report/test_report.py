@@ -21,7 +21,7 @@ from depthtrack.report.narrative import standings, verdict
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.provenance import bias_warning, matched_model
 from depthtrack.report.series import TrackerSeries, over_time, shares, top_of_scale, worst_frames
-from tests.run_samples import synthesise, true_poses, write_run
+from tests.support.runs import synthesise, true_poses, write_run
 
 FRAMES = 8
 

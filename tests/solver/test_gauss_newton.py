@@ -22,7 +22,7 @@ from depthtrack.solver.normal_equations import NormalEquations
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.residuals import Residual, add_correspondences, weight
 from depthtrack.solver.subspace import FULL, PostureSubspace
-from tests.hand.test_compiled_kinematics import random_pose
+from tests.support.hands import random_pose
 
 SEEDS = st.integers(0, 2**32 - 1)
 RESIDUALS = st.sampled_from(["point", "plane", "symmetric"])

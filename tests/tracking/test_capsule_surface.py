@@ -13,7 +13,7 @@ from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces import capsules
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, distance, fitted_capsules
 from depthtrack.tracking.surfaces.capsules import Distances, Placed, View
-from tests.hand.test_compiled_kinematics import random_pose
+from tests.support.hands import random_pose
 
 SHAPE = HandShape()
 FITTED = fitted_capsules(SHAPE)

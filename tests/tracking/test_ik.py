@@ -18,7 +18,7 @@ from depthtrack.tracking.state import TrackingThresholds
 from depthtrack.tracking.surfaces.registry import Model
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
-from tests.synthetic_observations import observe
+from tests.support.observations import observe
 
 MADE = Synthesiser(Synthesis(model="skin"))
 MODEL = HandModel(MADE.options.hand)

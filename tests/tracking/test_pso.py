@@ -16,7 +16,7 @@ from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.pipeline import track_sequence
 from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker, Variant
-from tests.synthetic_observations import observe
+from tests.support.observations import observe
 
 MADE = Synthesiser(Synthesis())
 MODEL = HandModel(MADE.options.hand)

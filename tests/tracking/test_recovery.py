@@ -25,7 +25,7 @@ from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, refine
 from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.trackers.pso import PsoOptions
-from tests.synthetic_observations import observe
+from tests.support.observations import observe
 
 MADE = Synthesiser(Synthesis(model="skin"))
 MODEL = HandModel(MADE.options.hand)

@@ -14,7 +14,7 @@ from depthtrack.solver import closest_points as closest
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces import skin as mesh
 from depthtrack.tracking.surfaces.skin import Cells, MeshModel, Posed, Seen
-from tests.hand.test_compiled_kinematics import random_pose
+from tests.support.hands import random_pose
 
 SHAPE = HandShape()
 SKIN = Skin.of(SHAPE)

@@ -11,7 +11,7 @@ from depthtrack.viewing.depth_colours import colour_scale, depth_range, depth_to
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FINGER_COLOURS, NO_READING, TRUE_MASK
-from tests.viewing_samples import CAMERA, GREY, open_hand
+from tests.support.viewing import CAMERA, GREY, open_hand
 
 
 def lightness(image: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -19,8 +19,8 @@ from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.panels import paint, panel, tile_grid, useful_layers
 from depthtrack.viewing.strip import strip
 from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, TRUE_MASK
-from tests.recording_samples import TIMES, joints_at, mask_at, write_sample
-from tests.viewing_samples import CAMERA, GREY, open_hand
+from tests.support.recordings import TIMES, joints_at, mask_at, write_sample
+from tests.support.viewing import CAMERA, GREY, open_hand
 
 
 def moment(depth: float = 0.5, colour: int | None = 100, index: int = 0) -> AnnotatedFrame:

@@ -25,7 +25,7 @@ from depthtrack.viewing.run_pictures import LAYERS, RunPainter
 from depthtrack.viewing.run_sheet import run_sheet
 from depthtrack.viewing.theme import NO_READING, STATUS_COLOURS, TEXT
 from depthtrack.viewing.timeline import Timeline
-from tests.run_samples import synthesise, true_poses, write_run
+from tests.support.runs import synthesise, true_poses, write_run
 
 FRAMES = 6
 STATUS = {2: "absent", 4: "lost"}

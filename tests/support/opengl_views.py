@@ -9,9 +9,10 @@ from depthtrack.rendering.opengl.context import Platform
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
-from tests.rendering.test_raster import KINECT, random_poses, random_shape, target_of, window_on
+from tests.support.rendering import KINECT, random_poses, random_shape, target_of, window_on
 
 OBJECTIVE = Objective()
+SMALL = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
 BOTH_SUMS: tuple[Sums, Sums] = ("cpu", "gpu")
 ABSURD = {
     "behind": ((0.0, 0.0, -0.6), 0.05),
@@ -23,7 +24,9 @@ ABSURD = {
 }
 
 
-def agree(platform: Platform, shape: HandShape, target: Target, poses: np.ndarray, objective: Objective) -> None:
+def assert_agrees(
+    platform: Platform, shape: HandShape, target: Target, poses: np.ndarray, objective: Objective
+) -> None:
     """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3, by either way to sum.
 
     The energies are compared where no match hangs on the last bits of a depth: such readings are taken out first.
@@ -55,7 +58,7 @@ def window(platform: Platform, seed: int, reduced: int | None) -> None:
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
-    agree(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
+    assert_agrees(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
 
 
 def any_camera(platform: Platform, seed: int) -> None:
@@ -65,7 +68,7 @@ def any_camera(platform: Platform, seed: int) -> None:
     focal = rng.uniform(0.5, 2) * max(width, height)
     camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *rng.uniform(-0.5, 1.5, 2) * [width, height])
     shape, poses = random_shape(rng), random_poses(rng, 4, (0, 0, rng.uniform(0.1, 2.5)), 0.2)
-    agree(platform, shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
+    assert_agrees(platform, shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
 
 
 def absurd(platform: Platform, name: str, seed: int) -> None:
@@ -74,7 +77,7 @@ def absurd(platform: Platform, name: str, seed: int) -> None:
     camera = KINECT.resized(0.25)
     shape, poses = random_shape(rng), random_poses(rng, 6, centre, spread)
     target = target_of(shape, random_poses(rng, 1, (0, 0, 0.4), 0)[0], camera, rng)
-    agree(platform, shape, target, poses, OBJECTIVE)
+    assert_agrees(platform, shape, target, poses, OBJECTIVE)
     if name in ("behind", "outside"):
         with OpenGLScorer(shape, platform=platform) as scorer:
             scorer.set_target(target)
@@ -87,7 +90,7 @@ def overhanging(platform: Platform) -> None:
     shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
     full = target_of(shape, poses[0], KINECT.resized(0.5), rng)
     for left, top, width, height in ((250, 190, 150, 150), (-40, -30, 400, 300), (-200, -200, 64, 64)):
-        agree(platform, shape, full.window(left, top, width, height), poses, OBJECTIVE)
+        assert_agrees(platform, shape, full.window(left, top, width, height), poses, OBJECTIVE)
 
 
 def energies_and_depth(platform: Platform, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -98,3 +101,10 @@ def energies_and_depth(platform: Platform, seed: int) -> tuple[np.ndarray, np.nd
     with OpenGLScorer(shape, platform=platform) as scorer:
         scorer.set_target(target)
         return scorer.score(poses), scorer.render(poses[1])
+
+
+def scene(seed: int = 0) -> tuple[Target, np.ndarray]:
+    """Return noise as an observation, and poses (9, 27) to score against it."""
+    rng = np.random.default_rng(seed)
+    depth = rng.uniform(0.3, 0.5, SMALL.shape).astype(np.float32)
+    return Target(SMALL, rng.random(SMALL.shape) < 0.5, depth), random_poses(rng, 9, (0, 0, 0.4), 0.05)

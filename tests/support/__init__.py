@@ -1,0 +1,1 @@
+"""Samples and comparisons that several test modules share."""
