@@ -13,7 +13,6 @@ from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.spans import find_spans
 from depthtrack.rendering.raster.tiles import BLOCK, COLUMNS, ROWS
-from depthtrack.rendering.raster.work_queue.queue import done, pop
 from depthtrack.rendering.surface import NEAR
 from depthtrack.simd.functions import (
     estimated_reciprocal,
@@ -143,9 +142,8 @@ def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth
 @numba.njit(cache=True, nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
-    tickets: Index,
-    thread: int,
-    spin_limit: int,
+    start: int,
+    stop: int,
     hand: Array,
     camera: Array,
     observed: Array32,
@@ -162,25 +160,22 @@ def score_poses(
     sums: Array,
     energies: Array,
 ) -> None:
-    """Score the poses that `tickets` are for, together with other threads; see `tickets.pop` for when this returns.
+    """Score poses `start` to `stop` of a batch.
 
-    `poses` (B, 27); `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes; `empty` the sums of
-    Eq. (2) for an empty image; `objective`: d_m, d_M, unit, epsilon, lambda, lambda_k. Writes `sums` (B, 3) and
-    `energies` (B,). A thread's own: `scratch`, `table`, `buffer` (stripes, all 0) and, a stripe each and one more,
-    `first` and `last`; a stripe each, `low` (all large) and `high` (all -1).
+    `poses` (B, 27) camera frame; `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes.
+    `empty` (3,): the sums of Eq. (2) for an empty image. `objective` (6,): d_m, d_M, unit, epsilon, lambda, lambda_k.
+    Writes `sums` (B, 3) and `energies` (B,). Other calls may score other poses of the same batch at the same time,
+    if each has arrays of its own for the rest: `scratch`, `table`, `buffer` (stripes, all 0), `first` and `last` (one
+    element a stripe and one more), `low` (one a stripe, all large) and `high` (one a stripe, all -1).
     """
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
-    while True:
-        n = pop(tickets, thread, spin_limit)
-        if n < 0:
-            break
+    for n in range(start, stop):
         blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
         clamped, on_skin, matched = _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth)
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_skin
         sums[n, 2] = empty[2] + matched - on_skin
         energies[n] = _energy(poses[n], sums[n], objective)
-        done(tickets, thread)
 
 
 @kernel_part

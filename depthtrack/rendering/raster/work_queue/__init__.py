@@ -1,1 +1,0 @@
-"""A lock-free work queue that spreads a batch of hypotheses over threads."""
