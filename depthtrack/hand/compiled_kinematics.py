@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from depthtrack.geometry.rotations import compiled_exp, compiled_matrix, compiled_normalised, compiled_product
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
@@ -53,7 +54,7 @@ class BodyPoses(NamedTuple):
 def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
     """Move the bodies to `pose` (27,): Eq. (1) of Schroeder et al. 2014."""
     T, axes, origins = bodies.T, bodies.axes, bodies.origins
-    _rotation(pose[3], pose[4], pose[5], pose[6], T[0])
+    compiled_matrix(pose[3], pose[4], pose[5], pose[6], T[0])
     for i in range(3):
         T[0, i, 3] = pose[i]
     base, lengths = chain.base, chain.lengths
@@ -91,28 +92,21 @@ def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _rotation(w: float, x: float, y: float, z: float, out: Array) -> None:
-    s = 2.0 / (w * w + x * x + y * y + z * z)
-    out[0, 0], out[0, 1], out[0, 2] = 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-    out[1, 0], out[1, 1], out[1, 2] = s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)
-    out[2, 0], out[2, 1], out[2, 2] = s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)
+def retract(pose: Array, tangent: Array, out: Array) -> None:
+    """Write the pose reached from `pose` (27,) by a tangent step (26,) to `out` (27,); see `pose.retract`."""
+    retract_unnormalised(pose, tangent, out)
+    out[3], out[4], out[5], out[6] = compiled_normalised(out[3], out[4], out[5], out[6])
 
 
 @numba.njit(cache=True, nogil=True)
-def retract(pose: Array, tangent: Array, out: Array) -> None:
-    """`pose.retract`: the pose (27,) reached by a tangent step (26,), written to `out` (27,)."""
+def retract_unnormalised(pose: Array, tangent: Array, out: Array) -> None:
+    """Write the retraction to `out` (27,), its quaternion unit only to rounding, and of either sign.
+
+    That is enough for a single step, as forward kinematics accepts a quaternion of any length.
+    """
     for i in range(3):
         out[i] = pose[i] + tangent[i]
-    x, y, z = tangent[3], tangent[4], tangent[5]
-    angle = math.sqrt(x * x + y * y + z * z)
-    sinc = math.sin(angle / 2) / angle if angle > 1e-9 else 0.5
-    w, x, y, z = math.cos(angle / 2), sinc * x, sinc * y, sinc * z
-    qw, qx, qy, qz = pose[3], pose[4], pose[5], pose[6]
-    rw = w * qw - x * qx - y * qy - z * qz
-    rx = w * qx + x * qw + y * qz - z * qy
-    ry = w * qy - x * qz + y * qw + z * qx
-    rz = w * qz + x * qy - y * qx + z * qw
-    scale = (1.0 if rw >= 0 else -1.0) / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)
-    out[3], out[4], out[5], out[6] = rw * scale, rx * scale, ry * scale, rz * scale
+    w, x, y, z = compiled_exp(tangent[3], tangent[4], tangent[5])
+    out[3], out[4], out[5], out[6] = compiled_product(w, x, y, z, pose[3], pose[4], pose[5], pose[6])
     for i in range(20):
         out[7 + i] = pose[7 + i] + tangent[6 + i]

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from depthtrack.hand.pose import ANGLES, FINGERS, ORIENTATION, POSITION, TANGENT_SIZE, rotation_matrix
+from depthtrack.geometry.rotations import rotation_matrix
+from depthtrack.hand.pose import ANGLES, FINGERS, ORIENTATION, POSITION, TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array, Mask
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
+from depthtrack.geometry.rotations import quaternion_from_matrix, rotation_matrix
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics
-from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose, quaternion_from_matrix, rotation_matrix
+from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud, Surface

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.geometry.alignment import rigid_alignment
+from depthtrack.geometry.rotations import quaternion_from_matrix
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel, body_of
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
-from depthtrack.hand.pose import ANGLES, POSE_SIZE, TANGENT_SIZE, make_pose, quaternion_from_matrix, retract
+from depthtrack.hand.pose import ANGLES, POSE_SIZE, TANGENT_SIZE, make_pose, retract
 from depthtrack.hand.postures import POSTURES
 from depthtrack.types import Array, Mask
 

@@ -5,6 +5,7 @@ from typing import Protocol
 import numba
 import numpy as np
 
+from depthtrack.hand.compiled_kinematics import retract_unnormalised
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, tangent_between
 from depthtrack.types import Array
@@ -77,22 +78,6 @@ class TangentSpace:
 
 @numba.njit(cache=True)
 def retract_batch(reference: Array, steps: Array, poses: Array) -> None:
-    """`pose.retract` of one reference (27,) by steps (N, 26), into poses (N, 27)."""
-    w, x, y, z = reference[3], reference[4], reference[5], reference[6]
+    """Write the poses (N, 27) reached from `reference` (27,) by steps (N, 26) to `poses`."""
     for n in range(steps.shape[0]):
-        a, b, c = steps[n, 3], steps[n, 4], steps[n, 5]
-        angle = np.sqrt(a * a + b * b + c * c)
-        # sin(angle / 2) / angle, which tends to 1/2.
-        k = np.sin(angle / 2) / angle if angle > 1e-9 else 0.5
-        r, a, b, c = np.cos(angle / 2), k * a, k * b, k * c
-        poses[n, 0], poses[n, 1], poses[n, 2] = (
-            reference[0] + steps[n, 0],
-            reference[1] + steps[n, 1],
-            reference[2] + steps[n, 2],
-        )
-        poses[n, 3] = r * w - a * x - b * y - c * z
-        poses[n, 4] = r * x + a * w + b * z - c * y
-        poses[n, 5] = r * y - a * z + b * w + c * x
-        poses[n, 6] = r * z + a * y - b * x + c * w
-        for d in range(20):
-            poses[n, 7 + d] = reference[7 + d] + steps[n, 6 + d]
+        retract_unnormalised(reference, steps[n], poses[n])

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import ORIENTATION, POSITION, make_pose, quaternion_from_matrix, quaternion_product
+from depthtrack.geometry.rotations import quaternion_from_matrix, quaternion_product
+from depthtrack.hand.pose import ORIENTATION, POSITION, make_pose
 from depthtrack.types import Array
 
 # Degrees away from the front, and which way: 0 to the right of the scene, 90 above it. Frontal, four oblique, three

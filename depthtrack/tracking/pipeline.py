@@ -6,8 +6,9 @@ from itertools import islice
 
 import numpy as np
 
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, POSITION, rotation_matrix
+from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.recording.run_folder import RunRow, RunWriter
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.pose import make_pose, quaternion_exp, quaternion_product
+from depthtrack.geometry.rotations import quaternion_exp, quaternion_product
+from depthtrack.hand.pose import make_pose
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.types import Array, Image

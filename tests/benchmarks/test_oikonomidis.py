@@ -27,7 +27,8 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import InThisProcess
-from depthtrack.hand.pose import make_pose, quaternion_exp
+from depthtrack.geometry.rotations import quaternion_exp
+from depthtrack.hand.pose import make_pose
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis import observations as films

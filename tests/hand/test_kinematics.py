@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import BODY_COUNT, ENDPOINT_NAMES, KEYPOINT_NAMES, MOVES, HandModel, body_of
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
-from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, make_pose, retract, rotation_matrix
+from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, make_pose, retract
 from depthtrack.hand.shape import HandShape, Side
 from tests.support.hands import random_pose_in_view
 

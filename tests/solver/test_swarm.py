@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import make_pose, normalised, retract, tangent_between
+from depthtrack.hand.pose import make_pose, retract, tangent_between
 from depthtrack.solver.swarm import SwarmOptions, advance, constriction, minimise, randomise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid

@@ -11,8 +11,9 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.errors import InputError
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, rotation_matrix
+from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import PRESETS
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import ANGLES, make_pose, rotation_matrix, tangent_between
+from depthtrack.hand.pose import ANGLES, make_pose, tangent_between
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from depthtrack.evaluation.metrics import endpoint_error
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import ANGLES, POSITION, rotation_matrix
+from depthtrack.hand.pose import ANGLES, POSITION
 from depthtrack.hand.postures import POSTURES
 from depthtrack.recording.status import Status
 from depthtrack.rendering.raster import RasterScorer

@@ -12,8 +12,9 @@ from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, Expe
 from depthtrack.benchmarks.papers.plot import mark
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, rotation_matrix
+from depthtrack.hand.pose import ORIENTATION
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker

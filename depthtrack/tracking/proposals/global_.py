@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from depthtrack.geometry.rotations import quaternion_log, quaternion_product
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ORIENTATION, make_pose, quaternion_log, quaternion_product
+from depthtrack.hand.pose import ORIENTATION, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.types import Array
 

@@ -7,18 +7,10 @@ one, or for the next, stays so for many frames. What other postures would look l
 import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
+from depthtrack.geometry.rotations import quaternion_exp, quaternion_from_matrix, quaternion_product, rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
-from depthtrack.hand.pose import (
-    ANGLES,
-    ORIENTATION,
-    POSITION,
-    make_pose,
-    quaternion_exp,
-    quaternion_from_matrix,
-    quaternion_product,
-    rotation_matrix,
-)
+from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.types import Array

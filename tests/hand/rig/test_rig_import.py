@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from depthtrack.errors import InputError
+from depthtrack.geometry.rotations import quaternion_from_matrix
 from depthtrack.hand.kinematics import JOINT_NAMES, HandModel, body_of
-from depthtrack.hand.pose import FINGERS, make_pose, quaternion_from_matrix
+from depthtrack.hand.pose import FINGERS, make_pose
 from depthtrack.hand.rig.rig_joints import finger_joints, finger_of, side_of
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
