@@ -1,33 +1,151 @@
-"""Text files from anywhere: regular files of bounded size, so that no absurd one fills the memory."""
+"""Read files of bounded size and write files that are complete or absent."""
 
-from collections.abc import Iterator
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn, TypeVar
 
 from depthtrack.errors import InputError
 
+Built = TypeVar("Built")
 
-def read_text(path: Path, largest: int = 1 << 20) -> str:
-    """All of a UTF-8 file of at most `largest` bytes. Raises InputError."""
-    return "".join(read_lines(path, largest))
-
-
-def read_lines(path: Path, largest: int) -> Iterator[str]:
-    """Lines of a UTF-8 file of at most `largest` bytes, one at a time. Raises InputError."""
-    check_size(path, largest)
-    try:
-        # The mark that some spreadsheets put before UTF-8 is no part of the text.
-        with path.open(encoding="utf-8-sig") as file:
-            yield from file
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} must be a text file, found bytes that are not UTF-8") from error
+_LINE_WIDTH = 160
+"""Columns within which `compact_json` keeps an object or a list on one line."""
 
 
 def check_size(path: Path, largest: int) -> None:
-    """Raise InputError unless `path` is a regular file of at most `largest` bytes."""
+    """Raise InputError if `path` is not a regular file of at most `largest` bytes."""
     if not path.is_file():
         raise InputError(f"{path} is missing or no regular file")
     size = path.stat().st_size
     if size > largest:
         raise InputError(f"{path} must be at most {largest:,} bytes long, found {size:,}")
+
+
+def read_bounded(path: Path, largest: int) -> bytes:
+    """Return the bytes of a regular file.
+
+    Raises: InputError if the file is missing, unreadable, or longer than `largest` bytes.
+    """
+    check_size(path, largest)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {_reason(error)}") from error
+
+
+def read_text(path: Path, largest: int = 1 << 20) -> str:
+    """Return the text of a UTF-8 file.
+
+    Raises: InputError if the file is missing, unreadable, not UTF-8, or longer than `largest` bytes.
+    """
+    return "".join(read_lines(path, largest))
+
+
+def read_lines(path: Path, largest: int) -> Iterator[str]:
+    """Yield the lines of a UTF-8 file.
+
+    Raises: InputError if the file is missing, unreadable, not UTF-8, or longer than `largest` bytes.
+    """
+    check_size(path, largest)
+    try:
+        # Some spreadsheets write a byte order mark, which is no part of the text.
+        with path.open(encoding="utf-8-sig") as file:
+            yield from file
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {_reason(error)}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} must be a text file, found bytes that are not UTF-8") from error
+
+
+def read_json(
+    path: Path, what: str, build: Callable[[Any], Built], largest: int = 1 << 20, made_by: str | None = None
+) -> Built:
+    """Return `build` of the parsed contents of a JSON file.
+
+    `what` names the contents in errors ("the hand file"). `made_by` is a command that writes such a file.
+    Raises: InputError if the file cannot be read, is not strict JSON, or `build` rejects it by an InputError, KeyError,
+    TypeError, ValueError, AttributeError, IndexError or OverflowError.
+    """
+    try:
+        text = read_text(path, largest)
+    except InputError as error:
+        raise InputError(f"cannot read {what}: {error}") from error
+    hint = "" if made_by is None else f" (`{made_by}` writes such a file)"
+    try:
+        return build(json.loads(text, parse_constant=_reject_constant))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except KeyError as error:
+        raise InputError(f"{path}: the entry {error} is missing{hint}") from error
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
+        raise InputError(f"cannot read {what} {path}: {error}{hint}") from error
+
+
+def compact_json(value: Any) -> str:
+    """Return strict JSON text in which every object and list that fits is on one line.
+
+    Raises: ValueError if a number is not finite.
+    """
+    return _compact(value, indent=0, used=0) + "\n"
+
+
+@contextmanager
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield a temporary path with the same suffix that replaces `path` if the block succeeds.
+
+    The temporary file is removed if the block fails. If the block writes no file, `path` stays as it was.
+    Raises: InputError if the folder does not exist or the file cannot be written.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: the folder {path.parent} does not exist: create it first")
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        if temporary.exists():
+            os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {_reason(error)}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_atomic(path: Path, content: str | bytes) -> None:
+    """Write a file that is complete or absent; text is written as UTF-8 without newline translation.
+
+    Raises: InputError if the folder does not exist or the file cannot be written.
+    """
+    with replace_atomically(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
+
+
+def _reject_constant(name: str) -> NoReturn:
+    raise ValueError(f"JSON has no {name}")
+
+
+def _compact(value: Any, indent: int, used: int) -> str:
+    """Return the text of a value that begins `used` columns from the left, its lines indented by `indent`."""
+    line = json.dumps(value, allow_nan=False)
+    nested = isinstance(value, dict | list) and bool(value)
+    if not nested or (indent > 0 and used + len(line) <= _LINE_WIDTH and not _holds_objects(value)):
+        return line
+    inner = " " * (indent + 2)
+    if isinstance(value, dict):
+        keys = [f"{inner}{json.dumps(str(key))}: " for key in value]
+        items = value.values()
+    else:
+        keys, items = [inner] * len(value), value
+    entries = [key + _compact(item, indent + 2, len(key)) for key, item in zip(keys, items, strict=True)]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return f"{opening}\n" + ",\n".join(entries) + f"\n{' ' * indent}{closing}"
+
+
+def _holds_objects(value: Any) -> bool:
+    items = value.values() if isinstance(value, dict) else value
+    return any(isinstance(item, dict) for item in items)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.hand.pose import ANGLES
-from depthtrack.hand.synergies import Synergies
+from depthtrack.hand.synergies import Synergies, save_synergies
 from depthtrack.posture_databases.registry import read_postures
 from depthtrack.synthesis.motion import load_motion
 
@@ -28,7 +28,7 @@ def main(postures: str | None = None, out: str | None = None) -> Synergies:
             f"{count} components: {few.variance_share(count):6.1%} of the variance, {error:4.1f} degrees off on average"
         )
     if out is not None:
-        Path(out).write_text(synergies.to_json(), encoding="utf-8")
+        save_synergies(synergies, Path(out))
     return synergies
 
 

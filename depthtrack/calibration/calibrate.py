@@ -15,6 +15,7 @@ from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.errors import InputError
+from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
@@ -91,13 +92,12 @@ class Calibration:
         return self.side_margin is None or self.side_margin >= _SURE_MARGIN
 
     def to_json(self) -> str:
-        """`hand.json` with what is known of each size beside it."""
-        rows = ",\n".join(
-            f'    "{name}": {{"mm": {m.mm:.2f}, "sigma_mm": {m.sigma_mm:.2f}, "confidence": {m.confidence:.2f}}}'
+        """Return the text of `hand.json` with size, standard deviation and confidence of each parameter added."""
+        measured = {
+            name: {"mm": round(m.mm, 2), "sigma_mm": round(m.sigma_mm, 2), "confidence": round(m.confidence, 2)}
             for name, m in self.measured.items()
-        )
-        text = self.hand.to_json().rstrip()
-        return f'{text[:-1].rstrip()},\n  "measured": {{\n{rows}\n  }}\n}}\n'
+        }
+        return compact_json({**self.hand.to_fields(), "measured": measured})
 
 
 def calibrate(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from depthtrack.errors import DepthtrackError
+from depthtrack.files import write_atomic
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -34,7 +35,7 @@ class _Benchmark:
         )
         text = dumps(asdict(report), indent=2)
         if self.out is not None:
-            _write(self.out, text + "\n")
+            write_atomic(self.out, text + "\n")
         print(text if self.json else benchmark.as_text(report))
         if not report.rows:
             raise DepthtrackError("nothing asked for can run here: the reasons are above")
@@ -98,12 +99,3 @@ class Command:
 
     def run(self) -> None:
         self.what.run()
-
-
-def _write(path: Path, text: str) -> None:
-    aside = path.with_name(path.name + ".part")
-    try:
-        aside.write_text(text, encoding="utf-8")
-        aside.replace(path)
-    finally:
-        aside.unlink(missing_ok=True)

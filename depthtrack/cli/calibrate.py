@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
+from depthtrack.files import write_atomic
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
@@ -77,22 +78,10 @@ class Command:
                 f"calibrated on {sequence.name}",
                 tell,
             )
-        _write(self.out, calibration.to_json())
+        write_atomic(self.out, calibration.to_json())
         save_picture(calibration_picture(calibration), picture)
         report = {**summary(calibration), "hand_file": str(self.out), "picture": str(picture)}
         print(dumps(report, indent=2) if self.json else _text(calibration, self.out, picture))
-
-
-def _write(path: Path, text: str) -> None:
-    """Complete or not at all."""
-    import os
-
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)
 
 
 def _text(calibration: "Calibration", out: Path, picture: Path) -> str:

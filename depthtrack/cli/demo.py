@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.source_options import SourceOptions
 from depthtrack.errors import InputError
+from depthtrack.files import write_atomic
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.running import Source
@@ -121,9 +122,7 @@ def _measure_hand(source: "Source", file: Path) -> bool:
             print(f"its sizes cannot be told, so the average adult's are used: {error}")
             return False
     file.parent.mkdir(parents=True, exist_ok=True)
-    aside = file.with_name(f".{file.name}.writing")
-    aside.write_text(found.to_json(), encoding="utf-8")
-    aside.replace(file)
+    write_atomic(file, found.to_json())
     hand = found.hand
     print(f"a {hand.side} hand, {hand.scale:.2f} times the average adult's")
     return True

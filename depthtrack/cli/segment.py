@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
+from depthtrack.files import replace_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,8 +93,8 @@ class Command:
 
         chosen, shown = set(evenly_chosen(len(sequence), 12)), []
         near, far = sequence_depth_range(sequence)
-        table = folder / ".segments.csv.part"
         with (
+            replace_atomically(folder / "segments.csv") as table,
             VideoWriter(folder / "overlay.mp4", frame_rate(sequence) or 30.0) as video,
             table.open("w", newline="", encoding="utf-8") as file,
             tqdm(total=len(sequence), unit="frame", delay=1, leave=False, disable=None) as bar,
@@ -111,7 +112,6 @@ class Command:
                 rows.writerow(row)
                 bar.update()
                 yield row
-        table.replace(folder / "segments.csv")
         save_picture(contact_sheet(shown, sequence.name, describe(sequence), near, far), folder / "contact-sheet.png")
 
 

@@ -122,7 +122,10 @@ def _path(run: Run, name: str) -> Path | None:
 def _camera(run: Run) -> Camera | None:
     """The camera that the run was tracked with; None leaves the recording its own."""
     fields: Any = run.configuration.get("camera")
-    return None if fields is None else Camera.from_dict(fields, f"{run.folder / 'run.json'}: camera")
+    try:
+        return None if fields is None else Camera.from_fields(fields)
+    except InputError as error:
+        raise InputError(f"{run.folder / 'run.json'}: {error}") from error
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.export.joint_track import JointTrack
-from depthtrack.export.writing import written_aside
+from depthtrack.files import replace_atomically
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.recording.ground_truth import JOINTS_HEADER
 
@@ -16,7 +16,7 @@ HEADER = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES, *
 
 def write_csv(path: Path, track: JointTrack) -> None:
     """Write a track; every number comes back bit for bit. Raises InputError."""
-    with written_aside(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
+    with replace_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(HEADER)
         for row, index in enumerate(track.index):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.export.joint_track import JointTrack
-from depthtrack.export.writing import written_aside
+from depthtrack.files import replace_atomically
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import POSE_NAMES
 
@@ -24,7 +24,7 @@ def write_npz(path: Path, track: JointTrack) -> None:
 
     Raises InputError.
     """
-    with written_aside(path) as aside, aside.open("wb") as file:
+    with replace_atomically(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(
             file,
             index=track.index,

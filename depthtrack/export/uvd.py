@@ -12,8 +12,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.export.benchmark_joints import Benchmark
-from depthtrack.export.writing import written_aside
-from depthtrack.files import read_lines
+from depthtrack.files import read_lines, replace_atomically
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array
@@ -49,7 +48,7 @@ def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
 
     Unknown joints, and what lies behind the camera, become nan.
     """
-    with written_aside(path) as aside, aside.open("w", encoding="utf-8") as file:
+    with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         for frame in _to_uvd(joints, benchmark.camera):
             file.write(" ".join(f"{x:.3f}" for x in frame.ravel()) + "\n")
 

@@ -1,6 +1,5 @@
 """Pinhole cameras. Camera frame: x right, y down, z forward; pixel centres at integer coordinates."""
 
-import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -9,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_text
+from depthtrack.files import compact_json, read_json
 from depthtrack.types import Array
 
 MAX_SIDE = 8192
@@ -37,7 +36,7 @@ class Camera:
             if not (isinstance(side, int) and 1 <= side <= MAX_SIDE):
                 raise InputError(f"camera {name} must be a whole number from 1 to {MAX_SIDE} pixels, found {side!r}")
         for name in ("fx", "fy"):
-            # A window of a few pixels has any ratio of focal length to side; `from_dict` is stricter with files.
+            # A window of a few pixels has any ratio of focal length to side; `from_fields` is stricter with files.
             if not (_is_number(getattr(self, name)) and 1e-3 <= getattr(self, name) <= 1e6):
                 raise InputError(f"camera {name} must be a focal length in pixels, found {getattr(self, name)!r}")
         for name in ("cx", "cy"):
@@ -88,33 +87,32 @@ class Camera:
         )
 
     def to_json(self) -> str:
-        """The text of `camera.json`."""
-        return json.dumps(asdict(self), indent=2) + "\n"
+        """Return the text of `camera.json`."""
+        return compact_json(asdict(self))
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
-        """Read `camera.json`. Raises InputError when it is missing, not JSON, or describes no usable camera."""
-        try:
-            fields = json.loads(read_text(path))
-        except (InputError, ValueError, RecursionError) as error:
-            raise InputError(f"cannot read the camera file {path}: {error}") from error
-        return cls.from_dict(fields, str(path))
+        """Return the camera of a `camera.json`.
+
+        Raises: InputError if the file is missing or malformed, or describes no usable camera.
+        """
+        return read_json(path, "the camera file", cls.from_fields)
 
     @classmethod
-    def from_dict(cls, fields: Any, where: str) -> Self:
-        """Build from parsed JSON; `where` names the source in error messages."""
+    def from_fields(cls, fields: Any) -> Self:
+        """Return the camera of the parsed contents of a `camera.json`.
+
+        Raises: InputError if an entry is missing or the field of view is below 0.5 or above 170 degrees.
+        """
         required = ("width", "height", "fx", "fy", "cx", "cy")
         if not isinstance(fields, dict) or any(name not in fields for name in required):
-            raise InputError(f"{where} must be a JSON object with {', '.join(required)} (and depth_scale)")
-        try:
-            camera = cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from error
-        # Between a 170 degree and a 0.5 degree field of view: outside it, units or columns were mixed up.
+            raise InputError(f"a camera must be a JSON object with {', '.join(required)} (and depth_scale)")
+        camera = cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
+        # Outside that range, units or columns were mixed up.
         for name in ("fx", "fy"):
             focal = getattr(camera, name)
             if not 0.04 <= focal / max(camera.shape) <= 120:
-                raise InputError(f"{where}: {name} must be a focal length in pixels, found {focal:g}")
+                raise InputError(f"camera {name} must be a focal length in pixels, found {focal:g}")
         return camera
 
 

@@ -5,7 +5,6 @@ to the right of somebody who looks at the palm: towards the thumb on a right han
 All sizes are stored for a right hand; a left hand is its mirror image in x.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any, Literal, Self, cast, get_args
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_text
+from depthtrack.files import compact_json, read_json
 from depthtrack.hand.pose import FINGERS
 from depthtrack.types import Array
 
@@ -109,43 +108,41 @@ class HandShape:
         return replace(self, **changes)
 
     def to_json(self) -> str:
-        """The text of `hand.json`: millimetres, one line a finger."""
-        fingers = ",\n".join(
-            f'    "{finger}": '
-            + json.dumps(
-                {
+        """Return the text of `hand.json`, sizes in millimetres."""
+        return compact_json(self.to_fields())
+
+    def to_fields(self) -> dict[str, Any]:
+        """Return the contents of `hand.json`, sizes in millimetres."""
+        return {
+            "side": self.side,
+            "scale": float(self.scale),
+            "palm": {f"{name}_mm": _mm(getattr(self, name)) for name in _PALM_SIZES},
+            "thumb_at_rest": {"direction": self.thumb_direction.tolist(), "pad": self.thumb_pad.tolist()},
+            "fingers": {
+                finger: {
                     "base_mm": _mm(self.bases[f]),
                     "lengths_mm": _mm(self.lengths[f]),
                     "radii_mm": _mm(self.radii[f]),
                 }
-            )
-            for f, finger in enumerate(FINGERS)
-        )
-        palm = json.dumps({f"{name}_mm": _mm(getattr(self, name)) for name in _PALM_SIZES})
-        thumb = json.dumps({"direction": self.thumb_direction.tolist(), "pad": self.thumb_pad.tolist()})
-        return (
-            f'{{\n  "side": "{self.side}",\n  "scale": {self.scale},\n  "palm": {palm},\n  "thumb_at_rest": {thumb},\n'
-            f'  "fingers": {{\n{fingers}\n  }},\n  "source": {json.dumps(self.source)}\n}}\n'
-        )
+                for f, finger in enumerate(FINGERS)
+            },
+            "source": self.source,
+        }
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
-        """Read `hand.json`. Raises InputError naming what is missing or out of range."""
-        text = read_text(path)
-        try:
-            return cls.from_fields(json.loads(text))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
-        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-            raise InputError(f"cannot read the hand file {path}: {error}") from error
-        except KeyError as error:
-            raise InputError(
-                f"{path}: the entry {error} is missing; write one with `depthtrack synth` to see the form"
-            ) from error
+        """Return the hand of a `hand.json`.
+
+        Raises: InputError if the file is missing or malformed, or a size is missing or out of range.
+        """
+        return read_json(path, "the hand file", cls.from_fields, made_by="depthtrack synth")
 
     @classmethod
     def from_fields(cls, fields: dict[str, Any]) -> Self:
-        """From the parsed JSON; whatever is wrong with it raises KeyError, TypeError, ValueError or InputError."""
+        """Return the hand of the parsed contents of a `hand.json`.
+
+        Raises: KeyError, TypeError, ValueError or InputError if an entry is missing or malformed.
+        """
         fingers = [fields["fingers"][finger] for finger in FINGERS]
         return cls(
             side=cast(Side, fields["side"]),

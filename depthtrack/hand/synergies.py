@@ -1,7 +1,5 @@
 """Hand synergies: the principal components of recorded postures (Schroeder et al. 2014, Sec. V), in a JSON file."""
 
-import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -10,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_text
+from depthtrack.files import compact_json, read_json, write_atomic
 from depthtrack.hand.pose import FINGERS
 from depthtrack.resources import resource_folder
 from depthtrack.types import Array
@@ -106,41 +104,31 @@ class Synergies:
         raise InputError(f"these {len(self)} components cover {reached:.1%} of the variance, found {share:.1%} asked")
 
     def to_json(self) -> str:
-        """The text of the file: degrees, a finger a line."""
-        shares = self.variances / self.total_variance
-        components = ",\n".join(
-            "    {"
-            + ",\n     ".join(
-                [
-                    f'"standard_deviation_deg": {_degrees(np.sqrt(self.variances[k]))}, "share": {shares[k]:.6f},'
-                    f' "lower_deg": {_degrees(self.lower[k])}, "upper_deg": {_degrees(self.upper[k])}',
-                    *_finger_lines(np.round(self.components[:, k], 9)),
-                ]
-            )
-            + "}"
-            for k in range(len(self))
-        )
-        mean = ",\n           ".join(_finger_lines(_degrees(self.mean)))
-        return (
-            f'{{\n  "source": {json.dumps(self.source)},\n'
-            f'  "total_standard_deviation_deg": {_degrees(np.sqrt(self.total_variance))},\n'
-            f'  "mean_deg": {{{mean}}},\n  "components": [\n{components}\n  ]\n}}\n'
-        )
+        """Return the text of the synergies file, angles in degrees."""
+        fields = {
+            "source": self.source,
+            "total_standard_deviation_deg": _degrees(np.sqrt(self.total_variance)),
+            "mean_deg": _by_finger(_degrees(self.mean)),
+            "components": [
+                {
+                    "standard_deviation_deg": _degrees(np.sqrt(self.variances[k])),
+                    "share": round(float(self.variances[k] / self.total_variance), 6),
+                    "lower_deg": _degrees(self.lower[k]),
+                    "upper_deg": _degrees(self.upper[k]),
+                    **_by_finger(np.round(self.components[:, k], 9)),
+                }
+                for k in range(len(self))
+            ],
+        }
+        return compact_json(fields)
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
-        """Read what `to_json` wrote. Raises InputError naming what is missing or does not fit."""
-        text = read_text(path)
-        try:
-            return cls._from_fields(json.loads(text))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from error
-        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-            raise InputError(f"cannot read the synergies {path}: {error}") from error
-        except KeyError as error:
-            raise InputError(
-                f"{path}: the entry {error} is missing; write one with `depthtrack synergies fit` to see the form"
-            ) from error
+        """Return the synergies of a file that holds the text of `to_json`.
+
+        Raises: InputError if the file is missing or malformed, or its entries do not fit together.
+        """
+        return read_json(path, "the synergies", cls._from_fields, made_by="depthtrack synergies fit")
 
     @classmethod
     def _from_fields(cls, fields: dict[str, Any]) -> Self:
@@ -161,15 +149,11 @@ class Synergies:
 
 
 def save_synergies(synergies: Synergies, path: Path) -> None:
-    """Write the file, complete or not at all. Raises InputError where that cannot be."""
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        aside.write_text(synergies.to_json(), encoding="utf-8")
-        os.replace(aside, path)
-    except OSError as error:
-        raise InputError(f"cannot write the synergies {path}: {error.strerror}") from error
-    finally:
-        aside.unlink(missing_ok=True)
+    """Write the file that `Synergies.from_json` reads.
+
+    Raises: InputError if the file cannot be written.
+    """
+    write_atomic(path, synergies.to_json())
 
 
 def load_synergies(name: str | Path = "leap") -> Synergies:
@@ -215,11 +199,8 @@ def _angles(table: dict[str, Any]) -> Array:
     return angles.ravel()
 
 
-def _finger_lines(values: Any) -> list[str]:
-    return [
-        f'"{finger}": {json.dumps(row)}'
-        for finger, row in zip(FINGERS, np.reshape(values, (5, 4)).tolist(), strict=True)
-    ]
+def _by_finger(values: ArrayLike) -> dict[str, list[float]]:
+    return dict(zip(FINGERS, np.reshape(values, (5, 4)).tolist(), strict=True))
 
 
 def _degrees(radians: Any) -> Any:

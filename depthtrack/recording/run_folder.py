@@ -7,7 +7,6 @@ the same whether a run was interrupted or not; timings, of course, are not.
 
 import csv
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_lines, read_text
+from depthtrack.files import read_lines, read_text, write_atomic
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.recording.status import Status
@@ -68,7 +67,7 @@ class RunWriter:
         else:
             _rewrite(folder / "poses.csv", _COLUMNS, ())
             _rewrite(folder / "timings.csv", ("index", *self._stages), ())
-            _replace(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
+            write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
         self._poses = (folder / "poses.csv").open("a", newline="", encoding="utf-8")
         self._timings = (folder / "timings.csv").open("a", newline="", encoding="utf-8")
 
@@ -227,14 +226,7 @@ def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
     writer = csv.writer(text)
     writer.writerow(columns)
     writer.writerows(rows)
-    _replace(path, text.getvalue())
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    aside = path.with_name(f".{path.name}.writing")
-    aside.write_text(text, encoding="utf-8", newline="")
-    os.replace(aside, path)
+    write_atomic(path, text.getvalue())
 
 
 def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:

@@ -13,6 +13,7 @@ from depthtrack import __version__
 from depthtrack.errors import InputError
 from depthtrack.evaluation.compare.results import Line, figures_of, lines_of
 from depthtrack.evaluation.evaluate import Evaluation
+from depthtrack.files import write_atomic
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.colours import css_variables
 from depthtrack.report.film import Film, as_webp, film_of
@@ -104,7 +105,8 @@ def write_report(
         "light": Markup(css_variables(dark=False)),
         "dark": Markup(css_variables(dark=True)),
     }
-    _write(path, _template().render(page))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomic(path, _template().render(page))
 
 
 def check_reportable(evaluations: Sequence[Evaluation]) -> None:
@@ -194,10 +196,3 @@ def _template() -> Any:
     pages = Environment(loader=PackageLoader("depthtrack.report", "page"), autoescape=True, trim_blocks=True)
     pages.lstrip_blocks = True
     return pages.get_template("report.html.jinja")
-
-
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.name}.writing")
-    aside.write_text(text, encoding="utf-8")
-    aside.replace(path)

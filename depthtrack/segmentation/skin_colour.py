@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import cv2
 import numba
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_text
+from depthtrack.files import read_json, write_atomic
 from depthtrack.geometry.rectangle import Window
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.types import Array, Image, Index, Labels, Mask
@@ -102,24 +102,24 @@ class SkinColourModel:
         return np.where(evidence > 1e-9, joint / np.maximum(evidence, 1e-9), 0.0)
 
     def save(self, path: Path) -> None:
-        """Write the model as JSON, complete or not at all. Raises InputError."""
+        """Write the model as JSON.
+
+        Raises: InputError if the file cannot be written.
+        """
         text = json.dumps({"prior": self.prior, "skin": self.skin.tolist(), "other": self.other.tolist()})
-        partial = path.with_name(path.name + ".part")
-        try:
-            partial.write_text(text + "\n", encoding="utf-8")
-            partial.replace(path)
-        except OSError as error:
-            raise InputError(f"cannot write the skin model {path}: {error.strerror}") from error
+        write_atomic(path, text + "\n")
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Read what `save` wrote. Raises InputError."""
-        text = read_text(path, _LARGEST_FILE)
-        try:
-            fields = json.loads(text)
-            return cls(fields["skin"], fields["other"], float(fields["prior"]))
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
-            raise InputError(f"{path} is no skin model: write one with `depthtrack train-skin` ({error!r})") from error
+        """Return the model that `save` wrote.
+
+        Raises: InputError if the file is missing, malformed, or its tables are no probabilities.
+        """
+        return read_json(path, "the skin model", cls._from_fields, _LARGEST_FILE, made_by="depthtrack train-skin")
+
+    @classmethod
+    def _from_fields(cls, fields: Any) -> Self:
+        return cls(fields["skin"], fields["other"], float(fields["prior"]))
 
 
 @cache

@@ -1,6 +1,5 @@
 """A recording on one page: moments chosen evenly, each with depth and colour, under a title and over a legend."""
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import cv2
 import numpy as np
 
 from depthtrack.errors import InputError
+from depthtrack.files import write_atomic
 from depthtrack.recording.sequence import Sequence
 from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
@@ -59,21 +59,17 @@ def frame_rate(sequence: Sequence) -> float | None:
 
 
 def save_picture(image: Image, path: Path) -> None:
-    """Write an RGB image as .png or .jpg, complete or not at all. Raises InputError where that cannot be."""
+    """Write an RGB image (h, w, 3) uint8 as .png or .jpg.
+
+    Raises: InputError if the suffix is another one or the file cannot be written.
+    """
     settings = PICTURE_SETTINGS.get(path.suffix.lower())
     if settings is None:
         raise InputError(f"a picture must end in {' or '.join(PICTURE_SETTINGS)}, found '{path.name}'")
     ok, data = cv2.imencode(path.suffix.lower(), np.ascontiguousarray(image[..., ::-1]), settings)
     if not ok:
         raise InputError(f"OpenCV cannot encode a picture of {image.shape[1]} x {image.shape[0]} pixels")
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        aside.write_bytes(data.tobytes())
-        os.replace(aside, path)
-    except OSError as error:
-        raise InputError(f"cannot write the picture {path}: {error.strerror}") from error
-    finally:
-        aside.unlink(missing_ok=True)
+    write_atomic(path, data.tobytes())
 
 
 def _tile(moment: AnnotatedFrame, height: int, near: float, far: float) -> Image:

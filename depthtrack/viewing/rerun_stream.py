@@ -1,7 +1,6 @@
 """Where the interactive viewer's data go: its window, a browser, or a file. Needs the extra `view` (rerun-sdk)."""
 
 import importlib
-import os
 import shutil
 import socket
 import sysconfig
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from depthtrack.errors import InputError, MissingExtraError
+from depthtrack.files import replace_atomically
 from depthtrack.geometry.camera import Camera
 from depthtrack.viewing.theme import ESTIMATED_MASK, TRUE_MASK
 
@@ -72,25 +72,22 @@ class RerunStream(ABC, Generic[Item]):
         self._stream.disconnect()
 
     def save(self, path: Path, items: Iterable[Item]) -> int:
-        """Write items to an .rrd file, complete or not at all; returns how many. Raises InputError."""
+        """Write items to an .rrd file and return their number.
+
+        Raises: InputError if the suffix is another one or the file cannot be written.
+        """
         if path.suffix.lower() != ".rrd":
             raise InputError(f"a rerun recording must end in .rrd, found '{path.name}'")
-        if not path.parent.is_dir():
-            raise InputError(f"the folder {path.parent} for the recording does not exist: create it first")
-        aside = path.with_name(f".{path.stem}.{os.getpid()}.rrd")
         count = 0
-        try:
+        with replace_atomically(path) as temporary:
             try:
-                self._stream.save(aside, default_blueprint=self._layout())
+                self._stream.save(temporary, default_blueprint=self._layout())
                 self._log_static()
                 for item in items:
                     self.log(item)
                     count += 1
             finally:
                 self.close()
-            os.replace(aside, path)
-        finally:
-            aside.unlink(missing_ok=True)
         return count
 
     def _log_static(self) -> None:

@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from depthtrack.errors import InputError
+from depthtrack.files import replace_atomically
 from depthtrack.types import Image
 
 QUICK_CODECS = ("avc1", "mp4v")
@@ -25,24 +26,22 @@ WEBM_CODECS = ("VP80",)
 
 
 class VideoWriter:
-    """Context manager that writes RGB images (h, w, 3) uint8 as an mp4 (or webm) film.
+    """Write RGB images (h, w, 3) uint8 as an mp4 or webm video; use as a context manager.
 
-    The size is the first image's, made even as encoders want it; later images must have the same. The file appears
-    under its name when the block ends well; after an exception, or without any image, nothing is left behind.
+    The size is that of the first image, rounded down to even numbers; all images must have the same size. The file
+    appears if the block succeeds. If the block fails or writes no image, no file is left.
     """
 
     def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] | None = None) -> None:
         if path.suffix.lower() not in (".mp4", ".webm"):
             raise InputError(f"a video file must end in .mp4 (or .webm), found '{path.name}'")
-        if not path.parent.is_dir():
-            raise InputError(f"the folder {path.parent} for the video does not exist: create it first")
         if not (np.isfinite(rate) and rate > 0):
             raise InputError(f"the frame rate of a video must be positive, found {rate!r}")
         self.path = path
         self.rate = rate
         self.codecs = codecs or (QUICK_CODECS if path.suffix.lower() == ".mp4" else WEBM_CODECS)
         self.frame_count = 0
-        self._aside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+        self._cleanup = ExitStack()
         self._shape: tuple[int, ...] = ()
         self._encoder: cv2.VideoWriter | None = None
 
@@ -58,23 +57,24 @@ class VideoWriter:
         self.frame_count += 1
 
     def __enter__(self) -> Self:
+        self._temporary = self._cleanup.enter_context(replace_atomically(self.path))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._cleanup.push(self._finish)
+        self._cleanup.__exit__(kind, error, trace)
+
+    def _finish(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._encoder is not None:
             self._encoder.release()
-        try:
-            if kind is None and self.frame_count > 0:
+            if kind is None:
                 self._check_complete()
-                os.replace(self._aside, self.path)
-        finally:
-            self._aside.unlink(missing_ok=True)
 
     def _check_complete(self) -> None:
-        """OpenCV does not tell of a full disk: ask the file how many images it holds."""
-        reader = cv2.VideoCapture(str(self._aside))
+        """Raise InputError if the file holds fewer images than were written: OpenCV does not report a full disk."""
+        reader = cv2.VideoCapture(str(self._temporary))
         held = round(reader.get(cv2.CAP_PROP_FRAME_COUNT))
         reader.release()
         if held != self.frame_count:
@@ -90,10 +90,10 @@ class VideoWriter:
             for codec in self.codecs:
                 fourcc = cv2.VideoWriter.fourcc(*codec)
                 with _silent_stderr():
-                    encoder = cv2.VideoWriter(str(self._aside), fourcc, self.rate, (width, height))
+                    encoder = cv2.VideoWriter(str(self._temporary), fourcc, self.rate, (width, height))
                 if encoder.isOpened():
                     return encoder
-                self._aside.unlink(missing_ok=True)
+                self._temporary.unlink(missing_ok=True)
         finally:
             cv2.utils.logging.setLogLevel(level)
         raise InputError(
@@ -104,7 +104,7 @@ class VideoWriter:
 
 @contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Drops what C libraries print: OpenCV tells of every tag that a webm file has no use for."""
+    """Discard the output of C libraries on stderr: FFmpeg reports each tag that webm does not support."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

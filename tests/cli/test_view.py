@@ -108,8 +108,8 @@ def test_a_codec_that_opencv_lacks_is_told_of(out: Path, capfd: pytest.CaptureFi
 
 @pytest.mark.parametrize(("name", "rate"), [("film.avi", 30.0), ("nowhere/film.mp4", 30.0), ("film.mp4", 0.0)])
 def test_a_video_that_cannot_be_is_refused_at_once(out: Path, name: str, rate: float) -> None:
-    with pytest.raises(InputError):
-        VideoWriter(out / name, rate)
+    with pytest.raises(InputError), VideoWriter(out / name, rate):
+        pass
 
 
 # The command

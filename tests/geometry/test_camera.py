@@ -1,7 +1,6 @@
 """Cameras: projection, windows and resampling, and files that describe no camera."""
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +57,7 @@ def test_json_round_trip(tmp_path: Path) -> None:
         {"height": 479.5},
         {"fx": 0},
         {"fx": -525},
-        {"fy": math.nan},
+        {"fy": 0.0},
         {"fy": 5e7},
         {"cx": 1e6},
         {"cy": "middle"},

@@ -135,7 +135,7 @@ def test_a_file_that_does_not_fit_together_is_refused(tmp_path: Path) -> None:
     refuses({}, "no lower limit", component={"lower_deg": 2, "upper_deg": 1})
     refuses({}, "descend", component={"standard_deviation_deg": 0.001})
     refuses({"total_standard_deviation_deg": 0.1}, "total variance")
-    refuses({"total_standard_deviation_deg": float("nan")}, "finite")
+    refuses({"total_standard_deviation_deg": float("nan")}, "JSON has no NaN")
     refuses({}, "finite|cannot read", component={"upper_deg": 10**400})
     refuses({"mean_deg": "flat"}, "cannot read")
     refuses({"mean_deg": {}}, "'thumb' is missing")

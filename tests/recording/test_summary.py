@@ -187,7 +187,7 @@ def test_a_camera_file_or_preset_can_be_corrected_in_numbers(tmp_path: Path) -> 
         (["--fx", "nan", "--depth-scale", "0.001"], "fx must be a focal length"),
         (["--fx", "30", "--fy", "0", "--depth-scale", "0.001"], "fy must be a focal length"),
         (["--fx", "30", "--depth-scale", "5000"], "depth_scale must be metres"),
-        (["--camera", "nowhere.json"], "cannot read the camera file nowhere.json"),
+        (["--camera", "nowhere.json"], "cannot read the camera file: nowhere.json is missing"),
         (["--camera", "a.json", "--camera-preset", "tum"], "give one of them"),
         (["--camera-preset", "kinect1"], "must be 640x480 pixels as the camera says, found 32x24"),
     ],

@@ -18,6 +18,7 @@ from depthtrack.benchmarks.papers.plot import draw_png
 from depthtrack.benchmarks.papers.registry import full_cell, measure_cell
 from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
+from depthtrack.files import write_atomic
 from depthtrack.machine import Machine, describe_machine
 
 Progress = Callable[[Iterator[Row], int, int], Iterable[Row]]
@@ -76,9 +77,9 @@ def reproduce(
         comparisons=experiment.compare(rows),
         table=experiment.tabulate(rows),
     )
-    _write(folder / "table.csv", as_csv(done.table).encode())
-    _write(folder / "figure.png", draw_png(experiment, rows, done.comparisons, as_note(done, cells[0])))
-    _write(folder / "summary.json", json.dumps(done.to_json(), indent=2).encode() + b"\n")
+    write_atomic(folder / "table.csv", as_csv(done.table).encode())
+    write_atomic(folder / "figure.png", draw_png(experiment, rows, done.comparisons, as_note(done, cells[0])))
+    write_atomic(folder / "summary.json", json.dumps(done.to_json(), indent=2).encode() + b"\n")
     return done
 
 
@@ -104,12 +105,3 @@ def as_csv(table: Sequence[Row]) -> str:
     writer.writeheader()
     writer.writerows(table)
     return text.getvalue()
-
-
-def _write(path: Path, content: bytes) -> None:
-    aside = path.with_name(path.name + ".part")
-    try:
-        aside.write_bytes(content)
-        aside.replace(path)
-    finally:
-        aside.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.evaluation.metrics import Metric
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Workers
+from depthtrack.files import write_atomic
 from depthtrack.recording.status import Status
 from depthtrack.text_table import aligned
 from depthtrack.tracking.registry import TRACKERS, complete_options
@@ -142,14 +143,14 @@ def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
 def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
     """Write `results.json`, an object a run, and `results.csv`, the same in columns."""
     rows = [result(evaluation) for evaluation in evaluations]
-    _write(folder / "results.json", json.dumps(rows, indent=2) + "\n")
+    write_atomic(folder / "results.json", json.dumps(rows, indent=2) + "\n")
     flat = [dict(_flat(row)) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
     text = StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
     writer.writerows(flat)
-    _write(folder / "results.csv", text.getvalue())
+    write_atomic(folder / "results.csv", text.getvalue())
 
 
 def result(evaluation: Evaluation) -> dict[str, Any]:
@@ -218,9 +219,3 @@ def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from _flat(inner, f"{name}_{key}" if name else key)
     else:
         yield name, value
-
-
-def _write(path: Path, text: str) -> None:
-    aside = path.with_name(f".{path.name}.writing")
-    aside.write_text(text, encoding="utf-8", newline="")
-    aside.replace(path)

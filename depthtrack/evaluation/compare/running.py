@@ -14,6 +14,7 @@ import cv2
 from depthtrack.evaluation.compare.budget import calibrate
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.files import write_atomic
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -124,7 +125,7 @@ def track_cell(cell: Cell) -> Row:
         rows = track_sequence(sequence, segmenter, tracker, HandModel(hand), run, count=count, clock=clock)
         tracked_now = sum(1 for _ in rows)
         done = {"frames": len(run.rows), "damaged": [asdict(damage) for damage in sequence.damaged]}
-    _write_done(folder, done)
+    write_atomic(folder / DONE, json.dumps(done) + "\n")
     return {"frames": done["frames"], "tracked_now": tracked_now}
 
 
@@ -138,12 +139,6 @@ def calibrate_cell(cell: Cell) -> Row:
     # JSON knows no infinity: no hand was followed anywhere.
     ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
     return {"chosen": budget.options, "calibrated_ms": ms}
-
-
-def _write_done(folder: Path, done: dict[str, Any]) -> None:
-    aside = folder / f".{DONE}.writing"
-    aside.write_text(json.dumps(done) + "\n", encoding="utf-8")
-    aside.replace(folder / DONE)
 
 
 class FrameCount:

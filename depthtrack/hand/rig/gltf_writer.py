@@ -3,7 +3,6 @@
 Needs the optional library pygltflib: `pip install 'depthtrack[gltf]'`. Plain meshes go through `Skin.to_trimesh`.
 """
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from depthtrack.errors import InputError
+from depthtrack.files import replace_atomically
 from depthtrack.hand.kinematics import BODY_COUNT, JOINT_NAMES, HandModel, body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig.gltf import gltf_library
@@ -59,13 +58,8 @@ def export_glb(skin: Skin, path: Path) -> None:
     gltf.scene = 0
     gltf.buffers = [library.Buffer(byteLength=len(blob.data))]
     gltf.set_binary_blob(bytes(blob.data))
-    aside = path.with_name(path.name + ".part")
-    try:
-        gltf.save_binary(aside)
-        os.replace(aside, path)
-    except OSError as error:
-        aside.unlink(missing_ok=True)
-        raise InputError(f"cannot write {path}: {error.strerror or error}") from error
+    with replace_atomically(path) as temporary:
+        gltf.save_binary(temporary)
 
 
 def _joint_transforms(skin: Skin) -> Array:
