@@ -6,15 +6,29 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+
 # A first call compiles, and a loaded machine is slow: time limits of single examples mean nothing here.
 settings.register_profile("depthtrack", deadline=None, max_examples=30, derandomize=True)
 settings.load_profile("depthtrack")
 
 
 @pytest.fixture(scope="session")
+def everyday() -> Synthesiser:
+    """The everyday motion of a hand of spheres and cylinders, seen by a perfect sensor."""
+    return Synthesiser(Synthesis())
+
+
+@pytest.fixture(scope="session")
+def everyday_skin() -> Synthesiser:
+    """The everyday motion of a hand with a skin, seen by a perfect sensor."""
+    return Synthesiser(Synthesis(model="skin"))
+
+
+@pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of the real recordings; the test is skipped where they are absent."""
-    folder = Path(os.environ.get("DEPTHTRACK_DATA", Path(__file__).parent.parent.parent / "shared" / "data"))
-    if not folder.is_dir():
-        pytest.skip(f"no real recordings at {folder}: set DEPTHTRACK_DATA to run this test")
-    return folder
+    """The folder that DEPTHTRACK_DATA names; tests of real recordings are skipped without it."""
+    folder = os.environ.get("DEPTHTRACK_DATA")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip("no real recordings: set DEPTHTRACK_DATA to their folder")
+    return Path(folder)

@@ -29,7 +29,7 @@ def polygonise(field: Field, low: Array, high: Array, cell: float, rounds: int =
     axes = [low[a] + cell * np.arange(shape[a]) for a in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = field(points.reshape(-1, 3)).reshape(points.shape[:3])
-    vertices, quads = surface_nets(_without_double_sheets(values))
+    vertices, quads = surface_nets(without_double_sheets(values))
     vertices = low + cell * vertices
     faces = _triangles(vertices, quads)
     for _ in range(rounds):
@@ -76,7 +76,7 @@ def _cell_values(values: Array) -> Array:
     return np.stack([values[i : nx - 1 + i, j : ny - 1 + j, k : nz - 1 + k] for i, j, k in _CORNERS], axis=-1)
 
 
-def _without_double_sheets(values: Array) -> Array:
+def without_double_sheets(values: Array) -> Array:
     """The grid with the corners of every ambiguous cell pushed inside until no cell holds two sheets."""
     values, bits = values.copy(), 1 << np.arange(8)
     while True:

@@ -32,7 +32,7 @@ SMALL_PIECE = 0.02
 PALM_HALF_THICKNESS = 0.0145
 """Metres from the palm's visible surface to its centre (see `hand.shape.HandShape.palm_thickness`)."""
 
-_NOTHING, _READING, _MISSING = 0, 1, 2
+_NOTHING, READING, _MISSING = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> Roi
     camera = frame.camera
     lens = (camera.fx, camera.fy, camera.cx - window.left, camera.cy - window.top)
     kinds = np.empty(depth.shape, dtype=np.uint8)
-    _reachable(depth, lens, place.centre, place.reach, place.wrist.point, place.wrist.normal, kinds)
-    readings, silhouette = kinds == _READING, kinds == _READING
+    mark_reachable(depth, lens, place.centre, place.reach, place.wrist.point, place.wrist.normal, kinds)
+    readings, silhouette = kinds == READING, kinds == READING
     if skin is not None and frame.colour is not None:
         found = skin.find(frame.colour, window, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
         radius = max(1, round(DILATION * camera.width))
@@ -83,7 +83,7 @@ def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> Roi
 
 
 @numba.njit(cache=True, nogil=True)
-def _reachable(
+def mark_reachable(
     depth: Depth,
     lens: tuple[float, float, float, float],
     centre: Array,
@@ -92,13 +92,13 @@ def _reachable(
     towards_arm: Array,
     out: Labels,
 ) -> None:
-    """_READING where a point lies within `reach` of the centre and before the wrist, _MISSING where there is no
+    """READING where a point lies within `reach` of the centre and before the wrist, _MISSING where there is no
     reading but a point as far away as the centre would, into `out` (h, w)."""
     fx, fy, cx, cy = lens
     for v in range(depth.shape[0]):
         for u in range(depth.shape[1]):
             z = np.float64(depth[v, u])
-            kind = _READING if z > 0.0 else _MISSING
+            kind = READING if z > 0.0 else _MISSING
             if kind == _MISSING:
                 z = centre[2]
             x, y = (u - cx) / fx * z, (v - cy) / fy * z

@@ -60,7 +60,7 @@ class Clearance:
         start, end = start.reshape(flat), end.reshape(flat)
         r0, r1 = self._radii[:, :-1].ravel(), self._radii[:, 1:].ravel()
         a, b = self._pairs
-        distance, s, t = _closest(start[..., a, :], end[..., a, :], start[..., b, :], end[..., b, :])
+        distance, s, t = closest_points_of_segments(start[..., a, :], end[..., a, :], start[..., b, :], end[..., b, :])
         reach = r0[a] + s * (r1 - r0)[a] + r0[b] + t * (r1 - r0)[b]
         return np.maximum(reach - distance, 0).max(axis=-1)
 
@@ -75,7 +75,7 @@ class Clearance:
         return np.max(np.where(inside, np.maximum(depth, 0), 0), axis=(-1, -2))
 
 
-def _closest(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array, Array]:
+def closest_points_of_segments(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array, Array]:
     """Distance (...) of segments p and q (..., 3), and where along each it is reached (0 to 1).
 
     Ericson, "Real-Time Collision Detection", 2005, Sec. 5.1.9.

@@ -13,12 +13,15 @@ from depthtrack.errors import InputError
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film
 
-FILM = Film(Synthesis(model="skin", distance=DISTANCE))
+
+@pytest.fixture(scope="module")
+def film() -> Film:
+    return Film(Synthesis(model="skin", distance=DISTANCE))
 
 
-def test_the_headline_is_3000_points_and_five_by_five() -> None:
+def test_the_headline_is_3000_points_and_five_by_five(film: Film) -> None:
     assert SETTINGS[0] == HEADLINE
-    row = ik.measure(FILM, HEADLINE, 1e-6)
+    row = ik.measure(film, HEADLINE, 1e-6)
     assert 2800 < row.points < 3200
     assert (row.model, row.residual, row.freedom, row.threads) == ("skin", "symmetric", "26", 1)
     assert (row.icp, row.inner) == (5, 5)
@@ -41,8 +44,8 @@ def test_the_headline_is_3000_points_and_five_by_five() -> None:
         (replace(HEADLINE, subsample=30, icp=2, inner=1), 0.3, 3),
     ],
 )
-def test_a_row_is_of_its_setting(setting: Setting, lowest_deg: float, highest_deg: float) -> None:
-    row, headline = ik.measure(FILM, setting, 1e-6), ik.measure(FILM, HEADLINE, 1e-6)
+def test_a_row_is_of_its_setting(film: Film, setting: Setting, lowest_deg: float, highest_deg: float) -> None:
+    row, headline = ik.measure(film, setting, 1e-6), ik.measure(film, HEADLINE, 1e-6)
     for name in ("model", "residual", "freedom", "icp", "inner"):
         assert getattr(row, name) == getattr(setting, name)
     assert row.points == pytest.approx(headline.points * HEADLINE.subsample / setting.subsample, abs=1)

@@ -67,12 +67,16 @@ def _sizes() -> np.ndarray:
 
 
 TRUE_HAND = hand_of(_sizes(), "right")
-MADE = Synthesiser(Synthesis(model="skin", hand=TRUE_HAND))
 
 
 @pytest.fixture(scope="module")
-def calibration() -> Calibration:
-    return calibrate([observe(MADE, i) for i in range(5, 355, 80)])
+def made() -> Synthesiser:
+    return Synthesiser(Synthesis(model="skin", hand=TRUE_HAND))
+
+
+@pytest.fixture(scope="module")
+def calibration(made: Synthesiser) -> Calibration:
+    return calibrate([observe(made, i) for i in range(5, 355, 80)])
 
 
 def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
@@ -93,14 +97,14 @@ def test_what_is_said_of_sureness_is_true(calibration: Calibration) -> None:
         assert abs(found.mm - truth[name]) < 3 * found.sigma_mm, name
 
 
-def test_a_calibrated_hand_is_tracked_better(calibration: Calibration) -> None:
+def test_a_calibrated_hand_is_tracked_better(made: Synthesiser, calibration: Calibration) -> None:
     frames, errors = range(100, 125), {}
-    observations = [observe(MADE, i) for i in frames]
+    observations = [observe(made, i) for i in frames]
     for name, hand in (("average", HandShape()), ("calibrated", calibration.hand)):
         tracker = IkTracker(hand)
-        first = tracker.start(observations[0], MADE.poses[frames.start])
+        first = tracker.start(observations[0], made.poses[frames.start])
         poses = [first.pose, *(tracker.track(o).pose for o in observations[1:])]
-        truth = HandModel(TRUE_HAND), MADE.poses[frames.start : frames.stop]
+        truth = HandModel(TRUE_HAND), made.poses[frames.start : frames.stop]
         errors[name] = endpoint_error(HandModel(hand), np.array(poses), *truth).values.mean()
     assert errors["calibrated"] < 2.5
     assert errors["calibrated"] < errors["average"] / 2
@@ -119,14 +123,12 @@ def test_views_are_shown_in_the_order_of_the_recording(calibration: Calibration)
 
 
 @pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])
-def test_a_side_that_fits_hardly_better_is_not_sure(
-    calibration: Calibration, margin: float | None, guide_confidence: bool
-) -> None:
+def test_a_side_that_fits_hardly_better_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
     certain = {name: replace(m, confidence=0.9999) for name, m in calibration.measured.items()}
     found = replace(calibration, side_margin=margin, measured=certain)
-    assert summary(found)["side_sure"] == guide_confidence
+    assert summary(found)["side_sure"] == sure
     text = _text(found, Path("hand.json"), Path("hand.png"))
-    assert ("side not sure; give --side" in text) == (not guide_confidence)
+    assert ("side not sure; give --side" in text) == (not sure)
     assert "0.99" in text
     assert "1.00\n" not in text
 
@@ -172,10 +174,10 @@ def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
     assert sigma["fist"] < 0.5 * sigma["nothing"]
 
 
-def test_the_true_hand_in_its_true_pose_has_no_residuals() -> None:
-    observation = observe(MADE, 40)
-    true = linearise(CalibrationView(observation), PosedSkin(TRUE_HAND), MADE.poses[40], 0.006)
-    average = linearise(CalibrationView(observation), PosedSkin(HandShape()), MADE.poses[40], 0.006)
+def test_the_true_hand_in_its_true_pose_has_no_residuals(made: Synthesiser) -> None:
+    observation = observe(made, 40)
+    true = linearise(CalibrationView(observation), PosedSkin(TRUE_HAND), made.poses[40], 0.006)
+    average = linearise(CalibrationView(observation), PosedSkin(HandShape()), made.poses[40], 0.006)
     assert true.distance < 1e-4 < average.distance
     assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
 

@@ -64,23 +64,23 @@ def run(request: pytest.FixtureRequest) -> Run:
 @given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
 @settings(max_examples=12)
 def test_agrees_with_the_oracle_in_a_window_on_the_hand(run: Run, seed: int, reduced: int | None) -> None:
-    run(views.window, seed, reduced)
+    run(views.assert_window_agrees, seed, reduced)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_agrees_with_the_oracle_through_any_camera(run: Run, seed: int) -> None:
-    run(views.any_camera, seed)
+    run(views.assert_any_camera_agrees, seed)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", views.ABSURD)
 def test_agrees_with_the_oracle_where_views_are_absurd(run: Run, name: str, seed: int) -> None:
-    run(views.absurd, name, seed)
+    run(views.assert_absurd_view_agrees, name, seed)
 
 
 def test_agrees_with_the_oracle_in_windows_beyond_the_image(run: Run) -> None:
-    run(views.overhanging)
+    run(views.assert_overhanging_windows_agree)
 
 
 @pytest.mark.parametrize("seed", range(3))

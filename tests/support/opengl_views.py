@@ -53,7 +53,7 @@ def assert_agrees(
         np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
 
 
-def window(platform: Platform, seed: int, reduced: int | None) -> None:
+def assert_window_agrees(platform: Platform, seed: int, reduced: int | None) -> None:
     """A window on the hand half a metre away, native or reduced."""
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
@@ -61,7 +61,7 @@ def window(platform: Platform, seed: int, reduced: int | None) -> None:
     assert_agrees(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
 
 
-def any_camera(platform: Platform, seed: int) -> None:
+def assert_any_camera_agrees(platform: Platform, seed: int) -> None:
     """Any image size, field of view and principal point; hands near and far, mostly partly outside."""
     rng = np.random.default_rng(seed)
     width, height = (int(n) for n in rng.integers(1, 200, 2))
@@ -71,7 +71,7 @@ def any_camera(platform: Platform, seed: int) -> None:
     assert_agrees(platform, shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
 
 
-def absurd(platform: Platform, name: str, seed: int) -> None:
+def assert_absurd_view_agrees(platform: Platform, name: str, seed: int) -> None:
     """Where a view makes little sense, it is still defined; behind the lens and outside the image, nothing shows."""
     rng, (centre, spread) = np.random.default_rng(seed), ABSURD[name]
     camera = KINECT.resized(0.25)
@@ -84,7 +84,7 @@ def absurd(platform: Platform, name: str, seed: int) -> None:
             assert not any(scorer.render(pose).any() for pose in poses)
 
 
-def overhanging(platform: Platform) -> None:
+def assert_overhanging_windows_agree(platform: Platform) -> None:
     """A window that hangs over the image's corner, and one larger than the image."""
     rng = np.random.default_rng(7)
     shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)

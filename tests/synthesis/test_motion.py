@@ -18,7 +18,7 @@ from depthtrack.hand.pose import ANGLES, make_pose, tangent_between
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
-from depthtrack.synthesis.clearance import Clearance, _closest
+from depthtrack.synthesis.clearance import Clearance, closest_points_of_segments
 from depthtrack.synthesis.motion import KeyframedMotion, load_motion
 from depthtrack.synthesis.motion_file import find_motion, motion_names, read_table, shared_postures
 from depthtrack.synthesis.random_motion import RandomMotion
@@ -163,7 +163,7 @@ def test_clearance_sees_a_finger_that_passes_through_another() -> None:
 @given(seed=st.integers(0, 2**32))
 def test_distance_of_segments_is_the_smallest_between_their_points(seed: int) -> None:
     p0, p1, q0, q1 = np.random.default_rng(seed).normal(size=(4, 3))
-    distance, s, t = _closest(p0, p1, q0, q1)
+    distance, s, t = closest_points_of_segments(p0, p1, q0, q1)
     shares = np.linspace(0, 1, 201)[:, None]
     between = np.linalg.norm((p0 + shares * (p1 - p0))[:, None] - (q0 + shares * (q1 - q0))[None], axis=-1)
     assert distance == pytest.approx(between.min(), abs=0.02)

@@ -9,6 +9,7 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
+from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.recording.status import Status
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
@@ -20,41 +21,47 @@ from depthtrack.tracking.tracker import Estimate
 from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 from tests.support.observations import observe
 
-MADE = Synthesiser(Synthesis(model="skin"))
-MODEL = HandModel(MADE.options.hand)
+MODEL = HandModel(HandShape())
 
 
-def follow(tracker: IkTracker, frames: range) -> list[Estimate]:
+@pytest.fixture(scope="module")
+def made(everyday_skin: Synthesiser) -> Synthesiser:
+    return everyday_skin
+
+
+def follow(made: Synthesiser, tracker: IkTracker, frames: range) -> list[Estimate]:
     first, *rest = frames
-    return [tracker.start(observe(MADE, first), MADE.poses[first])] + [tracker.track(observe(MADE, i)) for i in rest]
+    return [tracker.start(observe(made, first), made.poses[first])] + [tracker.track(observe(made, i)) for i in rest]
 
 
 @pytest.mark.parametrize(("model", "highest_mm", "highest_deg"), [("skin", 2.0, 2.0), ("cylinders", 5.0, 6.0)])
-def test_follows_everyday_motion_rendered_from_the_skin(model: Model, highest_mm: float, highest_deg: float) -> None:
+def test_follows_everyday_motion_rendered_from_the_skin(
+    made: Synthesiser, model: Model, highest_mm: float, highest_deg: float
+) -> None:
     """Five ICP iterations on a third of the points, as Schroeder et al. 2014 measure."""
     frames = range(100, 140)
-    estimates = follow(IkTracker(MADE.options.hand, IkOptions(model=model)), frames)
-    poses, truth = np.array([estimate.pose for estimate in estimates]), MADE.poses[frames.start : frames.stop]
+    estimates = follow(made, IkTracker(made.options.hand, IkOptions(model=model)), frames)
+    poses, truth = np.array([estimate.pose for estimate in estimates]), made.poses[frames.start : frames.stop]
     assert endpoint_error(MODEL, poses, MODEL, truth).values.mean() < highest_mm
     assert angle_error(poses, truth).values.mean() < highest_deg
     assert {estimate.status for estimate in estimates[1:]} == {Status.TRACKED}
 
 
 @pytest.mark.parametrize("frame", [10, 150, 270])
-def test_starts_by_itself(frame: int) -> None:
-    estimate = IkTracker(MADE.options.hand).track(observe(MADE, frame))
+def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
+    estimate = IkTracker(made.options.hand).track(observe(made, frame))
     assert estimate.status is Status.STARTED
     assert estimate.pose is not None
-    assert endpoint_error(MODEL, estimate.pose[None], MODEL, MADE.poses[[frame]]).values[0] < 10
+    assert endpoint_error(MODEL, estimate.pose[None], MODEL, made.poses[[frame]]).values[0] < 10
 
 
-def test_finds_the_hand_again_after_a_cut() -> None:
+def test_finds_the_hand_again_after_a_cut(made: Synthesiser) -> None:
     """From its palm to its back."""
-    tracker = IkTracker(MADE.options.hand)
-    tracker.start(observe(MADE, 30), MADE.poses[30])
-    after = [tracker.track(observe(MADE, frame)) for frame in (92, 93, 94)]
+    tracker = IkTracker(made.options.hand)
+    tracker.start(observe(made, 30), made.poses[30])
+    after = [tracker.track(observe(made, frame)) for frame in (92, 93, 94)]
     assert after[-1].pose is not None
-    assert endpoint_error(MODEL, after[-1].pose[None], MODEL, MADE.poses[[94]]).values[0] < 10
+    assert endpoint_error(MODEL, after[-1].pose[None], MODEL, made.poses[[94]]).values[0] < 10
     assert Status.STARTED in {estimate.status for estimate in after}
 
 
@@ -67,14 +74,16 @@ def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
 
 @pytest.mark.parametrize("model", ["skin", "cylinders"])
 @pytest.mark.parametrize("readings", [0, 1, 5])
-def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(model: Model, readings: int) -> None:
-    seen, tracker = observe(MADE, 0), IkTracker(MADE.options.hand, IkOptions(model=model))
+def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(
+    made: Synthesiser, model: Model, readings: int
+) -> None:
+    seen, tracker = observe(made, 0), IkTracker(made.options.hand, IkOptions(model=model))
     depth = np.zeros_like(seen.depth)
     some = np.flatnonzero(seen.depth)[:readings]
     depth.flat[some] = seen.depth.flat[some]
-    tracker.start(seen, MADE.poses[0])
+    tracker.start(seen, made.poses[0])
     assert tracker.track(replace(seen, depth=depth)).status is Status.LOST
-    assert tracker.track(observe(MADE, 1)).status is Status.STARTED
+    assert tracker.track(observe(made, 1)).status is Status.STARTED
 
 
 def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
@@ -112,20 +121,20 @@ def _synergies_of(motion: str) -> Synergies:
     return Synergies.fit(Synthesiser(Synthesis(motion=motion)).poses[:, ANGLES])
 
 
-def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
-    whole = follow(IkTracker(MADE.options.hand), range(0, 8))
-    resumed = IkTracker(MADE.options.hand)
+def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) -> None:
+    whole = follow(made, IkTracker(made.options.hand), range(0, 8))
+    resumed = IkTracker(made.options.hand)
     resumed.restore(whole[:5])
     for index in range(5, 8):
-        np.testing.assert_array_equal(resumed.track(observe(MADE, index)).pose, whole[index].pose)
+        np.testing.assert_array_equal(resumed.track(observe(made, index)).pose, whole[index].pose)
 
 
-def test_trackers_are_made_by_name() -> None:
-    assert create_tracker("ik", MADE.options.hand, subsample=5).name == "ik"
-    assert create_tracker("pso", MADE.options.hand, particles=8).name == "pso"
+def test_trackers_are_made_by_name(made: Synthesiser) -> None:
+    assert create_tracker("ik", made.options.hand, subsample=5).name == "ik"
+    assert create_tracker("pso", made.options.hand, particles=8).name == "pso"
     with pytest.raises(InputError, match="choose one of pso, ik"):
-        create_tracker("magic", MADE.options.hand)
+        create_tracker("magic", made.options.hand)
     with pytest.raises(InputError, match="point, plane, symmetric"):
-        create_tracker("ik", MADE.options.hand, residual="magic")
+        create_tracker("ik", made.options.hand, residual="magic")
     with pytest.raises(InputError, match="particles"):
-        create_tracker("ik", MADE.options.hand, particles=8)
+        create_tracker("ik", made.options.hand, particles=8)

@@ -18,42 +18,46 @@ from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker, Variant
 from tests.support.observations import observe
 
-MADE = Synthesiser(Synthesis())
-MODEL = HandModel(MADE.options.hand)
+MODEL = HandModel(HandShape())
 
 
-def follow(tracker: PsoTracker, frames: range, made: Synthesiser = MADE) -> list[Estimate]:
+@pytest.fixture(scope="module")
+def made(everyday: Synthesiser) -> Synthesiser:
+    return everyday
+
+
+def follow(made: Synthesiser, tracker: PsoTracker, frames: range) -> list[Estimate]:
     first, *rest = frames
     return [tracker.start(observe(made, first), made.poses[first])] + [tracker.track(observe(made, i)) for i in rest]
 
 
-def errors_mm(estimates: list[Estimate], frames: range, made: Synthesiser = MADE) -> np.ndarray:
+def errors_mm(made: Synthesiser, estimates: list[Estimate], frames: range) -> np.ndarray:
     poses = np.array([estimate.pose for estimate in estimates])
     return endpoint_error(MODEL, poses, MODEL, made.poses[frames.start : frames.stop]).values
 
 
 @pytest.mark.parametrize(("variant", "highest"), [("default", 3.0), ("paper", 5.5)])
-def test_follows_everyday_motion(variant: Variant, highest: float) -> None:
+def test_follows_everyday_motion(made: Synthesiser, variant: Variant, highest: float) -> None:
     """At the paper's budget and the sensor's resolution; the paper reports 5 mm on its own sequence."""
     frames = range(100, 150)
-    estimates = follow(PsoTracker(MADE.options.hand, PsoOptions(variant=variant)), frames)
-    assert errors_mm(estimates, frames).mean() < highest
+    estimates = follow(made, PsoTracker(HandShape(), PsoOptions(variant=variant)), frames)
+    assert errors_mm(made, estimates, frames).mean() < highest
     assert {estimate.status for estimate in estimates[1:]} == {Status.TRACKED}
     assert min(estimate.confidence for estimate in estimates) > 0.8
     assert set(estimates[1].stage_ms) == set(PsoTracker.stages)
 
 
 def test_follows_noisy_readings() -> None:
-    made, frames = Synthesiser(Synthesis(sensor="kinect1")), range(100, 130)
-    estimates = follow(PsoTracker(MADE.options.hand), frames, made)
-    assert errors_mm(estimates, frames, made).mean() < 4
+    noisy, frames = Synthesiser(Synthesis(sensor="kinect1")), range(100, 130)
+    estimates = follow(noisy, PsoTracker(HandShape()), frames)
+    assert errors_mm(noisy, estimates, frames).mean() < 4
 
 
-def test_the_skin_finishes_what_cylinders_cannot_fit() -> None:
-    made, frames = Synthesiser(Synthesis(model="skin")), range(100, 115)
+def test_the_skin_finishes_what_cylinders_cannot_fit(everyday_skin: Synthesiser) -> None:
+    frames = range(100, 115)
     ways: dict[str, PsoOptions] = {"none": PsoOptions(), "skin": PsoOptions(finish="skin")}
     errors = {
-        name: errors_mm(follow(PsoTracker(MADE.options.hand, options), frames, made), frames, made).mean()
+        name: errors_mm(everyday_skin, follow(everyday_skin, PsoTracker(HandShape(), options), frames), frames).mean()
         for name, options in ways.items()
     }
     assert errors["skin"] < 2
@@ -62,48 +66,49 @@ def test_the_skin_finishes_what_cylinders_cannot_fit() -> None:
 
 def test_refuses_an_unknown_finish() -> None:
     with pytest.raises(InputError, match="choose none or skin"):
-        PsoTracker(MADE.options.hand, PsoOptions(finish="paint"))  # type: ignore[arg-type]
+        PsoTracker(HandShape(), PsoOptions(finish="paint"))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("frame", [10, 150, 300])
-def test_starts_by_itself(frame: int) -> None:
-    tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=64))
-    estimate = tracker.track(observe(MADE, frame))
+def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
+    tracker = PsoTracker(HandShape(), PsoOptions(resolution=64))
+    estimate = tracker.track(observe(made, frame))
     assert estimate.status is Status.STARTED
-    assert errors_mm([estimate], range(frame, frame + 1))[0] < 40
+    assert errors_mm(made, [estimate], range(frame, frame + 1))[0] < 5
 
 
-def test_a_hand_that_jumps_is_lost_and_found_again() -> None:
-    tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=64))
-    follow(tracker, range(10, 14))
-    statuses = [tracker.track(observe(MADE, 300)).status for _ in range(3)]
-    found = tracker.track(observe(MADE, 300))
-    assert Status.LOST in statuses or found.energy < PsoOptions().lost.energy
-    assert errors_mm([found], range(300, 301))[0] < 40
+def test_a_hand_that_jumps_is_found_in_the_same_frame(made: Synthesiser) -> None:
+    """The jump moves the joints by more than 3 cm on average, which a swarm about the prediction does not cover."""
+    tracker = PsoTracker(HandShape(), PsoOptions(resolution=64))
+    *_, before = follow(made, tracker, range(10, 14))
+    assert errors_mm(made, [before], range(300, 301))[0] > 30
+    found = tracker.track(observe(made, 300))
+    assert found.status is Status.TRACKED
+    assert errors_mm(made, [found], range(300, 301))[0] < 5
 
 
-def test_the_same_bits_for_any_number_of_threads() -> None:
+def test_the_same_bits_for_any_number_of_threads(made: Synthesiser) -> None:
     poses = [
-        np.array([e.pose for e in follow(PsoTracker(MADE.options.hand, PsoOptions(threads=threads)), range(0, 4))])
+        np.array([e.pose for e in follow(made, PsoTracker(HandShape(), PsoOptions(threads=threads)), range(0, 4))])
         for threads in (1, 3)
     ]
     np.testing.assert_array_equal(poses[0], poses[1])
 
 
-def test_seeds_matter() -> None:
-    poses = [follow(PsoTracker(MADE.options.hand, PsoOptions(seed=seed)), range(2))[1].pose for seed in (1, 2)]
+def test_seeds_matter(made: Synthesiser) -> None:
+    poses = [follow(made, PsoTracker(HandShape(), PsoOptions(seed=seed)), range(2))[1].pose for seed in (1, 2)]
     assert poses[0] is not None
     assert poses[1] is not None
     assert not np.array_equal(poses[0], poses[1])
 
 
-def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
+def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) -> None:
     options = PsoOptions(resolution=64)
-    whole = follow(PsoTracker(MADE.options.hand, options), range(0, 8))
-    resumed = PsoTracker(MADE.options.hand, options)
+    whole = follow(made, PsoTracker(HandShape(), options), range(0, 8))
+    resumed = PsoTracker(HandShape(), options)
     resumed.restore(whole[:5])
     for index in range(5, 8):
-        estimate = resumed.track(observe(MADE, index))
+        estimate = resumed.track(observe(made, index))
         np.testing.assert_array_equal(estimate.pose, whole[index].pose)
         assert estimate.status is whole[index].status
 
@@ -111,32 +116,37 @@ def test_a_tracker_that_recalls_goes_on_with_the_same_bits() -> None:
 class _Recording:
     """Frames of a synthetic motion; every eighth shows no hand."""
 
-    def __init__(self, count: int) -> None:
-        self.count = count
+    def __init__(self, made: Synthesiser, count: int) -> None:
+        self.made, self.count = made, count
 
     def __iter__(self):  # type: ignore[no-untyped-def]
-        camera = MADE.sensor.camera
+        camera = self.made.sensor.camera
         for i in range(self.count):
-            yield Frame(i, float(MADE.timestamps[i]), np.zeros(camera.shape, np.float32), None, camera)
+            yield Frame(i, float(self.made.timestamps[i]), np.zeros(camera.shape, np.float32), None, camera)
 
 
-class _Observer:
-    def set_target(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
-        return None if frame.index % 8 == 5 else observe(MADE, frame.index)
+class _Segmenter:
+    def __init__(self, made: Synthesiser) -> None:
+        self.made = made
+
+    def segment(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
+        return None if frame.index % 8 == 5 else observe(self.made, frame.index)
 
 
-def run(folder: Path, count: int, resume: bool = False) -> None:
-    tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=48, generations=8))
+def run(made: Synthesiser, folder: Path, count: int, resume: bool = False) -> None:
+    tracker = PsoTracker(HandShape(), PsoOptions(resolution=48, generations=8))
     with RunWriter(folder, {"tracker": "pso"}, ("segment", *tracker.stages), resume) as writer:
-        loop = track_sequence(_Recording(count), _Observer(), tracker, MODEL, writer, MADE.poses[0])  # type: ignore[arg-type]
+        loop = track_sequence(_Recording(made, count), _Segmenter(made), tracker, MODEL, writer, made.poses[0])  # type: ignore[arg-type]
         assert len(list(loop)) <= count
 
 
 @pytest.mark.parametrize("interrupted_after", [1, 4, 6, 7])
-def test_an_interrupted_run_ends_like_one_that_was_not(tmp_path: Path, interrupted_after: int) -> None:
-    run(tmp_path / "whole", 12)
-    run(tmp_path / "cut", interrupted_after)
-    run(tmp_path / "cut", 12, resume=True)
+def test_an_interrupted_run_ends_like_one_that_was_not(
+    made: Synthesiser, tmp_path: Path, interrupted_after: int
+) -> None:
+    run(made, tmp_path / "whole", 12)
+    run(made, tmp_path / "cut", interrupted_after)
+    run(made, tmp_path / "cut", 12, resume=True)
     assert (tmp_path / "cut" / "poses.csv").read_bytes() == (tmp_path / "whole" / "poses.csv").read_bytes()
     result = Run.load(tmp_path / "cut")
     assert result.status[5] == Status.ABSENT
@@ -144,14 +154,14 @@ def test_an_interrupted_run_ends_like_one_that_was_not(tmp_path: Path, interrupt
     assert set(result.stage_ms) == {"segment", "observe", "swarm"}
 
 
-def test_absent_frames_forget_the_track() -> None:
-    tracker = PsoTracker(MADE.options.hand, PsoOptions(resolution=64))
-    follow(tracker, range(0, 3))
+def test_absent_frames_forget_the_track(made: Synthesiser) -> None:
+    tracker = PsoTracker(HandShape(), PsoOptions(resolution=64))
+    follow(made, tracker, range(0, 3))
     tracker.restore([ABSENT])
-    assert tracker.track(observe(MADE, 3)).status is Status.STARTED
+    assert tracker.track(observe(made, 3)).status is Status.STARTED
 
 
 @pytest.mark.parametrize("pose", [np.zeros(26), np.full(27, np.nan)])
-def test_start_poses_of_the_wrong_form_are_refused(pose: np.ndarray) -> None:
+def test_start_poses_of_the_wrong_form_are_refused(made: Synthesiser, pose: np.ndarray) -> None:
     with pytest.raises(InputError, match="27 finite numbers"):
-        PsoTracker(HandShape()).start(observe(MADE, 0), pose)
+        PsoTracker(HandShape()).start(observe(made, 0), pose)

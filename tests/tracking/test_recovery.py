@@ -15,11 +15,12 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES, POSITION
 from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.status import Status
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
 from depthtrack.solver.swarm import SwarmOptions
-from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
 from depthtrack.tracking.proposals.local import finger_shift_proposals, local_proposals, search_one_finger
 from depthtrack.tracking.registry import create_tracker
@@ -28,42 +29,46 @@ from depthtrack.tracking.state import TrackingThresholds, TrackState
 from depthtrack.tracking.trackers.pso import PsoOptions
 from tests.support.observations import observe
 
-MADE = Synthesiser(Synthesis(model="skin"))
-MODEL = HandModel(MADE.options.hand)
+MODEL = HandModel(HandShape())
 
 
-def _shifted(pose: np.ndarray) -> np.ndarray:
+@pytest.fixture(scope="module")
+def made(everyday_skin: Synthesiser) -> Synthesiser:
+    return everyday_skin
+
+
+def _shifted(made: Synthesiser, pose: np.ndarray) -> np.ndarray:
     """The palm one finger further, the middle finger folded: each other finger where the next one was."""
     wrong = pose.copy()
-    towards_thumb = rotation_matrix(pose[3:7])[:, 0] * MADE.options.hand.mirror
+    towards_thumb = rotation_matrix(pose[3:7])[:, 0] * made.options.hand.mirror
     wrong[POSITION] += 0.02 * towards_thumb
     wrong[ANGLES] = POSTURES["open"]
     wrong[ANGLES][8:12] = POSTURES["fist"][8:12]
     return wrong
 
 
-def test_another_place_is_found_where_a_swarm_stays() -> None:
+def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
     """From one finger further, in a single frame: a swarm of the same spread does not get there."""
-    frame, wrong = 11, _shifted(MADE.poses[11])
-    o = observe(MADE, frame)
-    with RasterScorer(MADE.options.hand) as scorer:
+    frame, wrong = 11, _shifted(made, made.poses[11])
+    o = observe(made, frame)
+    with RasterScorer(made.options.hand) as scorer:
         scorer.set_target(Target(o.camera, o.skin, o.depth).reduced(96))
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
         stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
         options = SearchOptions(apart=0.1)
         generator = np.random.default_rng(5)
         found, _ = find_candidates(scorer, local_proposals(wrong, generator, options.hypotheses), generator, options)
-    errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, MADE.poses[[frame, frame]]).values
+    errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, made.poses[[frame, frame]]).values
     assert errors[1] < 0.7 * errors[0]
 
 
-def test_poses_close_by_are_possible_and_close() -> None:
-    poses = local_proposals(MADE.poses[20], np.random.default_rng(1), 500)
+def test_poses_close_by_are_possible_and_close(made: Synthesiser) -> None:
+    poses = local_proposals(made.poses[20], np.random.default_rng(1), 500)
     angles = poses[:, ANGLES]
     assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
-    assert np.linalg.norm(poses[:, POSITION] - MADE.poses[20, POSITION], axis=1).max() < 0.12
+    assert np.linalg.norm(poses[:, POSITION] - made.poses[20, POSITION], axis=1).max() < 0.12
     # Some keep the fingers, as far as they are varied, and others change them all.
-    change = np.abs(angles - MADE.poses[20, ANGLES]).max(axis=1)
+    change = np.abs(angles - made.poses[20, ANGLES]).max(axis=1)
     assert change.min() < 0.4
     assert np.median(change) > 0.6
 
@@ -77,11 +82,11 @@ def test_orientations_that_no_wrist_allows_are_left_out() -> None:
     assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
 
 
-def test_a_finger_that_is_elsewhere_is_found() -> None:
+def test_a_finger_that_is_elsewhere_is_found(made: Synthesiser) -> None:
     """Each finger in turn is bent or stretched; moved alone, it is found again, and no other one moves."""
     frame = 11
-    o, truth = observe(MADE, frame), MADE.poses[frame]
-    with RasterScorer(MADE.options.hand) as scorer:
+    o, truth = observe(made, frame), made.poses[frame]
+    with RasterScorer(made.options.hand) as scorer:
         scorer.set_target(Target(o.camera, o.skin, o.depth))
         for finger in range(1, 5):
             wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
@@ -94,9 +99,9 @@ def test_a_finger_that_is_elsewhere_is_found() -> None:
             assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))
 
 
-def test_one_finger_further_undoes_a_shift() -> None:
+def test_one_finger_further_undoes_a_shift(made: Synthesiser) -> None:
     """A hand one finger beside its place, either way: three of its four fingers are where they should be again."""
-    truth = MADE.poses[11].copy()
+    truth = made.poses[11].copy()
     truth[ANGLES] = POSTURES["open"]
     for way in (0, 1):
         shifted = finger_shift_proposals(MODEL, truth)[way]
@@ -109,18 +114,18 @@ def test_one_finger_further_undoes_a_shift() -> None:
 
 
 @pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
-def test_where_a_hand_was_is_remembered_for_half_a_second(frames: int, remembered: bool) -> None:
-    memory, pose = TrackState(TrackingThresholds()), MADE.poses[0]
+def test_where_a_hand_was_is_remembered_for_half_a_second(made: Synthesiser, frames: int, remembered: bool) -> None:
+    memory, pose = TrackState(TrackingThresholds()), made.poses[0]
     memory.commit(pose, 5.0, 0.9, Status.TRACKED, {})
     for _ in range(frames):
-        lost = memory.commit(MADE.poses[50], 90.0, 0.1, Status.TRACKED, {})
+        lost = memory.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {})
         assert lost.status is Status.LOST
         assert memory.pose is None
     assert (memory.last_trusted is pose) == remembered
 
 
-def test_a_pose_of_unusual_energy_does_not_guide() -> None:
-    memory, pose = TrackState(TrackingThresholds()), MADE.poses[0]
+def test_a_pose_of_unusual_energy_does_not_guide(made: Synthesiser) -> None:
+    memory, pose = TrackState(TrackingThresholds()), made.poses[0]
     for _ in range(5):
         memory.commit(pose, 16.0, 0.8, Status.TRACKED, {})
         assert memory.predicted_pose is not None
@@ -143,9 +148,9 @@ class _Levels:
         return np.abs(poses[:, 13] - self.angle)
 
 
-def test_each_of_the_best_postures_of_a_finger_leads_on() -> None:
+def test_each_of_the_best_postures_of_a_finger_leads_on(made: Synthesiser) -> None:
     scorer = _Levels(0.7)
-    search_one_finger(scorer, MADE.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
+    search_one_finger(scorer, made.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
     first, second = scorer.seen[0], scorer.seen[1]
     kept = first[np.argsort(scorer.score(first), kind="stable")[:8]]
     assert np.array_equal(second[:8], kept)
@@ -156,39 +161,39 @@ def test_each_of_the_best_postures_of_a_finger_leads_on() -> None:
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
-def test_a_start_does_not_depend_on_what_was_tracked_before(name: str) -> None:
+def test_a_start_does_not_depend_on_what_was_tracked_before(made: Synthesiser, name: str) -> None:
     with (
-        closing(create_tracker(name, MADE.options.hand)) as fresh,
-        closing(create_tracker(name, MADE.options.hand)) as used,
+        closing(create_tracker(name, made.options.hand)) as fresh,
+        closing(create_tracker(name, made.options.hand)) as used,
     ):
-        used.start(observe(MADE, 30), MADE.poses[30])
-        first, second = (tracker.start(observe(MADE, 120)) for tracker in (fresh, used))
+        used.start(observe(made, 30), made.poses[30])
+        first, second = (tracker.start(observe(made, 120)) for tracker in (fresh, used))
     assert first.pose is not None
     assert first.pose.tolist() == second.pose.tolist()  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
-def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(name: str) -> None:
+def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synthesiser, name: str) -> None:
     """One frame shows a few crumbs far apart, as no hand does: it is lost, and found again beside where it was."""
-    frames = [observe(MADE, index) for index in (20, 21, 22, 23)]
+    frames = [observe(made, index) for index in (20, 21, 22, 23)]
     crumbs = np.zeros_like(frames[1].skin)
     crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
     frames[1] = replace(frames[1], skin=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
     with (
-        closing(create_tracker(name, MADE.options.hand)) as whole,
-        closing(create_tracker(name, MADE.options.hand)) as cut,
+        closing(create_tracker(name, made.options.hand)) as whole,
+        closing(create_tracker(name, made.options.hand)) as cut,
     ):
-        estimates = [whole.start(frames[0], MADE.poses[20]), *(whole.track(frame) for frame in frames[1:])]
+        estimates = [whole.start(frames[0], made.poses[20]), *(whole.track(frame) for frame in frames[1:])]
         assert [estimate.status for estimate in estimates[1:3]] == ["lost", "started"]
         cut.restore(estimates[:2])
         again = [cut.track(frame) for frame in frames[2:]]
     poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
     assert np.array_equal(poses, poses_again)
-    assert endpoint_error(MODEL, poses, MODEL, MADE.poses[[22, 23]]).values.max() < 10
+    assert endpoint_error(MODEL, poses, MODEL, made.poses[[22, 23]]).values.max() < 10
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
-def test_the_papers_have_no_second_thoughts(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_papers_have_no_second_thoughts(made: Synthesiser, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The hand jumps by as much as makes every other variant think again."""
     module = {"ik": "fit_recovery", "pso": "swarm_recovery"}[name]
     thoughts = import_module(f"depthtrack.tracking.stages.{module}").Recovery
@@ -196,9 +201,9 @@ def test_the_papers_have_no_second_thoughts(name: str, monkeypatch: pytest.Monke
     for method in ("search_locally", "refine_per_finger"):
         monkeypatch.setattr(thoughts, method, _noted(method, getattr(thoughts, method), thought))
     for variant in ("paper", "default"):
-        with closing(create_tracker(name, MADE.options.hand, variant=variant)) as tracker:
-            tracker.start(observe(MADE, 20), MADE.poses[20])
-            tracker.track(observe(MADE, 130))
+        with closing(create_tracker(name, made.options.hand, variant=variant)) as tracker:
+            tracker.start(observe(made, 20), made.poses[20])
+            tracker.track(observe(made, 130))
         assert bool(thought) == (variant == "default")
 
 
