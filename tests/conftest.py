@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from depthtrack.hand.rig.gltf_writer import export_glb
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 # A first call compiles, and a loaded machine is slow: time limits of single examples mean nothing here.
@@ -32,3 +35,12 @@ def real_data() -> Path:
     if not folder or not Path(folder).is_dir():
         pytest.skip("no real recordings: set DEPTHTRACK_DATA to their folder")
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def own_glb(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rigged hand: the average hand's built skin, exported as GLB."""
+    pytest.importorskip("pygltflib", reason="rigged hands need the extra: pip install 'depthtrack[gltf]'")
+    path = tmp_path_factory.mktemp("rig") / "own.glb"
+    export_glb(Skin.of(HandShape()), path)
+    return path

@@ -8,16 +8,16 @@ All sizes are stored for a right hand; a left hand is its mirror image in x.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self, cast, get_args
+from typing import Any, Self, cast, get_args
 
 import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
 from depthtrack.hand.pose import FINGERS
+from depthtrack.hand.rig_file import RigFile
+from depthtrack.hand.rig_file import Side as Side
 from depthtrack.types import Array
-
-Side = Literal["right", "left"]
 
 # Phalanx lengths and soft tissue at the tips: Buryanov and Kotiuk, "Proportions of hand segments", Int. J. Morphol.
 # 28(3), 2010 (means of 66 adults); the last length reaches the skin of the fingertip: distal phalanx + soft tissue.
@@ -52,11 +52,16 @@ _SOURCE = "depthtrack default: Buryanov and Kotiuk 2010; Greiner 1991; Garrett 1
 
 @dataclass(frozen=True)
 class HandShape:
-    """Every size of a hand: metres in Python, millimetres in the JSON file. `scale` multiplies all of them.
+    """Sizes of one hand, and the file of its surface if that is a user's rigged mesh.
 
-    Arrays are read-only and hold the right hand, unscaled: `lengths` (5, 3) phalanges from the palm outward,
-    `radii` (5, 4) at base, two joints and tip, `bases` (5, 3) base joints in the palm frame, `thumb_direction`
-    and `thumb_pad` (3,) where the resting thumb points and where its pad faces.
+    Lengths are metres here and millimetres in the JSON file. `scale` multiplies all of them. Arrays are read-only and
+    hold the right hand, unscaled, in the palm frame.
+
+    `lengths` (5, 3): phalanges from the palm outward.
+    `radii` (5, 4): half the thickness at the base, at two joints and at the tip.
+    `bases` (5, 3): base joints.
+    `thumb_direction`, `thumb_pad` (3,): directions of the resting thumb and of its pad.
+    `rig`: the mesh that the sizes were measured on; None if the surface is built from the sizes (`Skin.of`).
     """
 
     side: Side = "right"
@@ -72,6 +77,7 @@ class HandShape:
     wrist_breadth: float = 0.057
     wrist_thickness: float = 0.039
     source: str = _SOURCE
+    rig: RigFile | None = None
 
     def __post_init__(self) -> None:
         if self.side not in get_args(Side):
@@ -127,15 +133,17 @@ class HandShape:
                 for f, finger in enumerate(FINGERS)
             },
             "source": self.source,
+            **({} if self.rig is None else {"rig": self.rig.to_fields()}),
         }
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
-        """Return the hand of a `hand.json`.
+        """Return the hand of a `hand.json`; the path of its rig is relative to the file's folder.
 
         Raises: InputError if the file is missing or malformed, or a size is missing or out of range.
         """
-        return read_json(path, "the hand file", cls.from_fields, made_by="depthtrack synth")
+        shape = read_json(path, "the hand file", cls.from_fields, made_by="depthtrack synth")
+        return shape if shape.rig is None else shape.with_(rig=shape.rig.beside(path.parent.resolve()))
 
     @classmethod
     def from_fields(cls, fields: dict[str, Any]) -> Self:
@@ -153,6 +161,7 @@ class HandShape:
             thumb_direction=_frozen(fields["thumb_at_rest"]["direction"]),
             thumb_pad=_frozen(fields["thumb_at_rest"]["pad"]),
             source=str(fields.get("source", "")),
+            rig=None if fields.get("rig") is None else RigFile.from_fields(fields["rig"]),
             **{name: float(fields["palm"][f"{name}_mm"]) / 1000 for name in _PALM_SIZES},
         )
 
@@ -165,6 +174,8 @@ _ARRAY_SHAPES = {
     "thumb_pad": (3,),
 }
 _PALM_SIZES = ("palm_breadth", "palm_length", "palm_thickness", "wrist_breadth", "wrist_thickness")
+SIZE_NAMES = (*_ARRAY_SHAPES, *_PALM_SIZES)
+"""Fields of `HandShape` that a rig fixes: all but scale, side, source and rig."""
 
 
 def _frozen(values: Any) -> Array:

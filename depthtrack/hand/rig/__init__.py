@@ -1,1 +1,1 @@
-"""Rigged hands in glTF: reading, measuring, writing."""
+"""Rigged hands in glTF files: read, measure, write."""

@@ -1,4 +1,4 @@
-"""Writes a skin as a rigged GLB file that 3D programs open: mesh, 16 joints, five fingertips, weights.
+"""Write a skin as a rigged GLB file: mesh, 16 joints, five fingertips, weights.
 
 Needs the optional library pygltflib: `pip install 'depthtrack[gltf]'`. Plain meshes go through `Skin.to_trimesh`.
 """
@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from depthtrack.files import replace_atomically
 from depthtrack.hand.kinematics import BODY_COUNT, JOINT_NAMES, HandModel, body_of
 from depthtrack.hand.pose import FINGERS
-from depthtrack.hand.rig.gltf import gltf_library
+from depthtrack.hand.rig.gltf_document import gltf_library
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.types import Array
 
@@ -22,11 +22,14 @@ _VERTEX_DATA, _INDEX_DATA = 34962, 34963
 
 
 def export_glb(skin: Skin, path: Path) -> None:
-    """Write the skin at rest as GLB: metres, palm frame, y towards the fingers. Complete or absent.
+    """Write the skin at rest as GLB: metres, palm frame, y towards the fingers. The file is complete or absent.
 
-    Joints are named as `kinematics.JOINT_NAMES`, fingertips hang on the last ones as `thumb_tip` to `little_tip`;
-    the joint `wrist` sits at the wrist. Raises InputError when the file cannot be written, MissingExtraError without
-    pygltflib.
+    Joints are named as `kinematics.JOINT_NAMES`; `thumb_tip` to `little_tip` hang on the last ones. The joint `wrist`
+    is at the wrist.
+
+    Raises:
+        InputError: if the file cannot be written.
+        MissingExtraError: if pygltflib is not installed.
     """
     library = gltf_library()
     rest = _joint_transforms(skin)
@@ -63,14 +66,14 @@ def export_glb(skin: Skin, path: Path) -> None:
 
 
 def _joint_transforms(skin: Skin) -> Array:
-    """T_palm_joint (16, 4, 4) at rest: the bodies' frames, the palm's moved to the wrist."""
+    """Return T_palm_joint (16, 4, 4) at rest: the bodies' frames, the palm's moved to the wrist."""
     rest = np.linalg.inv(skin.T_body_rest)
     rest[0, :3, 3] += rest[0, :3, :3] @ skin.shape.wrist
     return np.asarray(rest)
 
 
 def _nodes(library: Any, skin: Skin, rest: Array) -> list[Any]:
-    """The tree of 16 joints, then the five fingertips."""
+    """Return the tree of 16 joints, then the five fingertips."""
     lengths = HandModel(skin.shape).lengths
     nodes = [library.Node(name=name, children=[]) for name in JOINT_NAMES]
     _place(nodes[0], rest[0])
@@ -98,7 +101,7 @@ class _Blob:
         self.library, self.gltf, self.data = library, gltf, bytearray()
 
     def add(self, array: NDArray[Any], kind: str, component: int, target: int | None) -> int:
-        """Append an array (count, width); returns the index of its accessor."""
+        """Append an array (count, width) and return the index of its accessor."""
         view = self.library.BufferView(buffer=0, byteOffset=len(self.data), byteLength=array.nbytes, target=target)
         accessor = self.library.Accessor(
             bufferView=len(self.gltf.bufferViews),

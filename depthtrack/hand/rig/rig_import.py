@@ -1,63 +1,121 @@
-"""A user's own rigged hand as a skin: its joints give the `HandShape`, so that tracker and mesh agree.
+"""Read a user's rigged hand as a skinned mesh of 16 bodies, and measure its `HandShape`.
 
 The palm frame follows the rig: y from the wrist to the middle finger's knuckle, x across the knuckles, z out of the
-palm. Bones that are no phalanges (wrist, metacarpals) belong to the palm, fingertips to the last phalanx; of a whole
-body only the hand is kept.
+palm. Bones that are no phalanges (wrist, metacarpals) belong to the palm, fingertips to the last phalanx. Of a whole
+body only the hand is kept. The joints are the rig's own. Each bone turns about the axes of `HandModel`: a rig whose
+finger joints are not in one plane meets its bind pose only approximately.
 """
 
-import json
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_text
+from depthtrack.files import read_json, read_text
 from depthtrack.hand.kinematics import BODY_COUNT, body_of
 from depthtrack.hand.pose import FINGERS
-from depthtrack.hand.rig.gltf import Rig, read_rigs
+from depthtrack.hand.rig.closing import close_holes
+from depthtrack.hand.rig.gltf import Rig, gltf_digest, read_rigs
 from depthtrack.hand.rig.rig_joints import finger_joints, mapped_joints, side_of
 from depthtrack.hand.rig.rig_measurement import bone_frames, measured_shape
-from depthtrack.hand.shape import Side
-from depthtrack.hand.skin.mesh import Skin
-from depthtrack.types import Array, Index
+from depthtrack.hand.rig_file import RigFile, Side
+from depthtrack.hand.shape import HandShape
+from depthtrack.types import Array, Faces, Index
+
+_LENGTH = (0.05, 0.5)
+"""Metres from wrist to middle fingertip that a hand may have: a factor of ten, so that one decimal unit fits."""
+_DECIMAL_UNITS = (1.0, 0.1, 0.01, 0.001)
+"""Units of length tried, metres: glTF's own, then those of programs that do not convert."""
+_UNCLEAR_SIDE, _CLEAR_SIDE = 0.2, 0.5
+"""Evidence for a side (sum of five sines) below which the shape does not show it, and above which it overrules names:
+a mirrored node makes a left hand of joints named for the right."""
 
 
-def load_skin(
-    path: Path, side: Side | None = None, mapping: Mapping[str, str] | Path | None = None, unit: float = 1.0
-) -> Skin:
-    """The skin of a rigged hand in a glTF file (.glb, .gltf); `skin.shape` holds the sizes measured on it.
+@dataclass(frozen=True)
+class RiggedHand:
+    """A user's rigged hand: see `hand.skin.mesh.Skin` for the arrays.
 
-    `side` where names and shape leave it open, or to choose one of two hands; `mapping` from `kinematics.JOINT_NAMES`
-    to the rig's joint names, or a JSON file of it, where they are not recognised; `unit` metres per unit of the file
-    (glTF means 1). The joints are the rig's own; each bone turns about our axes, so a rig whose joints do not lie in
-    one plane a finger meets its bind pose up to that. Raises InputError for files, names and sizes that do not make
-    a hand, MissingExtraError without pygltflib.
+    `shape`: sizes measured on the mesh, with the reference to its file.
     """
-    if isinstance(mapping, Path):
-        mapping = _read_mapping(mapping)
+
+    shape: HandShape
+    rest: Array
+    faces: Faces
+    weights: Array
+    T_body_rest: Array
+
+
+def read_rigged_hand(path: Path, side: Side | None = None, unit: float | None = None) -> RiggedHand:
+    """Read and measure the hand of a glTF file (.glb, .gltf).
+
+    Joints that are not recognised by name are mapped by the file `NAME.joints.json` beside it: one JSON object from
+    `kinematics.JOINT_NAMES` to the rig's joint names.
+
+    `side`: the hand to read; found by names and shape if None.
+    `unit`: metres per unit of the file; if None, the first decimal unit that gives a hand of usual length.
+
+    Raises:
+        InputError: if files, names or sizes do not make a hand.
+        MissingExtraError: if pygltflib is not installed.
+    """
     try:
+        mapping = _read_mapping(path)
         rig, phalanges = _rig_of_hand(read_rigs(path), side, mapping)
         wrist = _wrist(rig, phalanges, mapping)
         side = side or _side(rig, phalanges, wrist)
-        return _skin(_hand_alone(rig, wrist), phalanges, wrist, side, unit, f"rigged mesh {path.name}")
+        return _measured(_hand_alone(rig, wrist), phalanges, wrist, side, unit, path)
     except InputError as error:
         raise error if str(path) in str(error) else InputError(f"{path}: {error}") from error
 
 
-def _read_mapping(path: Path) -> Mapping[str, str]:
-    try:
-        mapping = json.loads(read_text(path))
-    except (InputError, ValueError, RecursionError) as error:
-        raise InputError(f"cannot read the joint mapping {path}: {error}") from error
-    if not isinstance(mapping, dict) or not all(isinstance(joint, str) for joint in mapping.values()):
-        raise InputError(f'{path} must be one JSON object like {{"index_0": "name in the rig", ...}}')
-    return mapping
+def reread_rigged_hand(file: RigFile) -> RiggedHand:
+    """Read a rigged hand again.
+
+    Raises:
+        InputError: if the file is missing, or is not the one that the reference was made for.
+        MissingExtraError: if pygltflib is not installed.
+    """
+    found = rig_digest(file.path)
+    if found != file.sha256:
+        raise InputError(
+            f"the rig {file.path} must have the SHA-256 {file.sha256[:12]}... of the hand measured on it, found "
+            f"{found[:12]}...: restore the file, or give the new one with --hand"
+        )
+    return read_rigged_hand(file.path, file.side, file.unit)
+
+
+def rig_digest(path: Path) -> str:
+    """Return the SHA-256 of a rig: its glTF file, external buffers and joint mapping.
+
+    Raises:
+        InputError: if the file cannot be read or is not glTF.
+    """
+    digest, mapping = gltf_digest(path), mapping_path(path)
+    return sha256((digest + read_text(mapping)).encode()).hexdigest() if mapping.exists() else digest
+
+
+def mapping_path(path: Path) -> Path:
+    """Return the path of the joint mapping that belongs to a glTF file."""
+    return path.with_suffix(".joints.json")
+
+
+def _read_mapping(rig: Path) -> Mapping[str, str] | None:
+    path = mapping_path(rig)
+    return read_json(path, "the joint mapping", _mapping) if path.exists() else None
+
+
+def _mapping(fields: Any) -> Mapping[str, str]:
+    if not isinstance(fields, dict) or not all(isinstance(joint, str) for joint in fields.values()):
+        raise InputError('a joint mapping must be one JSON object like {"index_0": "name in the rig", ...}')
+    return fields
 
 
 def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, str] | None) -> tuple[Rig, Index]:
-    """The first rig with five fingers, and its phalanges (5, 3)."""
+    """Return the first rig with five fingers, and its phalanges (5, 3)."""
     for rig in rigs:
         try:
             if mapping is not None:
@@ -70,7 +128,7 @@ def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, s
 
 
 def _wrist(rig: Rig, phalanges: Index, mapping: Mapping[str, str] | None) -> int:
-    """The joint at the wrist: as mapped, or the last one that all fingers hang on, or by name in a flat rig."""
+    """Return the joint at the wrist: as mapped, else the last ancestor of all fingers, else by name in a flat rig."""
     if mapping is not None and "wrist" in mapping:
         return rig.names.index(mapping["wrist"])
     above = [_ancestors(rig, int(joint)) for joint in phalanges[:, 0]]
@@ -92,54 +150,58 @@ def _ancestors(rig: Rig, joint: int) -> list[int]:
 
 
 def _hand_alone(rig: Rig, wrist: int) -> Rig:
-    """The rig without faces that other joints than the wrist's descendants move for the most part."""
+    """Return the rig without faces that joints above the wrist move for the most part, its holes closed."""
     hand = np.array([joint == wrist or wrist in _ancestors(rig, joint) for joint in range(len(rig.names))])
-    if hand.sum() < BODY_COUNT:  # a flat rig: nothing tells the hand from the rest
-        return rig
-    kept = np.sum(rig.weights * hand[rig.bound], axis=1) >= 0.5
-    faces = rig.faces[kept[rig.faces].all(axis=1)]
-    used = np.unique(faces)
-    index = np.zeros(len(kept), dtype=np.int64)
-    index[used] = np.arange(len(used))
-    return replace(
-        rig, vertices=rig.vertices[used], faces=index[faces], bound=rig.bound[used], weights=rig.weights[used]
-    )
+    if hand.sum() >= BODY_COUNT:  # fewer in a flat rig, where the hierarchy does not separate the hand
+        kept = np.sum(rig.weights * hand[rig.bound], axis=1) >= 0.5
+        faces = rig.faces[kept[rig.faces].all(axis=1)]
+        used = np.unique(faces)
+        index = np.zeros(len(kept), dtype=np.int64)
+        index[used] = np.arange(len(used))
+        rig = replace(
+            rig, vertices=rig.vertices[used], faces=index[faces], bound=rig.bound[used], weights=rig.weights[used]
+        )
+    return close_holes(rig)
 
 
 def _side(rig: Rig, phalanges: Index, wrist: int) -> Side:
-    """From the names; else from the way the fingers bend and the thumb stands out, both towards the palm."""
-    named = {side for joint in phalanges.ravel() if (side := side_of(rig.names[joint])) is not None}
-    if len(named) == 1:
-        return named.pop()
+    """Return the side by the bend of fingers and thumb, both towards the palm, and by the joints' names."""
     first, second, third = (rig.joints[phalanges[:, k]] for k in range(3))
     palmar_if_right = _unit(np.cross(first[1] - first[4], first[2] - rig.joints[wrist]))
     bend = _unit(third - second) - _unit(second - first)
     evidence = float(np.sum(bend[1:] @ palmar_if_right) + _unit(third[0] - first[0]) @ palmar_if_right)
-    if abs(evidence) < 0.2:
-        raise InputError("neither names nor shape tell whether the hand is left or right: say which, side=...")
-    return "right" if evidence > 0 else "left"
+    shown: Side = "right" if evidence > 0 else "left"
+    named = {side for joint in phalanges.ravel() if (side := side_of(rig.names[joint])) is not None}
+    if len(named) == 1 and abs(evidence) < _CLEAR_SIDE:
+        return named.pop()
+    if abs(evidence) < _UNCLEAR_SIDE:
+        raise InputError("neither names nor shape show whether the hand is left or right: give the side")
+    return shown
 
 
-def _skin(rig: Rig, phalanges: Index, wrist: int, side: Side, unit: float, source: str) -> Skin:
+def _measured(rig: Rig, phalanges: Index, wrist: int, side: Side, unit: float | None, path: Path) -> RiggedHand:
     weights = _body_weights(rig, phalanges)
     points = np.empty((5, 4, 3))
     points[:, :3] = rig.joints[phalanges]
     for finger in range(5):
         points[finger, 3] = _tip(rig, int(phalanges[finger, 2]), points[finger], weights[:, body_of(finger, 2)], finger)
-    _check_size(unit * np.linalg.norm(np.diff(points[2], axis=0, prepend=rig.joints[[wrist]]), axis=-1).sum(), unit)
+    unit = _checked_unit(np.linalg.norm(np.diff(points[2], axis=0, prepend=rig.joints[[wrist]]), axis=-1).sum(), unit)
 
     R, centre = _palm_frame(rig.joints[wrist], points, side)
     points, vertices = ((unit * (p - centre)) @ R.T for p in (points, rig.vertices))
     # Sizes are a right hand's: a left one is measured in the mirror.
     flip = np.array([1.0 if side == "right" else -1.0, 1, 1])
-    shape = measured_shape(points * flip, vertices * flip, weights, source)
+    shape = measured_shape(points * flip, vertices * flip, weights, f"rigged mesh {path.name}")
     mirror = np.diag([*flip, 1.0])
     T_palm_body = mirror @ bone_frames(shape, points * flip) @ mirror
-    return Skin(shape.with_(side=side), vertices, rig.faces, weights, np.asarray(np.linalg.inv(T_palm_body)))
+    shape = shape.with_(side=side, rig=RigFile(path.resolve(), rig_digest(path), side, unit))
+    # As a hand file gives it back: the same sizes, to the last bit, whether read from the rig or from the file.
+    shape = HandShape.from_fields(shape.to_fields())
+    return RiggedHand(shape, vertices, rig.faces, weights, np.asarray(np.linalg.inv(T_palm_body)))
 
 
 def _body_weights(rig: Rig, phalanges: Index) -> Array:
-    """(V, 16): each joint's weight goes to the phalanx that it is or hangs on, else to the palm."""
+    """Return weights (V, 16): each joint's weight goes to the phalanx that it is or hangs on, else to the palm."""
     body = {int(joint): 1 + i for i, joint in enumerate(phalanges.ravel())}
     bodies = np.array(
         [next((body[j] for j in (joint, *_ancestors(rig, joint)) if j in body), 0) for joint in range(len(rig.names))]
@@ -150,7 +212,7 @@ def _body_weights(rig: Rig, phalanges: Index) -> Array:
 
 
 def _tip(rig: Rig, last: int, joints: Array, weights: Array, finger: int) -> Array:
-    """The skin's furthest point (3,) along the last bone, whose direction a tip joint gives, or else the skin."""
+    """Return the skin's furthest point (3,) along the last bone, which points to a tip joint or along the skin."""
     own = rig.vertices[weights >= 0.5] - joints[2]
     along = _unit(joints[2] - joints[1])
     if len(own) < 4 or np.max(own @ along) <= 0:
@@ -164,16 +226,19 @@ def _tip(rig: Rig, last: int, joints: Array, weights: Array, finger: int) -> Arr
     return np.asarray(joints[2] + direction * np.max(own @ direction))
 
 
-def _check_size(length: float, unit: float) -> None:
-    if not 0.05 <= length <= 0.5:
-        raise InputError(
-            f"a hand must be 50 to 500 mm long from wrist to fingertip, found {length * 1000:.4g} mm with unit {unit:g}"
-            f" m: give its unit of length (unit={0.18 / length * unit:.1g} may fit)"
-        )
+def _checked_unit(length: float, unit: float | None) -> float:
+    """Return the unit (m) that gives a hand of usual length."""
+    for tried in _DECIMAL_UNITS if unit is None else (unit,):
+        if _LENGTH[0] <= tried * length <= _LENGTH[1]:
+            return tried
+    raise InputError(
+        f"a hand must be {_LENGTH[0] * 1000:.0f} to {_LENGTH[1] * 1000:.0f} mm long from wrist to fingertip, found "
+        f"{(unit or 1.0) * length * 1000:.4g} mm: export it in metres, as glTF has it"
+    )
 
 
 def _palm_frame(wrist: Array, points: Array, side: Side) -> tuple[Array, Array]:
-    """Rotation (3, 3) from the rig's frame into the palm's, and the palm's centre (3,) in the rig's."""
+    """Return the rotation (3, 3) from the rig's frame into the palm's, and the palm's centre (3,) in the rig's."""
     y = points[2, 0] - wrist
     across = points[1, 0] - points[4, 0] if side == "right" else points[4, 0] - points[1, 0]
     z = _unit(np.cross(across, y))

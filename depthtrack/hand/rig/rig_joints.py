@@ -1,10 +1,10 @@
-"""Finds the 15 finger joints of a hand among the joints of anybody's rig, by name and by place in the tree.
+"""Find the 15 finger joints of a hand among the joints of a rig, by name and by place in the tree.
 
-Rigs agree on little but the fingers' names: `thumb.01.R` and `f_index.01.R` (Rigify), `finger2-1.R` (MakeHuman),
-`index_01_r` (Unreal), `mixamorig:RightHandIndex1` (Mixamo), `rightIndexProximal` (VRM, Unity),
-`index-finger-phalanx-proximal` (OpenXR, WebXR), `b_r_index1` (Oculus), `lindex0` (MANO's kin). So the name gives the
-finger and the side, and the last three joints of a finger that are no tips are its phalanges: a metacarpal, where a
-rig has one, comes before them.
+Naming schemes that the tests cover: `thumb.01.R` and `f_index.01.R` (Blender's Rigify), `finger2-1.R` (MakeHuman),
+`index_01_r` (Unreal), `mixamorig:RightHandIndex1` (Mixamo), `rightIndexProximal` (VRM, Unity), `R_IndexProximal`
+(Unity XR Hands), `index-finger-phalanx-proximal` (OpenXR, WebXR), `INDEX_FINGER_MCP` (MediaPipe), `b_r_index1`
+(Oculus), `lindex0` (MANO). The name gives the finger and the side. The last three joints of a finger that are no tips
+are its phalanges: a metacarpal, if the rig has one, comes before them.
 """
 
 import re
@@ -20,21 +20,25 @@ from depthtrack.types import Array, Index
 
 _FINGER_WORDS = (("thumb",), ("index", "forefinger"), ("middle",), ("ring",), ("little", "pinky", "pinkie"))
 _PHALANX_WORDS = {"meta": 0, "carpal": 0, "prox": 1, "inter": 2, "medial": 2, "dist": 3}
+_JOINT_WORDS = {"cmc": 0, "mcp": 1, "pip": 2, "ip": 3, "dip": 3}
 _SIDE_WORDS: tuple[tuple[Side, str], ...] = (("left", "l"), ("right", "r"))
 _TIP_WORDS = ("tip", "end", "nub", "null", "effector")
 _NOT_A_HAND = ("toe", "foot", "leg")
 
 
 def finger_joints(names: Sequence[str], parents: Index, loads: Array, side: Side | None) -> Index:
-    """(5, 3) joints of the phalanges, from the palm outward.
+    """Return the joints (5, 3) of the phalanges, from the palm outward.
 
-    `names` and `parents` (J,) describe the rig, `loads` (J,) how much skin each joint moves: a last joint that moves
-    none is a tip. Joints named for the other side than `side` are passed over. Raises InputError naming the fingers
-    that are not found, and when both hands are there and `side` is None.
+    `names`, `parents` (J,): the rig's joints.
+    `loads` (J,): total skin weight of each joint; a fourth joint without weight is a tip.
+    `side`: joints named for the other side are left out.
+
+    Raises:
+        InputError: if a finger has fewer than three joints, or if both hands are there and `side` is None.
     """
     sides = {s for name in names if finger_of(name) is not None and (s := side_of(name)) is not None}
     if side is None and len(sides) == 2:
-        raise InputError("the rig holds both hands: say which one to read, side 'left' or 'right'")
+        raise InputError("the rig holds both hands: give the one to read, side 'left' or 'right'")
     found = np.empty((5, 3), dtype=np.int64)
     missing = []
     for finger in range(5):
@@ -52,16 +56,18 @@ def finger_joints(names: Sequence[str], parents: Index, loads: Array, side: Side
             found[finger] = chain[-3:]
     if missing:
         raise InputError(
-            f"three joints a finger are needed, not found by name for: {', '.join(missing)}. Give a mapping from "
-            f"{JOINT_NAMES[1]}, ..., {JOINT_NAMES[-1]} to the rig's names, which are: {_shortened(names)}"
+            f"three joints a finger are needed, not found by name for: {', '.join(missing)}; give a mapping from "
+            f"{JOINT_NAMES[1]}, ..., {JOINT_NAMES[-1]} to the rig's names in the file NAME.joints.json beside it; the "
+            f"names are {_shortened(names)}"
         )
     return found
 
 
 def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> Index:
-    """(5, 3) joints of the phalanges as a user names them, keyed by `kinematics.JOINT_NAMES`.
+    """Return the joints (5, 3) of the phalanges from a mapping of `kinematics.JOINT_NAMES` to the rig's names.
 
-    Raises InputError for keys that are missing or unknown and for joints that the rig does not have.
+    Raises:
+        InputError: if a key is missing or unknown, or if the rig has no such joint.
     """
     wanted = JOINT_NAMES[1:]
     if unknown := sorted(set(mapping) - set(JOINT_NAMES)):
@@ -74,7 +80,7 @@ def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> Index:
 
 
 def finger_of(name: str) -> int | None:
-    """Which finger a joint's name speaks of, 0 for the thumb; None for other joints."""
+    """Return the finger that a joint's name contains, 0 for the thumb; None for other joints."""
     text = name.lower()
     if any(word in text for word in _NOT_A_HAND):
         return None
@@ -87,7 +93,7 @@ def finger_of(name: str) -> int | None:
 
 
 def side_of(name: str) -> Side | None:
-    """The side a joint's name speaks of."""
+    """Return the side that a joint's name contains; None if it has none."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()
     words = re.findall(r"[a-z]+", spaced)
     fingers = "|".join(word for words in _FINGER_WORDS for word in words)
@@ -111,8 +117,12 @@ def _depth(parents: Index, joint: int) -> int:
 
 
 def _rank(name: str) -> tuple[int, list[int], str]:
-    """Order of the joints of a finger where the tree does not give it: by word, number, letter."""
+    """Return the key that sorts a finger's joints if the tree does not: by word, number, letter."""
     text = name.lower()
+    words = re.findall(r"[a-z]+", text)
+    anatomical = next((rank for word, rank in _JOINT_WORDS.items() if word in words), None)
+    if anatomical is not None:
+        return anatomical, [], text
     word = next((rank for word, rank in _PHALANX_WORDS.items() if word in text), 2 if "middle" in text[6:] else 0)
     return word, [int(number) for number in re.findall(r"\d+", text)], text
 

@@ -1,7 +1,9 @@
-"""Measures a `HandShape` on a mesh whose finger joints are known, and lays our bone frames onto those joints.
+"""Measure a `HandShape` on a mesh with known finger joints, and place the bone frames at those joints.
 
-Everything here is a right hand's, in its palm frame, in metres: `points` (5, 4, 3) hold the three joints and the tip
-of each finger, `vertices` (V, 3) the skin, `weights` (V, 16) its bodies.
+All arrays are a right hand's, in its palm frame, in metres.
+
+`points` (5, 4, 3): three joints and the tip of each finger.
+`vertices` (V, 3), `weights` (V, 16): the skin and its bodies.
 """
 
 import numpy as np
@@ -13,13 +15,13 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
 
 _BENT = 0.25
-"""A thumb whose bones lean this far (sine) from one line shows the plane it bends in."""
+"""Least bend of the thumb in the mesh (sum of two sines) that gives its plane of flexion."""
 
 
 def measured_shape(points: Array, vertices: Array, weights: Array, source: str) -> HandShape:
-    """Sizes of the hand: lengths and bases from its joints, radii and palm from the skin around them.
+    """Return the sizes of the hand: lengths and bases from its joints, radii and palm from the skin around them.
 
-    The thumb's direction in the mesh becomes its resting one. Sizes that the mesh does not show are the default
+    The thumb's direction in the mesh becomes its resting one. Sizes that the mesh does not give are the average
     hand's, in proportion.
     """
     default = HandShape()
@@ -52,9 +54,9 @@ def measured_shape(points: Array, vertices: Array, weights: Array, source: str) 
 
 
 def bone_frames(shape: HandShape, points: Array) -> Array:
-    """T_palm_body (16, 4, 4) of the mesh as it stands: origin at each joint, y along its bone, z to the pad.
+    """Return T_palm_body (16, 4, 4) of the mesh at rest: origin at each joint, y along its bone, z to the pad.
 
-    The angles that bring our model closest give the turn about the bone.
+    The rotation about the bone is that of `HandModel` at the joint angles closest to the mesh.
     """
     directions = np.diff(points, axis=1) / shape.lengths[..., None]
     model = HandModel(shape)
@@ -80,7 +82,7 @@ def bone_frames(shape: HandShape, points: Array) -> Array:
 
 
 def _radii(points: Array, bones: Array, vertices: Array, weights: Array, finger: int, default: HandShape) -> Array:
-    """(4,) half the thickness at base, two joints and tip: the median distance of the skin around from the bone."""
+    """Return half the thickness (4,) at base, two joints and tip: the median distance of the skin from the bone."""
     lengths = np.linalg.norm(bones, axis=-1)
     along = bones / lengths[:, None]
     own = [weights[:, body_of(finger, k)] for k in range(3)]
@@ -90,7 +92,7 @@ def _radii(points: Array, bones: Array, vertices: Array, weights: Array, finger:
         axis = (along[k - 1] + along[k]) / np.linalg.norm(along[k - 1] + along[k])
         near = vertices[own[k - 1] + own[k] >= 0.5]
         radii[k] = _thickness(near - points[k], axis, -0.2 * lengths[k], 0.2 * lengths[k], fallback[k])
-    # The tip's ball, and the base, hidden in the palm: drawn out from where the first phalanx is free.
+    # The tip's ball; and the base, which the palm hides: extrapolated from the free part of the first phalanx.
     tip = vertices[own[2] >= 0.5] - points[2]
     radii[3] = _thickness(tip, along[2], 0.45 * lengths[2], 0.8 * lengths[2], fallback[3])
     radii[3] = min(radii[3], radii[2], 0.6 * lengths[2])
@@ -105,7 +107,7 @@ def _radii(points: Array, bones: Array, vertices: Array, weights: Array, finger:
 
 
 def _thickness(points: Array, axis: Array, low: float, high: float, fallback: float) -> float:
-    """Median distance from an axis through the origin, of the points between two heights on it."""
+    """Return the median distance of points (N, 3) from an axis through the origin, between two heights on it."""
     height = points @ axis
     around = points[(height > low) & (height < high)]
     if len(around) < 4:
@@ -114,7 +116,7 @@ def _thickness(points: Array, axis: Array, low: float, high: float, fallback: fl
 
 
 def _thumb_pad(thumb: Array, default: HandShape) -> Array:
-    """Where the pad of the thumb faces: its bones bend that way, if they are bent at all."""
+    """Return the direction (3,) of the thumb's pad: that of its bend, or the average hand's if it is straight."""
     bend = (thumb[1] + thumb[2]) - (thumb[1] + thumb[2]) @ thumb[0] * thumb[0]
     if np.linalg.norm(bend) < _BENT:
         return default.thumb_pad

@@ -1,4 +1,4 @@
-"""The skinned triangle mesh of the hand (Schroeder et al. 2014, Sec. III), built from the sizes of a `HandShape`."""
+"""The skinned triangle mesh of the hand (Schroeder et al. 2014, Sec. III): built from sizes, or a user's rig."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -12,21 +12,26 @@ from trimesh import Trimesh
 from depthtrack.errors import InputError
 from depthtrack.geometry.isosurface import neighbour_average, polygonise
 from depthtrack.hand.kinematics import BODY_COUNT, HandModel
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.rig.rig_import import RiggedHand, reread_rigged_hand
+from depthtrack.hand.shape import SIZE_NAMES, HandShape
 from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
 from depthtrack.hand.skin.weights import skin_weights
 from depthtrack.types import Array, Faces, Index
 
 _VERTICES = 7000
-"""About how many vertices a hand of usual proportions gets."""
+"""Approximate number of vertices of a built hand of usual proportions."""
+_SAME_SIZE = 1e-6
+"""Largest difference, metres, between sizes in a hand file and the same ones measured again."""
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """A triangle mesh that the 16 bodies of `HandModel(shape)` move by linear blend skinning.
+    """A triangle mesh moved by the 16 bodies of `HandModel(shape)`, by linear blend skinning.
 
-    `rest` (V, 3) vertices in the palm frame, metres; `faces` (F, 3), counter-clockwise from outside; `weights`
-    (V, 16), each row convex; `T_body_rest` (16, 4, 4) from the palm frame at rest to each body's own frame.
+    `rest` (V, 3): vertices at rest, palm frame, metres.
+    `faces` (F, 3): counter-clockwise from outside.
+    `weights` (V, 16): of the bodies; each row is convex.
+    `T_body_rest` (16, 4, 4): from the palm frame at rest to each body's frame.
     """
 
     shape: HandShape
@@ -41,16 +46,21 @@ class Skin:
 
     @classmethod
     def of(cls, shape: HandShape) -> "Skin":
-        """The closed skin of a hand of these sizes; made once for each shape (under a second), then remembered.
+        """Return the skin of a hand: its rigged mesh if the shape refers to one, else built from its sizes.
 
-        Raises InputError for sizes whose flesh is not one solid without holes, such as fingers grown together.
+        A built skin is closed. It takes under a second and is cached by shape.
+
+        Raises:
+            InputError: if the sizes give no solid without holes, such as fingers grown together; or if the rig's file
+                is missing or changed, or is of other sizes.
         """
         return _skin_of(shape)
 
     def vertices(self, transforms: ArrayLike) -> Array:
-        """Vertices (..., V, 3) in the camera frame for T_camera_body (..., 16, 4, 4), as `HandModel.transforms` gives.
+        """Return posed vertices by linear blend skinning (Schroeder et al. 2014, Eq. 2).
 
-        Every vertex goes to the weighted mean of where the bodies take it (Schroeder et al. 2014, Eq. 2).
+        `transforms` (..., 16, 4, 4): T_camera_body, as `HandModel.transforms` returns them.
+        Returns (..., V, 3): camera frame, metres.
         """
         moved = (np.asarray(transforms, dtype=np.float64) @ self.T_body_rest)[..., :3, :]
         batch = moved.shape[:-3]
@@ -60,11 +70,11 @@ class Skin:
         return np.moveaxis(np.sum(blended[..., :3] * rest, axis=-1) + blended[..., 3], 0, -2)
 
     def at(self, pose: ArrayLike) -> Array:
-        """Vertices (..., V, 3) in the camera frame of poses (..., 27)."""
+        """Return the camera-frame vertices (..., V, 3), metres, of poses (..., 27)."""
         return self.vertices(HandModel(self.shape).transforms(pose))
 
     def normals(self, vertices: Array) -> Array:
-        """Outward unit normals (..., V, 3) of posed vertices (..., V, 3): the mean over the faces around, by area."""
+        """Return outward unit normals (..., V, 3) of posed vertices (..., V, 3): means over adjacent faces, by area."""
         a, b, c = (vertices[..., self.faces[:, k], :] for k in range(3))
         of_faces = np.cross(b - a, c - a)
         flat = np.moveaxis(of_faces, -2, 0).reshape(len(self.faces), -1)
@@ -72,12 +82,12 @@ class Skin:
         return np.asarray(total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30))
 
     def to_trimesh(self, vertices: Array) -> Trimesh:
-        """The mesh of posed vertices (V, 3) for trimesh: queries, and export to PLY, OBJ, STL, GLB."""
+        """Return the mesh of posed vertices (V, 3) for trimesh: queries, and export to PLY, OBJ, STL, GLB."""
         return Trimesh(vertices, self.faces, process=False)
 
     @cached_property
     def face_bodies(self) -> Index:
-        """(F,) body that moves each face most."""
+        """The body (F,) with the largest weight of each face."""
         return np.asarray(self.weights[self.faces].sum(axis=1).argmax(axis=-1), dtype=np.int64)
 
     @cached_property
@@ -86,7 +96,7 @@ class Skin:
 
     @cached_property
     def _faces_around(self) -> csr_array:
-        """(V, F) incidence."""
+        """Incidence (V, F) of vertices and faces."""
         columns = np.repeat(np.arange(len(self.faces)), 3)
         ones = np.ones(len(columns))
         return csr_array((ones, (self.faces.ravel(), columns)), shape=(len(self.rest), len(self.faces)))
@@ -94,6 +104,30 @@ class Skin:
 
 @lru_cache(maxsize=8)
 def _skin_of(shape: HandShape) -> Skin:
+    return _built(shape) if shape.rig is None else _rigged(shape, reread_rigged_hand(shape.rig))
+
+
+def _rigged(shape: HandShape, rigged: RiggedHand) -> Skin:
+    """Return the rig's mesh at the scale and on the side of `shape`.
+
+    Raises:
+        InputError: if the sizes of `shape` are not the ones measured on the rig.
+    """
+    measured = rigged.shape.with_(scale=shape.scale, side=shape.side, source=shape.source, rig=shape.rig)
+    pairs = ((getattr(shape, name), getattr(measured, name)) for name in SIZE_NAMES)
+    if not all(np.allclose(ours, theirs, rtol=0, atol=_SAME_SIZE) for ours, theirs in pairs):
+        raise InputError(
+            f"the hand's sizes must be those measured on its rig {rigged.shape.rig and rigged.shape.rig.path}, only "
+            "scale and side may differ: remove the entry `rig` to build a skin from these sizes"
+        )
+    mirror = np.diag([rigged.shape.mirror * shape.mirror, 1, 1, 1])
+    T_body_rest = mirror @ rigged.T_body_rest @ mirror
+    T_body_rest[:, :3, 3] *= shape.scale
+    faces = rigged.faces if shape.side == rigged.shape.side else np.ascontiguousarray(rigged.faces[:, ::-1])
+    return Skin(shape, rigged.rest @ mirror[:3, :3] * shape.scale, faces, rigged.weights, T_body_rest)
+
+
+def _built(shape: HandShape) -> Skin:
     flesh = ImplicitHand.of(shape)
     low, high = flesh.bounds()
     vertices, faces = polygonise(flesh.distance, low, high, _cell(shape, high - low))
@@ -108,7 +142,7 @@ def _skin_of(shape: HandShape) -> Skin:
 
 
 def _cell(shape: HandShape, box: Array) -> float:
-    """Grid spacing that gives about `_VERTICES` vertices, finer for thin fingers but within bounded memory."""
+    """Return the grid spacing for about `_VERTICES` vertices, finer for thin fingers but within bounded memory."""
     area = 2 * shape.palm_length * shape.palm_breadth + 2 * np.pi * float(np.sum(shape.lengths * shape.radii[:, 1:]))
     wanted = min(np.sqrt(1.4 * area / _VERTICES), 0.65 * shape.radii.min())
     return max(float(wanted), float(np.cbrt(np.prod(box) / 4e5)))
