@@ -19,7 +19,7 @@ from pathlib import Path
 # The checkout that this script lies in, whatever is installed.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from depthtrack.cli import main as depthtrack  # noqa: E402
+from depthtrack.cli import main as depthtrack
 
 FRAMES = 60
 RECORDINGS = {

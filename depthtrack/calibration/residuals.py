@@ -13,7 +13,8 @@ from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from depthtrack.calibration.parameters import COUNT, motion_of
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel, body_of
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin

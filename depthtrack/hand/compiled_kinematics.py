@@ -1,6 +1,6 @@
-"""The hand's kinematic chain as the solver needs it: compiled, one pose at a time.
+"""Compiled forward kinematics of the hand, one pose at a time, and the retraction that solvers step by.
 
-`HandModel` says the same for batches, slowly; the tests hold this file to it.
+`HandModel` wraps them for batches; the tests hold them to `reference_kinematics`.
 """
 
 import math
@@ -10,13 +10,18 @@ import numba
 import numpy as np
 
 from depthtrack.geometry.rotations import compiled_exp, compiled_matrix, compiled_normalised, compiled_product
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
 
+BODY_COUNT = 16
+"""The palm and three phalanges a finger."""
+
 
 class Chain(NamedTuple):
-    """Constants of a hand: `base` (5, 3, 4) T_palm_base with all angles zero, `lengths` (5, 3) m, `mirror` +1 or -1."""
+    """The constants of a hand: T_palm_base with all angles zero, phalanx lengths, and the side.
+
+    base: (5, 3, 4) metres, palm frame; lengths: (5, 3) metres, scaled; mirror: +1 for a right hand, -1 for a left one.
+    """
 
     base: Array
     lengths: Array
@@ -24,14 +29,23 @@ class Chain(NamedTuple):
 
     @staticmethod
     def of(shape: HandShape) -> "Chain":
-        """The chain of a hand of these sizes."""
-        model = HandModel(shape)
-        base = np.ascontiguousarray(model.base_transforms[:, :3])
-        return Chain(base, np.ascontiguousarray(model.lengths), shape.mirror)
+        """Return the chain of a hand of these sizes."""
+        base = np.tile(np.eye(4), (5, 1, 1))
+        base[:, :3, 3] = shape.bases * shape.scale
+        y = shape.thumb_direction / np.linalg.norm(shape.thumb_direction)
+        z = shape.thumb_pad - y * (shape.thumb_pad @ y)
+        z = z / np.linalg.norm(z)
+        base[0, :3, :3] = np.stack([np.cross(y, z), y, z], axis=-1)
+        flip = np.diag([shape.mirror, 1, 1, 1])
+        base = flip @ base @ flip
+        return Chain(np.ascontiguousarray(base[:, :3]), shape.lengths * shape.scale, shape.mirror)
 
 
 class BodyPoses(NamedTuple):
-    """A posed hand, camera frame: `T` (16, 3, 4) T_camera_body; `axes` and `origins` (20, 3) of the angles' hinges."""
+    """A posed hand in the camera frame, metres.
+
+    T: (16, 3, 4) T_camera_body; axes: (20, 3) unit axis of each finger angle; origins: (20, 3) a point on that axis.
+    """
 
     T: Array
     axes: Array
@@ -39,12 +53,12 @@ class BodyPoses(NamedTuple):
 
     @staticmethod
     def empty() -> "BodyPoses":
-        """Room for `forward_kinematics`."""
+        """Return zeroed arrays for `forward_kinematics`."""
         return BodyPoses(np.zeros((BODY_COUNT, 3, 4)), np.zeros((20, 3)), np.zeros((20, 3)))
 
     @staticmethod
     def at(chain: Chain, pose: Array) -> "BodyPoses":
-        """The hand in a pose (27,)."""
+        """Return the hand in a pose (27,)."""
         bodies = BodyPoses.empty()
         forward_kinematics(chain, np.ascontiguousarray(pose, dtype=np.float64), bodies)
         return bodies
@@ -52,7 +66,7 @@ class BodyPoses(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
-    """Move the bodies to `pose` (27,): Eq. (1) of Schroeder et al. 2014."""
+    """Place the bodies in a pose (27,), its quaternion of any length except zero: Eq. (1) of Schroeder et al. 2014."""
     T, axes, origins = bodies.T, bodies.axes, bodies.origins
     compiled_matrix(pose[3], pose[4], pose[5], pose[6], T[0])
     for i in range(3):
@@ -89,6 +103,17 @@ def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
                     T[body + 1, i, 1] = T[body, i, 1]
                     T[body + 1, i, 2] = T[body, i, 2]
                     T[body + 1, i, 3] = T[body, i, 3] + T[body, i, 1] * lengths[finger, k]
+
+
+@numba.njit(cache=True, nogil=True)
+def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
+    """Write T_camera_body (N, 16, 4, 4), metres, of poses (N, 27) to `out`."""
+    bodies = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
+    for n in range(poses.shape[0]):
+        forward_kinematics(chain, poses[n], bodies)
+        out[n, :, :3] = bodies.T
+        out[n, :, 3, :3] = 0.0
+        out[n, :, 3, 3] = 1.0
 
 
 @numba.njit(cache=True, nogil=True)

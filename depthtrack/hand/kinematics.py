@@ -6,16 +6,17 @@ thumb (and, for the thumb itself, out of the palm: palmar abduction).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.geometry.rotations import rotation_matrix
-from depthtrack.hand.pose import ANGLES, FINGERS, ORIENTATION, POSITION, TANGENT_SIZE
+from depthtrack.hand.compiled_kinematics import BODY_COUNT, Chain, transforms_of
+from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_SIZE, POSITION, TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array, Mask
 
-BODY_COUNT = 16
 JOINT_NAMES = ("wrist", *(f"{finger}_{k}" for finger in FINGERS for k in range(3)))
 _THUMB_POINTS = ("cmc", "mcp", "ip", "tip")
 _FINGER_POINTS = ("mcp", "pip", "dip", "tip")
@@ -50,56 +51,48 @@ class HandModel:
     shape: HandShape
 
     def transforms(self, pose: ArrayLike) -> Array:
-        """T_camera_body (..., 16, 4, 4), metres: Eq. (1) of Schroeder et al. 2014."""
+        """Return T_camera_body (..., 16, 4, 4), metres, of poses (..., 27): Eq. (1) of Schroeder et al. 2014."""
         p = np.asarray(pose, dtype=np.float64)
-        batch = p.shape[:-1]
-        T = np.zeros((*batch, BODY_COUNT, 4, 4))
-        T[..., 3, 3] = 1
-        T[..., 0, :3, :3] = rotation_matrix(p[..., ORIENTATION])
-        T[..., 0, :3, 3] = p[..., POSITION]
-        angles = p[..., ANGLES].reshape(*batch, 5, 4)
-        for finger in range(5):
-            base = self.base_transforms[finger]
-            local = _with_rotation(base, base[:3, :3] @ self._abduction(angles[..., finger, 0]))
-            parent = T[..., 0, :, :] @ local
-            for phalanx in range(3):
-                here = parent @ _homogeneous(_rotation_x(angles[..., finger, 1 + phalanx]))
-                T[..., body_of(finger, phalanx), :, :] = here
-                parent = here @ _translation_y(self.lengths[finger, phalanx])
-        return T
+        flat = np.ascontiguousarray(p.reshape(-1, POSE_SIZE))
+        T = np.empty((len(flat), BODY_COUNT, 4, 4))
+        transforms_of(self.chain, flat, T)
+        return T.reshape(*p.shape[:-1], BODY_COUNT, 4, 4)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The constants of the hand that compiled kinematics takes."""
+        return Chain.of(self.shape)
 
     @property
     def lengths(self) -> Array:
-        """(5, 3) phalanx lengths, metres, scaled."""
-        return self.shape.lengths * self.shape.scale
+        """The phalanx lengths (5, 3), metres, scaled."""
+        return self.chain.lengths
 
     @property
     def base_transforms(self) -> Array:
-        """T_palm_base (5, 4, 4): base joints with all angles zero."""
+        """T_palm_base (5, 4, 4), metres: the base joints with all angles zero."""
         T = np.tile(np.eye(4), (5, 1, 1))
-        T[:, :3, 3] = self.shape.bases * self.shape.scale
-        y = self.shape.thumb_direction / np.linalg.norm(self.shape.thumb_direction)
-        z = self.shape.thumb_pad - y * (self.shape.thumb_pad @ y)
-        z = z / np.linalg.norm(z)
-        T[0, :3, :3] = np.stack([np.cross(y, z), y, z], axis=-1)
-        flip = np.diag([self.shape.mirror, 1, 1, 1])
-        return flip @ T @ flip
+        T[:, :3] = self.chain.base
+        return T
+
+    def wrist(self, pose: ArrayLike) -> Array:
+        """Return the wrist (..., 3), metres, camera frame, of poses (..., 27), without placing the fingers."""
+        p = np.asarray(pose, dtype=np.float64)
+        return np.einsum("...ij,j->...i", rotation_matrix(p[..., ORIENTATION]), self.shape.wrist) + p[..., POSITION]
 
     def joints(self, pose: ArrayLike) -> Array:
         """The 16 joints (..., 16, 3) in the camera frame, metres: the wrist, then the origin of each phalanx."""
-        T = self.transforms(pose)
-        joints = T[..., :3, 3].copy()
-        joints[..., 0, :] = self._wrist(T)
+        joints = self.transforms(pose)[..., :3, 3].copy()
+        joints[..., 0, :] = self.wrist(pose)
         return joints
 
     def endpoints(self, pose: ArrayLike) -> Array:
         """The 20 phalanx endpoints (..., 20, 3), metres: per finger the base, two joints and the tip."""
-        return self._endpoints(self.transforms(pose))
+        return self.endpoints_of(self.transforms(pose))
 
     def keypoints(self, pose: ArrayLike) -> Array:
         """The 21 keypoints (..., 21, 3) in MediaPipe's order, metres: the wrist, then the endpoints."""
-        T = self.transforms(pose)
-        return np.concatenate([self._wrist(T)[..., None, :], self._endpoints(T)], axis=-2)
+        return np.concatenate([self.wrist(pose)[..., None, :], self.endpoints(pose)], axis=-2)
 
     def transform_points(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
         """Camera-frame positions (..., N, 3) of points (N, 3) fixed to `bodies` (N,)."""
@@ -141,10 +134,8 @@ class HandModel:
                 origins[..., 4 * finger + 1 + phalanx, :] = body[..., :3, 3]
         return axes, origins
 
-    def _wrist(self, T: Array) -> Array:
-        return np.einsum("...ij,j->...i", T[..., 0, :3, :3], self.shape.wrist) + T[..., 0, :3, 3]
-
-    def _endpoints(self, T: Array) -> Array:
+    def endpoints_of(self, T: Array) -> Array:
+        """Return the 20 phalanx endpoints (..., 20, 3), metres, of placed bodies `T` (..., 16, 4, 4)."""
         points = np.empty((*T.shape[:-3], 20, 3))
         for finger in range(5):
             for phalanx in range(3):
@@ -153,43 +144,10 @@ class HandModel:
             points[..., 4 * finger + 3, :] = last[..., :3, 3] + last[..., :3, 1] * self.lengths[finger, 2]
         return points
 
-    def _abduction(self, angle: Array) -> Array:
-        return _rotation_z(-self.shape.mirror * angle)
-
-
-def _rotation_x(angle: Array) -> Array:
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    return _matrix([[one, zero, zero], [zero, c, -s], [zero, s, c]])
-
-
-def _rotation_z(angle: Array) -> Array:
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    return _matrix([[c, -s, zero], [s, c, zero], [zero, zero, one]])
-
-
-def _matrix(rows: list[list[Array]]) -> Array:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def _homogeneous(rotation: Array) -> Array:
-    return _with_rotation(np.eye(4), rotation)
-
-
-def _with_rotation(T: Array, rotation: Array) -> Array:
-    """T (4, 4), or a batch of it, with its rotation replaced."""
-    out = np.broadcast_to(T, (*rotation.shape[:-2], 4, 4)).copy()
-    out[..., :3, :3] = rotation
-    return out
-
-
-def _translation_y(length: float) -> Array:
-    T = np.eye(4)
-    T[1, 3] = length
-    return T
-
 
 def _cross_matrix(v: Array) -> Array:
     """[v]x (..., 3, 3) with [v]x u = v x u."""
     x, y, z = np.moveaxis(v, -1, 0)
     zero = np.zeros_like(x)
-    return _matrix([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

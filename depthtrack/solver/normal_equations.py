@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from depthtrack.hand.compiled_kinematics import BodyPoses
-from depthtrack.hand.kinematics import BODY_COUNT
+from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses
 from depthtrack.types import Array
 
 ROW = 8

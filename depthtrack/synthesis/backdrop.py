@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import BODY_COUNT
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.primitives import CYLINDER, SPHERE
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.surface import Surface

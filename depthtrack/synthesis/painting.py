@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear

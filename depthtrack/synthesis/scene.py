@@ -7,7 +7,8 @@ from typing import Literal, Protocol
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin

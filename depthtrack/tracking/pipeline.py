@@ -70,7 +70,7 @@ def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
         return None
     shape = model.shape
     max_distance = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + _REACH_MARGIN
-    wrist = WristPlane(model.joints(pose)[0], -rotation_matrix(pose[ORIENTATION])[:, 1])
+    wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
     return RoiPrior(pose[POSITION].copy(), float(max_distance), wrist)
 
 

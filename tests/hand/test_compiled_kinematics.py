@@ -1,4 +1,4 @@
-"""The compiled kinematics of the IK solver, held to the plain ones of the hand."""
+"""The compiled kinematics, held to the reference in plain numpy."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from depthtrack.hand import compiled_kinematics
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import retract, tangent_between
+from depthtrack.hand.pose import ORIENTATION, retract, tangent_between
+from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.shape import HandShape, Side
 from tests.support.hands import random_pose
 
@@ -20,7 +21,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) -> None:
     shape, rng = HandShape(side=side, scale=1.2), np.random.default_rng(seed)
     pose, model = random_pose(rng), HandModel(shape)
-    bodies, T = BodyPoses.at(Chain.of(shape), pose), model.transforms(pose)
+    bodies, T = BodyPoses.at(Chain.of(shape), pose), reference_transforms(Chain.of(shape), pose)
     np.testing.assert_allclose(bodies.T, T[:, :3], atol=1e-12)
     # A point of each body moves with each angle as its hinge says.
     points = np.einsum("bij,j->bi", T[:, :3, :3], rng.normal(0, 0.02, 3)) + T[:, :3, 3]
@@ -29,6 +30,19 @@ def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) ->
         turned = np.cross(bodies.axes[angle], points - bodies.origins[angle])
         moves = np.any(J[:, :, angle] != 0, axis=1)
         np.testing.assert_allclose(J[moves, :, angle], turned[moves], atol=1e-12)
+
+
+@given(seed=SEEDS, length=st.floats(0.1, 10))
+def test_batches_are_placed_as_single_poses_and_as_the_reference(seed: int, length: float) -> None:
+    shape, rng = HandShape(scale=0.9), np.random.default_rng(seed)
+    poses = np.stack([random_pose(rng) for _ in range(6)]).reshape(2, 3, 27)
+    model, scaled = HandModel(shape), poses.copy()
+    T = model.transforms(poses)
+    np.testing.assert_array_equal(T[1, 2], model.transforms(poses[1, 2]))
+    np.testing.assert_allclose(T, reference_transforms(model.chain, poses), atol=1e-14)
+    scaled[..., ORIENTATION] *= length
+    np.testing.assert_allclose(model.transforms(scaled), T, atol=1e-13)
+    assert model.transforms(np.empty((0, 27))).shape == (0, 16, 4, 4)
 
 
 @given(seed=SEEDS, size=st.sampled_from([0.0, 1e-12, 1e-3, 1.0, 4.0]))

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.geometry.rotations import rotation_matrix
-from depthtrack.hand.kinematics import BODY_COUNT, ENDPOINT_NAMES, KEYPOINT_NAMES, MOVES, HandModel, body_of
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import ENDPOINT_NAMES, KEYPOINT_NAMES, MOVES, HandModel, body_of
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, make_pose, retract
 from depthtrack.hand.shape import HandShape, Side

@@ -17,7 +17,7 @@ from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective, evaluate
 from depthtrack.rendering.opengl.context import OpenGLError
-from depthtrack.rendering.opengl.impostors import HandTable, body_transforms, place_impostors
+from depthtrack.rendering.opengl.impostors import HandTable, place_impostors
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.opengl.sums import sum_tiles
@@ -130,18 +130,6 @@ def test_regions_too_large_for_the_renderer_are_refused() -> None:
     renderer = shared_renderer("egl")
     with renderer.context as gl, pytest.raises(InputError, match=r"at most \d+ pixels a side"):
         renderer.grid(gl, 10, renderer.context.max_side + 1)
-
-
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=15)
-def test_the_kernel_places_bodies_as_the_hand_model_does(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    shape, pose = random_shape(rng), random_poses(rng, 1, (0, 0, 0.5), 0.1)[0]
-    rotations, positions = np.empty((16, 3, 3)), np.empty((16, 3))
-    body_transforms(pose * np.r_[np.ones(3), np.full(4, 1.7), np.ones(20)], HandTable.of(shape), rotations, positions)
-    T = HandModel(shape).transforms(pose)
-    np.testing.assert_allclose(rotations, T[:, :3, :3], atol=1e-12)
-    np.testing.assert_allclose(positions, T[:, :3, 3], atol=1e-12)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

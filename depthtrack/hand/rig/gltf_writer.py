@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from depthtrack.files import replace_atomically
-from depthtrack.hand.kinematics import BODY_COUNT, JOINT_NAMES, HandModel, body_of
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import JOINT_NAMES, HandModel, body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig.gltf_document import gltf_library
 from depthtrack.hand.skin.mesh import Skin

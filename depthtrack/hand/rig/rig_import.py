@@ -16,7 +16,8 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_json, read_text
-from depthtrack.hand.kinematics import BODY_COUNT, body_of
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import body_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig.closing import close_holes
 from depthtrack.hand.rig.gltf import Rig, gltf_digest, read_rigs

@@ -10,8 +10,10 @@ from typing import Self
 
 import numpy as np
 
-from depthtrack.hand.kinematics import HandModel, body_of
+from depthtrack.hand.compiled_kinematics import Chain
+from depthtrack.hand.kinematics import body_of
 from depthtrack.hand.pose import make_pose
+from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
 
@@ -103,7 +105,7 @@ class ImplicitHand:
     def of(cls, shape: HandShape) -> Self:
         """The flesh of a right hand of scale 1 with the sizes of `shape`."""
         shape = shape.with_(side="right", scale=1.0)
-        bones = HandModel(shape).transforms(rest_pose(shape))
+        bones = reference_transforms(Chain.of(shape), rest_pose(shape))
         fingers = tuple(tuple(_finger(shape, bones, finger)) for finger in range(5))
         return cls(
             shape, bones, fingers, tuple(_palm(shape)), tuple(_muscles(shape, bones)), tuple(_webs(shape, bones))

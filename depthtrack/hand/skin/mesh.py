@@ -11,7 +11,9 @@ from trimesh import Trimesh
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.isosurface import neighbour_average, polygonise
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.compiled_kinematics import BODY_COUNT, Chain
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.rig.rig_import import RiggedHand, reread_rigged_hand
 from depthtrack.hand.shape import SIZE_NAMES, HandShape
 from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
@@ -137,7 +139,7 @@ def _built(shape: HandShape) -> Skin:
     rest = vertices * np.array([shape.mirror, 1, 1]) * shape.scale
     if shape.side == "left":
         faces = np.ascontiguousarray(faces[:, ::-1])
-    T_palm_body = HandModel(shape).transforms(rest_pose(shape))
+    T_palm_body = reference_transforms(Chain.of(shape), rest_pose(shape))
     return Skin(shape, rest, faces, weights, np.asarray(np.linalg.inv(T_palm_body), dtype=np.float64))
 
 

@@ -7,7 +7,8 @@ Across the hand it goes by distance to the flesh of each finger, so that webs fo
 import numpy as np
 
 from depthtrack.geometry.isosurface import neighbour_average
-from depthtrack.hand.kinematics import BODY_COUNT, body_of
+from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.kinematics import body_of
 from depthtrack.hand.skin.implicit import ImplicitHand
 from depthtrack.types import Array, Faces
 

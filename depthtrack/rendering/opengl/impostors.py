@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numba
 import numpy as np
 
-from depthtrack.hand.kinematics import BODY_COUNT, HandModel
+from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses, Chain, forward_kinematics
 from depthtrack.hand.primitives import CYLINDER, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.surface import NEAR
@@ -26,14 +26,11 @@ its map that multiply x, y, 1 and w; and (w of its middle, 1 for a ball or 0 for
 class HandTable(NamedTuple):
     """What of a hand does not depend on its pose, as the kernels read it; metres.
 
-    `base_rotations` (5, 3, 3), `base_positions` (5, 3), `lengths` (5, 3), `mirror` of `HandModel`; `kinds` (N,),
-    `bodies` (N,), `T_body_unit` (N, 4, 4) of `Primitives`, and their inverses `T_unit_body`.
+    `chain`: see `Chain`; `kinds` (N,), `bodies` (N,), `T_body_unit` (N, 4, 4) of `Primitives`, and their inverses
+    `T_unit_body`.
     """
 
-    base_rotations: Array
-    base_positions: Array
-    lengths: Array
-    mirror: float
+    chain: Chain
     kinds: Index
     bodies: Index
     T_body_unit: Array
@@ -41,13 +38,9 @@ class HandTable(NamedTuple):
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
-        model, primitives = HandModel(shape), Primitives.of(shape)
-        base = model.base_transforms
+        primitives = Primitives.of(shape)
         return cls(
-            np.ascontiguousarray(base[:, :3, :3]),
-            np.ascontiguousarray(base[:, :3, 3]),
-            model.lengths,
-            shape.mirror,
+            Chain.of(shape),
             primitives.kinds,
             primitives.bodies,
             primitives.T_body_unit,
@@ -71,26 +64,26 @@ def place_impostors(
     `instances` (>= 37 B, 6, 4) receives what VECTORS says, primitives out of sight left out. `windows` (B, 4)
     receives the pixels (u0, u1, v0, v1; ends excluded) of each tile that may be drawn.
     """
-    rotations, positions = np.empty((BODY_COUNT, 3, 3)), np.empty((BODY_COUNT, 3))
+    placed = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
     T, M, map_ = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     window = np.empty(4, np.int64)
     height, width = tile
     fx, fy, cx, cy = intrinsics
     count = 0
     for n in range(poses.shape[0]):
-        body_transforms(poses[n], hand, rotations, positions)
+        forward_kinematics(hand.chain, poses[n], placed)
         left, top = n % columns * width, n // columns * height
         windows[n, 0], windows[n, 1], windows[n, 2], windows[n, 3] = width, 0, height, 0
         for k in range(hand.kinds.shape[0]):
             body, is_cylinder = hand.bodies[k], hand.kinds[k] == CYLINDER
-            _compose(rotations[body], positions[body], hand.T_body_unit[k], T)
+            _compose(placed.T[body], hand.T_body_unit[k], T)
             middle = _bounds(T, is_cylinder, intrinsics, tile, window)
             u0, u1, v0, v1 = window
             if middle <= 0.0 or u1 <= u0 or v1 <= v0:
                 continue
             windows[n, 0], windows[n, 1] = min(windows[n, 0], u0), max(windows[n, 1], u1)
             windows[n, 2], windows[n, 3] = min(windows[n, 2], v0), max(windows[n, 3], v1)
-            _uncompose(hand.T_unit_body[k], rotations[body], positions[body], M)
+            _uncompose(hand.T_unit_body[k], placed.T[body], M)
             anchor_u, anchor_v, w = (u0 + u1) // 2, (v0 + v1) // 2, 1.0 / middle
             dx, dy = (anchor_u - cx) / fx, (anchor_v - cy) / fy
             for i in range(4):
@@ -108,62 +101,27 @@ def place_impostors(
 
 
 @numba.njit(cache=True)
-def body_transforms(pose: Array, hand: HandTable, rotations: Array, positions: Array) -> None:
-    """`HandModel.transforms` of one pose: rotations (16, 3, 3) and positions (16, 3, metres) of the bodies."""
-    qw, qx, qy, qz = pose[3], pose[4], pose[5], pose[6]
-    s = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
-    palm = rotations[0]
-    palm[0, 0], palm[0, 1], palm[0, 2] = 1 - s * (qy * qy + qz * qz), s * (qx * qy - qw * qz), s * (qx * qz + qw * qy)
-    palm[1, 0], palm[1, 1], palm[1, 2] = s * (qx * qy + qw * qz), 1 - s * (qx * qx + qz * qz), s * (qy * qz - qw * qx)
-    palm[2, 0], palm[2, 1], palm[2, 2] = s * (qx * qz - qw * qy), s * (qy * qz + qw * qx), 1 - s * (qx * qx + qy * qy)
-    for i in range(3):
-        positions[0, i] = pose[i]
-    for finger in range(5):
-        first = 1 + 3 * finger
-        for i in range(3):
-            base = hand.base_positions[finger]
-            positions[first, i] = pose[i] + palm[i, 0] * base[0] + palm[i, 1] * base[1] + palm[i, 2] * base[2]
-            for j in range(3):
-                base = hand.base_rotations[finger, :, j]
-                rotations[first, i, j] = palm[i, 0] * base[0] + palm[i, 1] * base[1] + palm[i, 2] * base[2]
-        _turn(rotations[first], 0, 1, -hand.mirror * pose[7 + 4 * finger])
-        for phalanx in range(3):
-            here = rotations[first + phalanx]
-            _turn(here, 1, 2, pose[8 + 4 * finger + phalanx])
-            if phalanx < 2:
-                rotations[first + phalanx + 1] = here
-                for i in range(3):
-                    step = here[i, 1] * hand.lengths[finger, phalanx]
-                    positions[first + phalanx + 1, i] = positions[first + phalanx, i] + step
-
-
-@numba.njit(cache=True)
-def _turn(R: Array, a: int, b: int, angle: float) -> None:
-    """R times the rotation by `angle` from axis a towards axis b, in place."""
-    s, c = math.sin(angle), math.cos(angle)
-    for i in range(3):
-        R[i, a], R[i, b] = c * R[i, a] + s * R[i, b], c * R[i, b] - s * R[i, a]
-
-
-@numba.njit(cache=True)
-def _compose(R: Array, t: Array, T_body_unit: Array, T: Array) -> None:
-    """T_camera_unit = [R t; 0 1] T_body_unit."""
+def _compose(B: Array, T_body_unit: Array, T: Array) -> None:
+    """Write T_camera_unit = T_camera_body T_body_unit (4, 4) to `T`; `B` (3, 4) is T_camera_body."""
     for j in range(4):
         x, y, z, w = T_body_unit[0, j], T_body_unit[1, j], T_body_unit[2, j], T_body_unit[3, j]
         for i in range(3):
-            T[i, j] = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z + t[i] * w
+            T[i, j] = B[i, 0] * x + B[i, 1] * y + B[i, 2] * z + B[i, 3] * w
         T[3, j] = w
 
 
 @numba.njit(cache=True)
-def _uncompose(T_unit_body: Array, R: Array, t: Array, M: Array) -> None:
-    """T_unit_camera = T_unit_body [R t; 0 1]^-1, whose inverse is [R' -R't; 0 1]."""
+def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
+    """Write T_unit_camera = T_unit_body T_body_camera to `M` (4, 4); `B` = [R t] (3, 4) is T_camera_body.
+
+    The inverse of [R t; 0 1] is [R' -R't; 0 1].
+    """
     for i in range(4):
         x, y, z = T_unit_body[i, 0], T_unit_body[i, 1], T_unit_body[i, 2]
         M[i, 3] = T_unit_body[i, 3]
         for j in range(3):
-            M[i, j] = x * R[j, 0] + y * R[j, 1] + z * R[j, 2]
-            M[i, 3] -= M[i, j] * t[j]
+            M[i, j] = x * B[j, 0] + y * B[j, 1] + z * B[j, 2]
+            M[i, 3] -= M[i, j] * B[j, 3]
 
 
 @numba.njit(cache=True)

@@ -12,6 +12,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.types import Array
 
@@ -68,15 +69,18 @@ def finger_shift_proposals(model: HandModel, pose: Array) -> Array:
     """Poses (2, 27) of the hand in `pose` (27,) with each finger where the next one was, one way and the other: what
     remains of a hand that was found one finger beside where it is. The thumb, and a finger that has none beside it on
     that side, go along."""
-    there = model.endpoints(pose).reshape(5, 4, 3)
+
+    # The reference kinematics: the last bits of these points reach the tracked poses.
+    def endpoints(of: Array) -> Array:
+        return model.endpoints_of(reference_transforms(model.chain, of)).reshape(5, 4, 3)
+
+    there = endpoints(pose)
     poses = np.tile(pose, (2, 1))
     for other, mine, next_ones in zip(poses, ([1, 2, 3], [2, 3, 4]), ([2, 3, 4], [1, 2, 3]), strict=True):
         angles = pose[ANGLES].reshape(5, 4).copy()
         angles[mine] = angles[next_ones]
         other[ANGLES] = angles.ravel()
-        R, t = rigid_alignment(
-            model.endpoints(other).reshape(5, 4, 3)[mine].reshape(-1, 3), there[next_ones].reshape(-1, 3)
-        )
+        R, t = rigid_alignment(endpoints(other)[mine].reshape(-1, 3), there[next_ones].reshape(-1, 3))
         turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
         other[:] = make_pose(R @ pose[POSITION] + t, turned, other[ANGLES])
     return within_limits(poses)
