@@ -18,7 +18,6 @@ from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
 from depthtrack.tracking.random import frame_generator
@@ -174,7 +173,7 @@ class _Searcher:
         out = []
         with RasterScorer(shape, threads=self._threads) as scorer:
             for o in self.observations[:count]:
-                scorer.set_target(_target(o))
+                scorer.set_target(o.reduced(_RESOLUTION))
                 generator = frame_generator(self._seed, o.frame_index)
                 angles = typical_angles(generator, _WIDE.hypotheses)
                 poses = hypotheses(o.centre, angles, generator, o.arm_direction)
@@ -184,7 +183,7 @@ class _Searcher:
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
         """Of a hand in a pose (27,), in one view."""
         with RasterScorer(shape) as scorer:
-            scorer.set_target(_target(self.observations[view]))
+            scorer.set_target(self.observations[view].reduced(_RESOLUTION))
             return float(scorer.score(pose[None])[0])
 
     def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
@@ -192,7 +191,7 @@ class _Searcher:
         poses, energies, agreements = [], [], []
         with RasterScorer(shape, threads=self._threads) as scorer:
             for n, o in enumerate(observations):
-                scorer.set_target(_target(o))
+                scorer.set_target(o.reduced(_RESOLUTION))
                 generator = frame_generator(self._seed, o.frame_index)
                 pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
                 tried = np.stack([pose] if known is None else [pose, known[n]])
@@ -200,12 +199,8 @@ class _Searcher:
                 best = int(np.argmin(terms.energy))
                 poses.append(tried[best])
                 energies.append(float(terms.energy[best]))
-                agreements.append(float(1 - terms.skin[best]))
+                agreements.append(float(terms.agreement[best]))
         return Found(np.stack(poses), np.array(energies), np.array(agreements))
-
-
-def _target(o: Observation) -> Target:
-    return Target(o.camera, o.skin, o.depth).reduced(_RESOLUTION)
 
 
 def _initialise(searcher: _Searcher, side: Side) -> tuple[Array, Found]:

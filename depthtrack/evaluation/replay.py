@@ -14,7 +14,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.rendering.hand_surface import ModelSurface
+from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.tracking.pipeline import roi_prior
 from depthtrack.tracking.state import TrackingThresholds, TrackState
@@ -56,10 +56,10 @@ class Replay:
         _check_same_recording(run, recording, path)
         return cls(run, recording, run_hand(run))
 
-    def surface(self) -> ModelSurface:
+    def surface(self) -> HandSurface:
         """The surface that the run fitted. Raises InputError for hand sizes that no skin fits."""
         fitted = {self.run.configuration.get(name) for name in ("model", "finish")}
-        return ModelSurface.of(self.hand, skin="skin" in fitted)
+        return HandSurface.of(self.hand, skin="skin" in fitted)
 
     def __len__(self) -> int:
         return len(self.run.index)

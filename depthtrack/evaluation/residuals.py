@@ -7,7 +7,7 @@ import numpy as np
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
 from depthtrack.evaluation.replay import ReplayedFrame
 from depthtrack.geometry.camera import Camera
-from depthtrack.rendering.hand_surface import ModelSurface
+from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
 
@@ -16,7 +16,7 @@ _FINEST = 0.001
 _MOST_FINER = 5
 
 
-def run_residuals(replayed: Iterable[ReplayedFrame], surface: ModelSurface, rows: int) -> Residuals:
+def run_residuals(replayed: Iterable[ReplayedFrame], surface: HandSurface, rows: int) -> Residuals:
     """E3D, E2D and the silhouettes' overlap of a run of so many `rows`."""
     values = np.full((3, rows), np.nan)
     for moment in replayed:
@@ -28,26 +28,24 @@ def run_residuals(replayed: Iterable[ReplayedFrame], surface: ModelSurface, rows
 
 
 def frame_residuals(
-    surface: ModelSurface, pose: Array, observation: Observation, camera: Camera
+    surface: HandSurface, pose: Array, observation: Observation, camera: Camera
 ) -> tuple[float, float, float]:
     """E3D (mm), E2D (pixels) and the overlap of the silhouettes for one pose (27,), in the whole image of `camera`."""
-    observed = np.zeros(camera.shape, dtype=np.bool_)
-    (left, top), (height, width) = observation.origin, observation.camera.shape
-    observed[top : top + height, left : left + width] = observation.skin
+    observed = observation.whole_mask(camera.shape)
     rendered = surface.silhouette(pose, camera)
     model_points = visible_points(surface, pose, camera)
     return e3d(observation.points, model_points), e2d(rendered, observed), silhouette_iou(rendered, observed)
 
 
-def visible_points(surface: ModelSurface, pose: Array, camera: Camera) -> Array:
+def visible_points(surface: HandSurface, pose: Array, camera: Camera) -> Array:
     """Points (M, 3) of the surface that `camera` sees, metres, about a millimetre apart or as far as its pixels are."""
-    window = surface.window(pose, camera)
-    if window is None:
+    region = surface.bounds(pose, camera)
+    if region.is_empty:
         return np.empty((0, 3))
     spacing = float(pose[2]) / camera.fx
     finer = int(np.clip(np.ceil(spacing / _FINEST), 1, _MOST_FINER))
     # An odd factor keeps the rays of the sensor's own pixels.
-    close = camera.crop(*window).resized(finer + (finer + 1) % 2)
-    depth = surface.seen(pose, close).depth
+    close = camera.crop(region).resized(finer + (finer + 1) % 2)
+    depth = surface.render(pose, close).depth
     v, u = np.nonzero(depth)
     return close.unproject(np.stack([u, v], axis=-1), depth[v, u])

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from depthtrack.evaluation.metrics import silhouette_iou
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame, Sequence
@@ -61,25 +62,10 @@ def segment_sequence(
         ms = 1e3 * (time.perf_counter() - begun)
         if tracker is not None:
             follow(tracker, observation)
-        mask = None if observation is None else whole_mask(observation, frame.depth.shape)
+        mask = None if observation is None else observation.whole_mask(frame.depth.shape)
         truth = sequence.hand_mask(frame.index)
-        yield SegmentedFrame(frame, observation, mask, None if truth is None else overlap(mask, truth), ms)
-
-
-def whole_mask(observation: Observation, shape: tuple[int, ...]) -> Mask:
-    """The hand's silhouette over the whole frame (h, w)."""
-    mask = np.zeros(shape, dtype=np.bool_)
-    left, top = observation.origin
-    mask[top : top + observation.camera.height, left : left + observation.camera.width] = observation.skin
-    return mask
-
-
-def overlap(mask: Mask | None, truth: Mask) -> float:
-    """Intersection over union of two silhouettes (h, w), the Jaccard index; two empty ones agree."""
-    if mask is None:
-        return float(not truth.any())
-    union = np.count_nonzero(mask | truth)
-    return 1.0 if union == 0 else np.count_nonzero(mask & truth) / union
+        found = np.zeros(frame.depth.shape, dtype=np.bool_) if mask is None else mask
+        yield SegmentedFrame(frame, observation, mask, None if truth is None else silhouette_iou(found, truth), ms)
 
 
 def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Array
 
 MAX_SIDE = 8192
@@ -36,11 +37,11 @@ class Camera:
             if not (isinstance(side, int) and 1 <= side <= MAX_SIDE):
                 raise InputError(f"camera {name} must be a whole number from 1 to {MAX_SIDE} pixels, found {side!r}")
         for name in ("fx", "fy"):
-            # A window of a few pixels has any ratio of focal length to side; `from_fields` is stricter with files.
+            # A region of a few pixels has any ratio of focal length to side; `from_fields` is stricter with files.
             if not (_is_number(getattr(self, name)) and 1e-3 <= getattr(self, name) <= 1e6):
                 raise InputError(f"camera {name} must be a focal length in pixels, found {getattr(self, name)!r}")
         for name in ("cx", "cy"):
-            # A window of an image may lie far from the principal point, so only nonsense is refused.
+            # A region of an image may lie far from the principal point, so only nonsense is refused.
             if not (_is_number(getattr(self, name)) and abs(getattr(self, name)) <= 4 * MAX_SIDE):
                 raise InputError(f"camera {name} must be a principal point in pixels, found {getattr(self, name)!r}")
         if not (_is_number(self.depth_scale) and 1e-6 <= self.depth_scale <= 0.1):
@@ -70,9 +71,29 @@ class Camera:
         z = np.asarray(depth, dtype=np.float64)
         return np.stack([(uv[..., 0] - self.cx) / self.fx * z, (uv[..., 1] - self.cy) / self.fy * z, z], axis=-1)
 
-    def crop(self, left: int, top: int, width: int, height: int) -> Self:
-        """Camera of the window whose first pixel is (left, top); the window may reach outside the image."""
-        return replace(self, width=int(width), height=int(height), cx=self.cx - int(left), cy=self.cy - int(top))
+    @property
+    def rect(self) -> Rect:
+        """The whole image."""
+        return Rect(0, 0, self.width, self.height)
+
+    def rect_around(self, centre: ArrayLike, reach: float) -> Rect:
+        """Return the part of the image, at least a pixel, that may show points near `centre`.
+
+        centre (3,): metres, camera frame, before the camera.
+        reach: metres across the line of sight.
+        """
+        point = np.asarray(centre, dtype=np.float64)
+        (u, v), z = self.project(point), float(point[2])
+        du, dv = self.fx * reach / z, self.fy * reach / z
+        left, top = min(max(int(u - du), 0), self.width - 1), min(max(int(v - dv), 0), self.height - 1)
+        right, bottom = min(max(int(u + du), left) + 1, self.width), min(max(int(v + dv), top) + 1, self.height)
+        return Rect(left, top, right, bottom)
+
+    def crop(self, region: Rect) -> Self:
+        """Return the camera of a region of the image; the region may reach outside."""
+        return replace(
+            self, width=region.width, height=region.height, cx=self.cx - region.left, cy=self.cy - region.top
+        )
 
     def resized(self, factor: float) -> Self:
         """Camera of the image resampled by `factor` (0.5 halves both sides), pixel areas aligned at the corner."""

@@ -1,15 +1,21 @@
-"""A rectangle of an image's pixels."""
+"""Rectangles of pixels: regions of interest, bounding boxes and crops."""
 
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.geometry.camera import Camera
-from depthtrack.types import Array, Mask
+from depthtrack.types import Mask
+
+Element = TypeVar("Element", bound=np.generic)
 
 
-class Window(NamedTuple):
-    """Pixels from `left` and `top`, included, to `right` and `bottom`, excluded."""
+class Rect(NamedTuple):
+    """The pixels from `left` and `top`, included, to `right` and `bottom`, excluded.
+
+    A rectangle may reach outside the image. It is the only convention for rectangles in this program: compiled
+    kernels take the same four integers in the same order.
+    """
 
     left: int
     top: int
@@ -17,44 +23,93 @@ class Window(NamedTuple):
     bottom: int
 
     @classmethod
-    def whole(cls, camera: Camera) -> Self:
-        """All of a camera's image."""
-        return cls(0, 0, camera.width, camera.height)
+    def of_size(cls, left: int, top: int, width: int, height: int) -> Self:
+        """Return the rectangle of `width` by `height` pixels whose first pixel is (left, top)."""
+        return cls(int(left), int(top), int(left) + int(width), int(top) + int(height))
 
     @classmethod
-    def around(cls, camera: Camera, centre: Array, reach: float) -> Self:
-        """What may see points within `reach` metres of `centre` (3,) across the line of sight; never empty."""
-        (u, v), z = camera.project(centre), float(centre[2])
-        du, dv = camera.fx * reach / z, camera.fy * reach / z
-        left, top = min(max(int(u - du), 0), camera.width - 1), min(max(int(v - dv), 0), camera.height - 1)
-        right, bottom = min(max(int(u + du), left) + 1, camera.width), min(max(int(v + dv), top) + 1, camera.height)
-        return cls(left, top, right, bottom)
+    def of_image(cls, shape: tuple[int, ...]) -> Self:
+        """Return the rectangle of a whole image of `shape` (height, width, ...)."""
+        return cls(0, 0, shape[1], shape[0])
+
+    @classmethod
+    def bounding(cls, mask: Mask) -> Self:
+        """Return the bounding box of a mask (h, w), empty at the origin if the mask is empty."""
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if len(rows) == 0:
+            return cls(0, 0, 0, 0)
+        return cls(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+
+    @classmethod
+    def around(cls, pixels: ArrayLike, margin: ArrayLike = 0.0) -> Self:
+        """Return the smallest rectangle that holds points and `margin` around them.
+
+        pixels (N, 2): finite image coordinates, pixels, at least one.
+        margin (2,) or a scalar: pixels along x and y.
+        """
+        points = np.asarray(pixels, dtype=np.float64)
+        low = np.floor(points.min(axis=0) - margin)
+        high = np.ceil(points.max(axis=0) + margin) + 1
+        return cls(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
     @property
     def width(self) -> int:
+        """Columns."""
         return self.right - self.left
 
     @property
     def height(self) -> int:
+        """Rows."""
         return self.bottom - self.top
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width), as numpy orders an image."""
+        return self.height, self.width
+
+    @property
+    def is_empty(self) -> bool:
+        """True if the rectangle holds no pixel."""
+        return self.width <= 0 or self.height <= 0
+
+    @property
     def slices(self) -> tuple[slice, slice]:
-        """Rows and columns, to index an image with."""
+        """Rows and columns that index an image which holds the whole rectangle."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
-    def grown(self, margin: int, camera: Camera) -> "Window":
-        """With `margin` more pixels on every side, as far as the camera's image goes."""
-        return Window(
-            max(self.left - margin, 0),
-            max(self.top - margin, 0),
-            min(self.right + margin, camera.width),
-            min(self.bottom + margin, camera.height),
-        )
+    def shifted(self, dx: int, dy: int) -> "Rect":
+        """Return the rectangle moved by `dx` columns and `dy` rows."""
+        return Rect(self.left + dx, self.top + dy, self.right + dx, self.bottom + dy)
 
-    def pasted(self, mask: Mask, outer: "Window") -> Mask:
-        """`mask` (h, w) of this window as one of an `outer` window that holds it."""
-        out = np.zeros((outer.height, outer.width), dtype=np.bool_)
-        left, top = self.left - outer.left, self.top - outer.top
-        out[top : top + self.height, left : left + self.width] = mask
+    def relative_to(self, outer: "Rect") -> "Rect":
+        """Return the rectangle in the pixel coordinates of `outer`."""
+        return self.shifted(-outer.left, -outer.top)
+
+    def grown(self, margin: int) -> "Rect":
+        """Return the rectangle with `margin` more pixels on every side."""
+        return Rect(self.left - margin, self.top - margin, self.right + margin, self.bottom + margin)
+
+    def scaled(self, factor: float) -> "Rect":
+        """Return the rectangle with its edges multiplied by `factor` and rounded."""
+        return Rect(*(round(edge * factor) for edge in self))
+
+    def clipped(self, outer: "Rect") -> "Rect":
+        """Return the part inside `outer`, empty at its border if there is none."""
+        left, right = (min(max(x, outer.left), outer.right) for x in (self.left, self.right))
+        top, bottom = (min(max(y, outer.top), outer.bottom) for y in (self.top, self.bottom))
+        return Rect(left, top, right, bottom)
+
+    def paste(self, part: NDArray[Element], outer: "Rect") -> NDArray[Element]:
+        """Return an image of `outer` with `part` at this rectangle's place and zeros elsewhere.
+
+        part (height, width, ...): the image of this rectangle. What lies outside `outer` is dropped.
+        """
+        out = np.zeros((*outer.shape, *part.shape[2:]), dtype=part.dtype)
+        common = self.clipped(outer)
+        if not common.is_empty:
+            out[common.relative_to(outer).slices] = part[common.relative_to(self).slices]
         return out
+
+    def crop(self, image: NDArray[Element]) -> NDArray[Element]:
+        """Return a copy of this rectangle of an image (h, w, ...), with zeros outside the image."""
+        return Rect.of_image(image.shape).paste(image, self)

@@ -49,6 +49,11 @@ class Terms:
     skin: Array
     kinematic: Array
 
+    @property
+    def agreement(self) -> Array:
+        """The confidence (B,) in each pose, 0 to 1: how far the rendered and the observed silhouette agree."""
+        return 1 - self.skin
+
     @classmethod
     def of_sums(
         cls, objective: Objective, poses: ArrayLike, clamped: Array, matched_skin: Array, union: Array

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import CYLINDER
 from depthtrack.rendering.surface import NEAR, Surface
 from depthtrack.types import Array, Index
@@ -31,12 +32,12 @@ def raycast(
     """
     surface = Surface.empty(camera) if onto is None else onto
     inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
-    windows = np.array([_window(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64)
+    regions = np.array([_bounds(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64)
     _cast(
         np.asarray(kinds, dtype=np.int64),
         inverses,
         np.asarray(labels, dtype=np.int16),
-        windows.reshape(-1, 4),
+        regions.reshape(-1, 4),
         (camera.fx, camera.fy, camera.cx, camera.cy),
         surface.depth,
         surface.label,
@@ -45,19 +46,16 @@ def raycast(
     return surface
 
 
-def _window(camera: Camera, kind: int, T: Array) -> tuple[int, int, int, int]:
-    """Pixels (u0, u1, v0, v1) that may see a primitive: the projected corners of its bounding box."""
+def _bounds(camera: Camera, kind: int, T: Array) -> Rect:
+    """Return the pixels that may see a primitive: the projected corners of its bounding box."""
     low = 0.0 if kind == CYLINDER else -1.0
     corners = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (low, 1.0)]) @ T.T
     points = corners[:, :3] / corners[:, 3:]
     if points[:, 2].max() < NEAR:
-        return 0, 0, 0, 0
+        return Rect(0, 0, 0, 0)
     if points[:, 2].min() < NEAR:  # reaches behind the lens: no bound on its image
-        return 0, camera.width, 0, camera.height
-    uv = camera.project(points)
-    u0, v0 = np.clip(np.floor(uv.min(axis=0)), 0, [camera.width, camera.height])
-    u1, v1 = np.clip(np.ceil(uv.max(axis=0)) + 1, 0, [camera.width, camera.height])
-    return int(u0), int(u1), int(v0), int(v1)
+        return camera.rect
+    return Rect.around(camera.project(points)).clipped(camera.rect)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -65,7 +63,7 @@ def _cast(
     kinds: Index,
     inverses: Array,
     labels: NDArray[np.int16],
-    windows: Index,
+    regions: Index,
     intrinsics: tuple[float, float, float, float],
     depth: Array,
     label: NDArray[np.int16],
@@ -77,8 +75,8 @@ def _cast(
         M = inverses[n]
         # Spheres add uz^2 to the quadric; for cylinders uz only bounds the segment.
         zz = 0.0 if kinds[n] == CYLINDER else 1.0
-        for v in range(windows[n, 2], windows[n, 3]):
-            for u in range(windows[n, 0], windows[n, 1]):
+        for v in range(regions[n, 1], regions[n, 3]):
+            for u in range(regions[n, 0], regions[n, 2]):
                 dx, dy = (u - cx) / fx, (v - cy) / fy
                 # A point of the ray is (t dx, t dy, t): in the unit frame, t a + b.
                 ax = M[0, 0] * dx + M[0, 1] * dy + M[0, 2]

@@ -14,6 +14,7 @@ import numpy as np
 
 from depthtrack.errors import DepthtrackError
 from depthtrack.geometry.camera import PRESETS
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import TANGENT_SIZE, make_pose, retract
 from depthtrack.hand.shape import HandShape
@@ -63,8 +64,8 @@ def scene() -> tuple[HandShape, Target, Array]:
     rng = np.random.Generator(np.random.Philox(key=_SEED))
     spread = np.repeat([0.005, 0.1, 0.1], [3, 3, 20])
     poses = within_limits(retract(truth, rng.normal(size=(HYPOTHESES, TANGENT_SIZE)) * spread))
-    camera = PRESETS["kinect1"].crop(210, 135, 220, 220).resized(SIDE / 220)
-    blank = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    camera = PRESETS["kinect1"].crop(Rect.of_size(210, 135, 220, 220)).resized(SIDE / 220)
+    blank = Target.blank(camera)
     with OracleScorer(shape) as oracle:
         oracle.set_target(blank)
         depth = oracle.render(truth)

@@ -11,6 +11,7 @@ from depthtrack.evaluation.compare.results import figures_of
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.replay import Replay
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
@@ -19,7 +20,7 @@ from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import TrackerSeries
 from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
-from depthtrack.viewing.close_ups import Window, close_ups
+from depthtrack.viewing.close_ups import close_ups
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
 from depthtrack.viewing.panels import captioned, paint, tile_grid
@@ -28,7 +29,7 @@ from depthtrack.viewing.theme import Rgb
 
 _TRUE: Rgb = (255, 255, 255)
 _SIDE_ROOM = 1.15
-"""Half the width of a window over how far the hand reaches to a side."""
+"""Half the width of a region over how far the hand reaches to a side."""
 _MOST_BESIDE = 3
 """More panels than this go into two rows."""
 
@@ -45,7 +46,7 @@ class _Panel:
 
 
 class SideBySide:
-    """Paints frames of one recording with the first run of every tracker, all through the same window."""
+    """Paints frames of one recording with the first run of every tracker, all through the same region."""
 
     def __init__(
         self, shown: Sequence[TrackerSeries], metric: str, height: int = 300, sequence: Path | None = None
@@ -58,8 +59,8 @@ class SideBySide:
         self.indices = sorted(set().union(*(panel.row_of for panel in self._panels)))
         keypoints = self._keypoints()
         known = np.asarray(np.isfinite(keypoints).all(axis=(1, 2)), dtype=np.bool_)
-        windows = _narrowed(close_ups(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
-        self._windows = dict(zip(self.indices, windows, strict=True))
+        regions = _narrowed(close_ups(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
+        self._regions = dict(zip(self.indices, regions, strict=True))
         depths = keypoints[known, :, 2]
         near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
         self._range = max(near - 0.06, 0.05), far + 0.1
@@ -77,12 +78,12 @@ class SideBySide:
         told = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
         remark = "  ·  ".join(filter(None, (told, note)))
         colour = tracker_colour(panel.shown.number).rgb
-        close = AnnotatedFrame(frame).cropped(*self._windows[frame.index])
+        close = AnnotatedFrame(frame).cropped(self._regions[frame.index])
         image = paint(close, "colour", self._height, *self._range)
         pose = None if row is None else panel.replay.run.poses[row]
         if pose is not None and np.isfinite(pose).all():
             camera = close.camera.resized(self._height / close.camera.height)
-            surface = self._surfaces[k].seen(pose, camera)
+            surface = self._surfaces[k].render(pose, camera)
             image = _outlined(draw_surface(image, surface, 0.35), surface, colour)
             image = self._with_truth(image, close)
             image = draw_skeleton(image, camera, self._surfaces[k].model.keypoints(pose))
@@ -134,15 +135,15 @@ def _panel(shown: TrackerSeries, metric: str, sequence: Path | None) -> _Panel:
     return _Panel(shown, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
 
 
-def _narrowed(windows: list[Window], camera: Camera, keypoints: Array, known: Mask) -> list[Window]:
-    """The windows (N) without what the hand leaves empty at both sides, though never higher than wide."""
-    width, height = windows[0][2:]
+def _narrowed(regions: list[Rect], camera: Camera, keypoints: Array, known: Mask) -> list[Rect]:
+    """The regions (N) without what the hand leaves empty at both sides, though never higher than wide."""
+    height, width = regions[0].shape
     if not known.any() or width <= height:
-        return windows
-    middles = np.array([left + width / 2 for left, *_ in windows])
+        return regions
+    middles = np.array([region.left + width / 2 for region in regions])
     reach = np.abs(camera.project(keypoints[known])[..., 0] - middles[known, None]).max(axis=1)
     narrow = min(width, max(height, round(2 * _SIDE_ROOM * float(np.percentile(reach, 98)))))
-    return [(left + (width - narrow) // 2, top, narrow, height) for left, top, *_ in windows]
+    return [Rect.of_size(region.left + (width - narrow) // 2, region.top, narrow, height) for region in regions]
 
 
 def _outlined(image: Image, surface: Surface, colour: Rgb) -> Image:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Array, Array32, Depth, Index, Mask
 
 MAX_JUMP = 0.03
@@ -47,10 +47,10 @@ class Paths:
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes (rows, columns) over a window of a depth image.
+    """Nodes (rows, columns) over a region of a depth image.
 
     `depth` metres, 0 where a block shows no surface within reach; `points` (rows * columns, 3) metres in the camera
-    frame; `focal` (fx, fy) in nodes. The block of node (i, j) starts at pixel (j stride, i stride) of the window.
+    frame; `focal` (fx, fy) in nodes. The block of node (i, j) starts at pixel (j stride, i stride) of the region.
     """
 
     depth: Depth
@@ -59,15 +59,15 @@ class Grid:
     stride: int
 
     @classmethod
-    def over(cls, depth: Depth, camera: Camera, window: Window, reach: tuple[float, float], stride: int) -> Self:
-        """The grid over a window of a depth image (h, w) in metres, seen by `camera`.
+    def over(cls, depth: Depth, camera: Camera, region: Rect, reach: tuple[float, float], stride: int) -> Self:
+        """The grid over a region of a depth image (h, w) in metres, seen by `camera`.
 
         Only readings within `reach` (nearest, farthest) count.
         """
-        nodes = np.empty((-(-window.height // stride), -(-window.width // stride)), dtype=np.float32)
+        nodes = np.empty((-(-region.height // stride), -(-region.width // stride)), dtype=np.float32)
         points = np.empty((nodes.size, 3))
         lens = (camera.fx, camera.fy, camera.cx, camera.cy)
-        sample_blocks(depth, tuple(window), lens, reach[0], reach[1], stride, nodes, points)
+        sample_blocks(depth, tuple(region), lens, reach[0], reach[1], stride, nodes, points)
         return cls(nodes, points, (camera.fx / stride, camera.fy / stride), stride)
 
     @cached_property
@@ -77,7 +77,7 @@ class Grid:
 
     @property
     def edge(self) -> Mask:
-        """(rows, columns): the outermost nodes, through which a surface leaves the window."""
+        """(rows, columns): the outermost nodes, through which a surface leaves the region."""
         edge = np.zeros(self.depth.shape, dtype=np.bool_)
         edge[[0, -1], :] = edge[:, [0, -1]] = True
         return edge
@@ -106,7 +106,7 @@ class Grid:
     def inscribed(self, mask: Mask) -> Depth:
         """Radius (rows, columns), metres, of the largest circle around each node that stays within `mask`.
 
-        Measured across the line of sight; the window's edge bounds circles too.
+        Measured across the line of sight; the region's edge bounds circles too.
         """
         padded = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
         padded[1:-1, 1:-1] = mask
@@ -117,7 +117,7 @@ class Grid:
 @numba.njit(cache=True)
 def sample_blocks(
     depth: Depth,
-    window: tuple[int, int, int, int],
+    region: tuple[int, int, int, int],
     lens: tuple[float, float, float, float],
     near: float,
     far: float,
@@ -128,7 +128,7 @@ def sample_blocks(
     """Mean depth of the nearest surface of each block into `nodes`, its middle into `points`; 0 where less than a
     quarter of the block is within reach. Looks at every second pixel both ways where blocks are large enough.
     """
-    left, top, right, bottom = window
+    left, top, right, bottom = region
     fx, fy, cx, cy = lens
     jump, near32, far32 = np.float32(MAX_JUMP), np.float32(near), np.float32(far)
     step = 1 if stride < 4 else 2
@@ -159,7 +159,7 @@ def sample_blocks(
                             close += 1
                 mean = float(total) / float(close)
             nodes[i, j] = mean
-            # The block's middle, whatever part of it lies outside the window.
+            # The block's middle, whatever part of it lies outside the region.
             middle = (stride - 1) / 2
             points[i * columns + j, 0] = (u0 + middle - cx) / fx * mean
             points[i * columns + j, 1] = (v0 + middle - cy) / fy * mean

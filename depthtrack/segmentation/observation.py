@@ -7,31 +7,30 @@ from typing import Self
 
 import numpy as np
 
-from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.rendering.target import Target
 from depthtrack.segmentation.point_cloud import point_cloud
 from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior
 from depthtrack.segmentation.segmenter import HandLocator, Segmentation
 from depthtrack.segmentation.skin_colour import SkinColourModel
-from depthtrack.types import Array, Depth, Mask
+from depthtrack.types import Array, Mask
 
 
 @dataclass(frozen=True)
-class Observation:
-    """Observation O = (o_s, o_d) of Oikonomidis et al. 2011, Sec. 2.1, made once a frame and shared by all trackers.
+class Observation(Target):
+    """The hand in a frame: a target for scorers, with its place, its palm and its point cloud.
 
-    `camera` of the region of interest, whose first pixel is `origin` (left, top) in the frame; `skin` (h, w) the
-    hand's silhouette o_s; `depth` (h, w) float32 metres o_d, 0 where there is no reading of the hand. `centre` (3,)
-    metres, camera frame: about the palm's centre; `palm_radius` metres; `arm_direction` (3,) unit, from the palm
-    along the forearm, None where no arm is seen.
+    It is made once a frame and shared by all trackers.
+    `region`: of the frame, seen by `camera`.
+    `centre` (3,): about the palm's centre, metres, camera frame.
+    `palm_radius`: metres.
+    `arm_direction` (3,): unit vector from the palm along the forearm, camera frame, None if no arm is seen.
     """
 
     frame_index: int
     timestamp: float
-    camera: Camera
-    origin: tuple[int, int]
-    skin: Mask
-    depth: Depth
+    region: Rect
     centre: Array
     palm_radius: float
     arm_direction: Array | None = None
@@ -39,20 +38,23 @@ class Observation:
     @classmethod
     def of(cls, frame: Frame, found: Segmentation) -> Self:
         """The observation of a frame whose hand was found."""
-        window = found.window
-        depth = np.where(found.readings, frame.depth[window.slices], np.float32(0))
+        depth = np.where(found.readings, frame.depth[found.region.slices], np.float32(0))
         sight = found.centre / np.linalg.norm(found.centre)
         return cls(
+            frame.camera.crop(found.region),
+            found.skin,
+            depth,
             frame.index,
             frame.timestamp,
-            frame.camera.crop(window.left, window.top, window.right - window.left, window.bottom - window.top),
-            (window.left, window.top),
-            np.ascontiguousarray(found.skin),
-            np.ascontiguousarray(depth),
+            found.region,
             found.centre + PALM_HALF_THICKNESS * sight,
             found.palm_radius,
             found.arm_direction,
         )
+
+    def whole_mask(self, shape: tuple[int, ...]) -> Mask:
+        """Return the silhouette in the whole frame of `shape` (height, width)."""
+        return self.region.paste(self.skin, Rect.of_image(shape))
 
     @property
     def points(self) -> Array:

@@ -4,9 +4,10 @@ import cv2
 import numba
 import numpy as np
 
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.grid import MAX_JUMP
 from depthtrack.segmentation.palm import HAND_REACH, TIP_TO_WRIST, Palm
+from depthtrack.segmentation.roi_tracking import DILATION, ROI_MARGIN, bounding_box
 from depthtrack.segmentation.surface_grid import SurfaceGrid, dilated, disc, eroded
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Depth, Labels, Mask
@@ -18,14 +19,8 @@ NOTHING, MISSING, OTHER, READING = 0, 1, 2, 3
 """Kinds of pixels: far from the hand; without a reading, beside the hand; a reading of what hangs together with the
 hand; a reading of the hand."""
 
-DILATION = 5 / 640
-"""Radius r of the circular dilation of Oikonomidis et al. 2011, Sec. 2.1, as a share of the image's width."""
-
 MARGIN = 2
 """Nodes around the hand's into which its pixels may reach."""
-
-ROOM = 0.04
-"""Metres around the hand that the region of interest leaves for hypotheses to move in."""
 
 
 def label_hand(view: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlane | None) -> Labels:
@@ -49,35 +44,29 @@ def label_hand(view: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlan
     return labels
 
 
-def hand_masks(view: SurfaceGrid, labels: Labels, wrist: WristPlane | None) -> tuple[Window, Mask, Mask]:
+def hand_masks(view: SurfaceGrid, labels: Labels, wrist: WristPlane | None) -> tuple[Rect, Mask, Mask]:
     """The region of interest in the frame, with the hand's silhouette and its readings (h, w) in it.
 
     Within r of the outline of its readings, where depth is least sure, only what has the colour of skin is hand;
     farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
     are filled where they are skin, and the outline is smoothed. Readings count up to r outside the silhouette.
     """
-    blocks = _blocks_of_hand(labels)
-    stride, window, frame = view.grid.stride, view.window, view.frame
-    tight = Window(
-        window.left + blocks.left * stride,
-        window.top + blocks.top * stride,
-        min(window.left + blocks.right * stride, window.right),
-        min(window.top + blocks.bottom * stride, window.bottom),
-    )
+    blocks = bounding_box(labels == HAND, MARGIN)
+    stride, region, frame = view.grid.stride, view.region, view.frame
+    tight = blocks.scaled(stride).shifted(region.left, region.top).clipped(region)
     plane = (0.0, 0.0, 0.0, 0.0) if wrist is None else (*wrist.normal.tolist(), float(wrist.normal @ wrist.point))
     lens = (frame.camera.fx, frame.camera.fy, frame.camera.cx, frame.camera.cy)
-    kinds = np.empty((tight.height, tight.width), dtype=np.uint8)
+    kinds = np.empty(tight.shape, dtype=np.uint8)
     sort_pixels(frame.depth, tuple(tight), view.grid.depth, labels, tuple(blocks), stride, lens, plane, kinds)
     silhouette = readings = kinds == READING
     if view.skin is not None:
-        left, top = tight.left - window.left, tight.top - window.top
-        coloured = view.skin[top : top + tight.height, left : left + tight.width] > 0
+        coloured = view.skin[tight.relative_to(region).slices] > 0
         r = max(1, round(DILATION * frame.camera.width))
         silhouette = _silhouette(kinds, coloured, frame.depth[tight.slices] == 0, r)
         readings = readings & dilated(silhouette, r)
-    room = round(ROOM * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
-    roi = tight.grown(max(room - MARGIN * stride, 0), frame.camera)
-    return roi, tight.pasted(silhouette, roi), tight.pasted(readings, roi)
+    room = round(ROI_MARGIN * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
+    roi = tight.grown(max(room - MARGIN * stride, 0)).clipped(frame.camera.rect)
+    return roi, tight.paste(silhouette, roi), tight.paste(readings, roi)
 
 
 def _silhouette(kinds: Labels, coloured: Mask, missing: Mask, r: int) -> Mask:
@@ -109,18 +98,6 @@ def _smoothed(mask: Mask, r: int) -> Mask:
     return np.asarray(share > 85)
 
 
-def _blocks_of_hand(labels: Labels) -> Window:
-    """The hand's nodes, and MARGIN more on every side."""
-    hand = labels == HAND
-    rows, columns = np.flatnonzero(hand.any(axis=1)), np.flatnonzero(hand.any(axis=0))
-    return Window(
-        max(int(columns[0]) - MARGIN, 0),
-        max(int(rows[0]) - MARGIN, 0),
-        min(int(columns[-1]) + 1 + MARGIN, labels.shape[1]),
-        min(int(rows[-1]) + 1 + MARGIN, labels.shape[0]),
-    )
-
-
 @numba.njit(cache=True)
 def sort_pixels(
     depth: Depth,
@@ -133,9 +110,9 @@ def sort_pixels(
     plane: tuple[float, float, float, float],
     out: Labels,
 ) -> None:
-    """Kind of every pixel in the window `roi` of a depth image (h, w; metres), into `out`.
+    """Kind of every pixel in the region `roi` of a depth image (h, w; metres), into `out`.
 
-    `nodes` and `labels` (rows, columns) are the grid's, of which the window shows `blocks`. A reading belongs to the
+    `nodes` and `labels` (rows, columns) are the grid's, whose `blocks` are in the region. A reading belongs to the
     node, of its own block and those around it, whose depth is nearest to its own, if that is within MAX_JUMP: to hand
     or arm if there are any. A pixel without a reading belongs to the nearest block. Where arm and hand meet, the plane
     (a, b, c, d) decides instead: the hand is where a x + b y + c z <= d.

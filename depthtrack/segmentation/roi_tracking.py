@@ -10,18 +10,18 @@ import cv2
 import numba
 import numpy as np
 
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.skin_colour import AdaptiveSkin
 from depthtrack.segmentation.surface_grid import dilated, disc
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Depth, Labels, Mask
 
-ROOM = 0.04
+ROI_MARGIN = 0.04
 """Metres around the hand that the region of interest leaves for hypotheses to move in."""
 
 DILATION = 5 / 640
-"""Radius of the dilation of skin (ibid.: 5 pixels of 640), as a share of the image's width."""
+"""Radius of the circular dilation of skin (ibid.: 5 pixels of 640), as a share of the image's width."""
 
 FEWEST_READINGS = 30
 """Pixels of depth below which nothing can be said of a hand."""
@@ -47,9 +47,9 @@ class RoiPrior:
 
 @dataclass(frozen=True)
 class RoiMasks:
-    """`skin` and `readings` (h, w) of the hand in a `window` of the frame."""
+    """`skin` and `readings` (h, w) of the hand in a `region` of the frame."""
 
-    window: Window
+    region: Rect
     skin: Mask
     readings: Mask
 
@@ -58,15 +58,15 @@ def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> Roi
     """The hand at its expected place, or None where hardly anything is there."""
     if place.centre[2] <= 0.05:
         return None
-    window = Window.around(frame.camera, place.centre, place.reach)
-    depth = np.ascontiguousarray(frame.depth[window.slices])
+    region = frame.camera.rect_around(place.centre, place.reach)
+    depth = np.ascontiguousarray(frame.depth[region.slices])
     camera = frame.camera
-    lens = (camera.fx, camera.fy, camera.cx - window.left, camera.cy - window.top)
+    lens = (camera.fx, camera.fy, camera.cx - region.left, camera.cy - region.top)
     kinds = np.empty(depth.shape, dtype=np.uint8)
     mark_reachable(depth, lens, place.centre, place.reach, place.wrist.point, place.wrist.normal, kinds)
     readings, silhouette = kinds == READING, kinds == READING
     if skin is not None and frame.colour is not None:
-        found = skin.find(frame.colour, window, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
+        found = skin.find(frame.colour, region, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
         radius = max(1, round(DILATION * camera.width))
         readings &= dilated(found, radius)
         # Skin without a reading counts in gaps between readings: beyond them, shadows fall on what may look like skin.
@@ -76,10 +76,13 @@ def segment_roi(frame: Frame, place: RoiPrior, skin: AdaptiveSkin | None) -> Roi
     readings &= silhouette
     if np.count_nonzero(readings) < FEWEST_READINGS:
         return None
-    roi = _around(silhouette, round(ROOM * camera.fx / float(place.centre[2])))
-    part = (slice(roi.top, roi.bottom), slice(roi.left, roi.right))
-    outer = Window(roi.left + window.left, roi.top + window.top, roi.right + window.left, roi.bottom + window.top)
-    return RoiMasks(outer, silhouette[part], readings[part])
+    roi = bounding_box(silhouette, round(ROI_MARGIN * camera.fx / float(place.centre[2])))
+    return RoiMasks(roi.shifted(region.left, region.top), silhouette[roi.slices], readings[roi.slices])
+
+
+def bounding_box(mask: Mask, margin: int) -> Rect:
+    """Return the bounding box of a mask (h, w) with `margin` pixels around it, within the image."""
+    return Rect.bounding(mask).grown(margin).clipped(Rect.of_image(mask.shape))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -115,13 +118,3 @@ def _without_specks(mask: Mask) -> Mask:
     areas = statistics[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0
     return np.asarray((areas >= SMALL_PIECE * areas.max())[labels])
-
-
-def _around(mask: Mask, room: int) -> Window:
-    """The mask's bounding box with some room, within its image."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if len(rows) == 0:
-        return Window(0, 0, 1, 1)
-    height, width = mask.shape
-    left, top = max(int(columns[0]) - room, 0), max(int(rows[0]) - room, 0)
-    return Window(left, top, min(int(columns[-1]) + 1 + room, width), min(int(rows[-1]) + 1 + room, height))

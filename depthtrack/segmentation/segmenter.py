@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.flying_pixels import flying_pixels
 from depthtrack.segmentation.forearm import Arm, find_arm, find_vanishing_arm
@@ -36,14 +36,14 @@ MEMORY = 0.5
 
 @dataclass(frozen=True)
 class Segmentation:
-    """A hand found in a frame. Masks cover `window` of the frame, which leaves room around the hand.
+    """A hand found in a frame. Masks cover `region` of the frame, which leaves room around the hand.
 
     `skin` (h, w) the hand's silhouette; `readings` (h, w) where the depth is the hand's; `centre` (3,) of the palm on
     the visible surface, metres, camera frame; `palm_radius` of the circle inscribed in it; `arm_direction` (3,) unit,
     from the palm along the forearm, or None where no arm is seen or looked for; `wrist` the plane of the cut, if any.
     """
 
-    window: Window
+    region: Rect
     skin: Mask
     readings: Mask
     centre: Array
@@ -101,20 +101,20 @@ class HandLocator:
         self._arm_direction = None
         self._wrist.expect(place.wrist.point + to_surface)
         radius = float(np.linalg.norm(place.wrist.point - place.centre))
-        return Segmentation(masks.window, masks.skin, masks.readings, self._last, radius, None, place.wrist)
+        return Segmentation(masks.region, masks.skin, masks.readings, self._last, radius, None, place.wrist)
 
     def _start(self, frame: Frame) -> Array | None:
         """Where a hand is (3,), metres, looking at the whole frame."""
         stride = max(1, round(frame.camera.width / START_COLUMNS))
-        view = build_grid(frame, Window.whole(frame.camera), (NEAREST, FARTHEST), stride, self._skin)
+        view = build_grid(frame, frame.camera.rect, (NEAREST, FARTHEST), stride, self._skin)
         return find_start(view.grid, view.surface, self._last)
 
     def _follow(self, frame: Frame, last: Array) -> Segmentation | None:
         """The hand within DEPTH_WINDOW of its last position (3,)."""
         z = float(last[2])
-        window = Window.around(frame.camera, last, DEPTH_WINDOW)
+        region = frame.camera.rect_around(last, DEPTH_WINDOW)
         reach = (max(z - DEPTH_WINDOW, NEAREST), z + DEPTH_WINDOW)
-        view = build_grid(frame, window, reach, max(1, round(NODE_SIZE * frame.camera.fx / z)), self._skin)
+        view = build_grid(frame, region, reach, max(1, round(NODE_SIZE * frame.camera.fx / z)), self._skin)
         palm = nearest_palm(view.grid, view.surface, last)
         if palm is None:
             return None
@@ -147,17 +147,16 @@ class HandLocator:
         self._arm_direction = None
         self._wrist.forget()
 
-    def _learn(self, view: SurfaceGrid, roi: Window, hand: Mask) -> None:
+    def _learn(self, view: SurfaceGrid, roi: Rect, hand: Mask) -> None:
         """Adapt to the colours of the hand and of what is around it."""
         if self._skin is None or view.skin is None or view.frame.colour is None:
             return
-        left, top = roi.left - view.window.left, roi.top - view.window.top
-        skin = view.skin[top : top + roi.height, left : left + roi.width]
+        skin = view.skin[roi.relative_to(view.region).slices]
         self._skin.learn(view.frame.colour, roi, np.ascontiguousarray(skin), np.ascontiguousarray(hand))
 
     def _without_flying(self, frame: Frame, found: Segmentation) -> Segmentation:
         """The hand without readings that hang in the air, where depth alone tells what is hand."""
         if self._skin is not None and frame.colour is not None:
             return found
-        hand = ~flying_pixels(frame.depth[found.window.slices], frame.camera.fx)
+        hand = ~flying_pixels(frame.depth[found.region.slices], frame.camera.fx)
         return replace(found, readings=found.readings & hand, skin=found.skin & hand)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_json, write_atomic
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.types import Array, Image, Index, Labels, Mask
 
@@ -84,7 +84,7 @@ class SkinColourModel:
         for image, mask in labelled:
             if image.shape != (*mask.shape, 3):
                 raise InputError(f"an image of shape {image.shape} cannot have a mask of shape {mask.shape}")
-            whole = Window(0, 0, image.shape[1], image.shape[0])
+            whole = Rect.of_image(image.shape)
             counts += _count(np.ascontiguousarray(image), whole, mask.astype(np.uint8), mask, step=1)
         other, skin = counts
         if skin.sum() == 0 or other.sum() == 0:
@@ -169,12 +169,12 @@ class AdaptiveSkin:
         self._total = np.zeros((2, BINS, BINS))
         self._classes = class_of_colour(self._offline)
 
-    def learn(self, image: Image, window: Window, skin: Labels, hand: Mask) -> None:
-        """Take in a window of an RGB image: its `skin` (h, w; not 0) that is `hand` (h, w), and what is neither.
+    def learn(self, image: Image, region: Rect, skin: Labels, hand: Mask) -> None:
+        """Take in a region of an RGB image: its `skin` (h, w; not 0) that is `hand` (h, w), and what is neither.
 
         Skin elsewhere, as a face's or the arm's, and what the hand has that is no skin, are left out.
         """
-        self._recent.append(_count(image, window, skin, hand, step=3))
+        self._recent.append(_count(image, region, skin, hand, step=3))
         self._total += self._recent[-1]
         if len(self._recent) > WINDOW:
             self._total -= self._recent.popleft()
@@ -189,18 +189,18 @@ class AdaptiveSkin:
         blended[known] = OFFLINE_WEIGHT * blended[known] + (1 - OFFLINE_WEIGHT) * skin[known] / seen[known]
         return blended
 
-    def find(self, image: Image, window: Window, blocks: Labels, stride: int) -> Labels:
-        """1 on skin, over a window of an RGB image (h, w, 3), found with hysteresis.
+    def find(self, image: Image, region: Rect, blocks: Labels, stride: int) -> Labels:
+        """1 on skin, over a region of an RGB image (h, w, 3), found with hysteresis.
 
         Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are looked at.
         """
-        skin = np.zeros((window.height, window.width), dtype=np.uint8)
+        skin = np.zeros((region.height, region.width), dtype=np.uint8)
         rows, columns = np.flatnonzero(blocks.any(axis=1)), np.flatnonzero(blocks.any(axis=0))
         if len(rows):
             i0, i1, j0, j1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
             part = skin[i0 * stride : i1 * stride, j0 * stride : j1 * stride]
             classes = np.empty(part.shape, dtype=np.uint8)
-            left, top = int(window.left + j0 * stride), int(window.top + i0 * stride)
+            left, top = int(region.left + j0 * stride), int(region.top + i0 * stride)
             classify(image, left, top, self._classes, np.ascontiguousarray(blocks[i0:i1, j0:j1]), stride, classes)
             part[:] = grow_skin(classes)
         return skin
@@ -219,10 +219,10 @@ def _place_of_colour() -> NDArray[np.intp]:
     return np.where(bins < 0, BINS * BINS, bins)
 
 
-def _count(image: Image, window: Window, skin: Labels, hand: Mask, step: int) -> Array:
+def _count(image: Image, region: Rect, skin: Labels, hand: Mask, step: int) -> Array:
     """Pixels (2, 64, 64) of neither skin nor hand, and of both, by U and V bin; every `step`-th both ways."""
     counts = np.zeros((2, BINS * BINS))
-    count_colours(image, tuple(window), skin, hand, step, _bin_of_colour(), counts)
+    count_colours(image, tuple(region), skin, hand, step, _bin_of_colour(), counts)
     return counts.reshape(2, BINS, BINS)
 
 
@@ -234,15 +234,15 @@ def _colour_index(image: Image, y: int, x: int) -> int:
 @numba.njit(cache=True)
 def count_colours(
     image: Image,
-    window: tuple[int, int, int, int],
+    region: tuple[int, int, int, int],
     skin: Labels,
     hand: Mask,
     step: int,
     bin_of_colour: NDArray[np.int16],
     counts: Array,
 ) -> None:
-    """Add to `counts` (2, 4096) the pixels of a window where `skin` and `hand` (h, w) agree, by that and by bin."""
-    left, top, _, _ = window
+    """Add to `counts` (2, 4096) the pixels of a region where `skin` and `hand` (h, w) agree, by that and by bin."""
+    left, top, _, _ = region
     for v in range(0, skin.shape[0], step):
         for u in range(0, skin.shape[1], step):
             if (skin[v, u] != 0) == hand[v, u]:

@@ -1,4 +1,4 @@
-"""What is seen through a window of a frame: surfaces on a grid, and which of them may be hand."""
+"""What is seen in a region of a frame: surfaces on a grid, and which of them may be hand."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -7,7 +7,7 @@ import cv2
 import numba
 import numpy as np
 
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.skin_colour import AdaptiveSkin
@@ -16,28 +16,28 @@ from depthtrack.types import Array32, Labels, Mask
 
 @dataclass(frozen=True)
 class SurfaceGrid:
-    """`grid` of everything within reach in a `window` of a frame, and `surface`, its nodes that may be hand: those of
-    skin, or all of them where only depth is used. `skin` (h, w) covers the window, not 0 on skin, or None."""
+    """`grid` of everything within reach in a `region` of a frame, and `surface`, its nodes that may be hand: those of
+    skin, or all of them where only depth is used. `skin` (h, w) covers the region, not 0 on skin, or None."""
 
     frame: Frame
-    window: Window
+    region: Rect
     grid: Grid
     surface: Grid
     skin: Labels | None
 
 
 def build_grid(
-    frame: Frame, window: Window, reach: tuple[float, float], stride: int, skin: AdaptiveSkin | None
+    frame: Frame, region: Rect, reach: tuple[float, float], stride: int, skin: AdaptiveSkin | None
 ) -> SurfaceGrid:
     """A view of what is between `reach` (nearest, farthest; metres), on blocks of `stride` x `stride` pixels."""
-    grid = Grid.over(frame.depth, frame.camera, window, reach, stride)
+    grid = Grid.over(frame.depth, frame.camera, region, reach, stride)
     if skin is None or frame.colour is None:
-        return SurfaceGrid(frame, window, grid, grid, None)
+        return SurfaceGrid(frame, region, grid, grid, None)
     # Colour is asked only about what is within reach, and right beside it: edges of depth are ragged.
     beside = cv2.dilate((grid.depth > 0).astype(np.uint8), disc(1))
     blocks = np.asarray(beside, dtype=np.uint8)
-    found = skin.find(frame.colour, window, blocks, stride)
-    return SurfaceGrid(frame, window, grid, grid.within(_closed(_covered(found, stride, 0.25, blocks))), found)
+    found = skin.find(frame.colour, region, blocks, stride)
+    return SurfaceGrid(frame, region, grid, grid.within(_closed(_covered(found, stride, 0.25, blocks))), found)
 
 
 def blind_skin(view: SurfaceGrid, skin: AdaptiveSkin) -> Mask:
@@ -45,8 +45,8 @@ def blind_skin(view: SurfaceGrid, skin: AdaptiveSkin) -> Mask:
     if view.frame.colour is None:
         return np.zeros(view.grid.depth.shape, dtype=np.bool_)
     everywhere = np.ones(view.grid.depth.shape, dtype=np.uint8)
-    missing = _covered((view.frame.depth[view.window.slices] == 0).astype(np.uint8), view.grid.stride, 0.5, everywhere)
-    found = skin.find(view.frame.colour, view.window, missing.astype(np.uint8), view.grid.stride)
+    missing = _covered((view.frame.depth[view.region.slices] == 0).astype(np.uint8), view.grid.stride, 0.5, everywhere)
+    found = skin.find(view.frame.colour, view.region, missing.astype(np.uint8), view.grid.stride)
     return missing & _covered(found, view.grid.stride, 0.5, missing.astype(np.uint8))
 
 

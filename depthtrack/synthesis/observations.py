@@ -12,11 +12,9 @@ import numpy as np
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.roi_tracking import ROI_MARGIN, bounding_box
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
 from depthtrack.types import Array
-
-ROOM = 0.04
-"""Metres around the hand's silhouette that the region of interest takes in."""
 
 FILMS_KEPT = 1
 """A film of 360 frames at half a metre takes 160 MB: experiments go through their conditions one after another, and a
@@ -60,14 +58,9 @@ class Film:
 def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation:
     """The observation of a frame that shows a hand and nothing behind it."""
     camera, hand = made.sensor.camera, made.options.hand
-    rows, columns = np.nonzero(frame.mask)
-    margin = round(ROOM * camera.fx / float(np.median(frame.exact_depth[rows, columns])))
-    top, left = max(int(rows.min()) - margin, 0), max(int(columns.min()) - margin, 0)
-    bottom = min(int(rows.max()) + 1 + margin, camera.height)
-    right = min(int(columns.max()) + 1 + margin, camera.width)
-    window = (slice(top, bottom), slice(left, right))
-    roi = camera.crop(left, top, right - left, bottom - top)
-    depth = np.ascontiguousarray(frame.depth[window], dtype=np.float32)
+    region = bounding_box(frame.mask, round(ROI_MARGIN * camera.fx / float(np.median(frame.exact_depth[frame.mask]))))
+    roi = camera.crop(region)
+    depth = np.ascontiguousarray(frame.depth[region.slices], dtype=np.float32)
     v, u = np.nonzero(depth)
     surface = np.median(roi.unproject(np.stack([u, v], axis=-1), depth[v, u]), axis=0)
     inwards = surface / np.linalg.norm(surface)
@@ -75,8 +68,8 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
         frame_index=index,
         timestamp=frame.timestamp,
         camera=roi,
-        origin=(left, top),
-        skin=np.ascontiguousarray(frame.skin[window]),
+        region=region,
+        skin=frame.skin[region.slices],
         depth=depth,
         centre=surface + hand.palm_thickness * hand.scale / 2 * inwards,
         palm_radius=hand.palm_breadth * hand.scale / 2,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.hand_surface import HandDrawer, PrimitiveHand, SkinHand
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.backdrop import FOREARM, Backdrop
@@ -20,35 +20,6 @@ from depthtrack.synthesis.forearm import Forearm
 from depthtrack.types import Array, Mask
 
 HandKind = Literal["primitives", "skin"]
-
-
-class DrawsHand(Protocol):
-    """Draws a posed hand into a surface, labelled by body (0 to 15)."""
-
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
-        """`transforms` T_camera_body (16, 4, 4), metres."""
-        ...
-
-
-@dataclass(frozen=True)
-class PrimitiveHand:
-    """The hand of spheres and cylinders."""
-
-    primitives: Primitives
-
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
-        raycast(camera, self.primitives.kinds, self.primitives.placed(transforms), self.primitives.bodies, onto)
-
-
-@dataclass(frozen=True)
-class SkinHand:
-    """The skinned mesh."""
-
-    skin: Skin
-
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
-        vertices = self.skin.vertices(transforms)
-        rasterise(camera, vertices, self.skin.faces, self.skin.normals(vertices), self.skin.face_bodies, onto)
 
 
 @dataclass(frozen=True)
@@ -107,7 +78,7 @@ class Scene:
         return HandModel(self.shape)
 
     @cached_property
-    def _hand(self) -> DrawsHand:
+    def _hand(self) -> HandDrawer:
         return PrimitiveHand(Primitives.of(self.shape)) if self.kind == "primitives" else SkinHand(Skin.of(self.shape))
 
     @cached_property

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Self, TypeVar
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
 from depthtrack.types import Array, Mask
 from depthtrack.viewing.depth_colours import depth_range
-
-Pixel = TypeVar("Pixel", bound=np.generic)
 
 MaskEstimator = Callable[[Frame], Mask | None]
 """Finds the hand's silhouette (h, w) in a frame, or None where it sees no hand. Called on frames in their order."""
@@ -45,8 +43,8 @@ class AnnotatedFrame:
         """Camera of the frame."""
         return self.frame.camera
 
-    def hand_box(self) -> tuple[int, int, int, int] | None:
-        """(left, top, right, bottom) pixels, ends excluded, around the silhouette and the keypoints seen; or None."""
+    def hand_box(self) -> Rect | None:
+        """Return the bounding box of the silhouette and the keypoints in sight, None without either."""
         pixels = [np.empty((0, 2))]
         if self.mask is not None:
             pixels.append(np.argwhere(self.mask)[:, ::-1].astype(np.float64))
@@ -54,24 +52,20 @@ class AnnotatedFrame:
             pixels.append(self.camera.project(self.keypoints))
         found = np.concatenate(pixels)
         found = found[np.isfinite(found).all(axis=1)]
-        if len(found) == 0:
-            return None
-        (left, top), (right, bottom) = np.floor(found.min(axis=0)), np.floor(found.max(axis=0)) + 1
-        return int(left), int(top), int(right), int(bottom)
+        return Rect.around(np.floor(found)) if len(found) else None
 
-    def cropped(self, left: int, top: int, width: int, height: int) -> "AnnotatedFrame":
-        """The window whose first pixel is (left, top); what lies outside the image is black and without reading."""
+    def cropped(self, region: Rect) -> "AnnotatedFrame":
+        """Return a region of the frame; what lies outside the image is black and without reading."""
         frame = self.frame
-        window = (left, top, width, height)
         return AnnotatedFrame(
             Frame(
                 frame.index,
                 frame.timestamp,
-                _crop(frame.depth, *window),
-                None if frame.colour is None else _crop(frame.colour, *window),
-                self.camera.crop(*window),
+                region.crop(frame.depth),
+                None if frame.colour is None else region.crop(frame.colour),
+                self.camera.crop(region),
             ),
-            None if self.mask is None else _crop(self.mask, *window),
+            None if self.mask is None else region.crop(self.mask),
             self.mask_is_true,
             self.keypoints,
         )
@@ -102,12 +96,3 @@ def evenly_chosen(length: int, count: int) -> list[int]:
 def sequence_depth_range(sequence: Sequence) -> tuple[float, float]:
     """Near and far, metres, of a few frames spread over a recording: one scale for all of its pictures."""
     return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
-
-
-def _crop(image: NDArray[Pixel], left: int, top: int, width: int, height: int) -> NDArray[Pixel]:
-    out = np.zeros((height, width, *image.shape[2:]), dtype=image.dtype)
-    x0, y0 = max(left, 0), max(top, 0)
-    x1, y1 = min(left + width, image.shape[1]), min(top + height, image.shape[0])
-    if x0 < x1 and y0 < y1:
-        out[y0 - top : y1 - top, x0 - left : x1 - left] = image[y0:y1, x0:x1]
-    return out

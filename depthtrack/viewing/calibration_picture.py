@@ -7,6 +7,7 @@ import numpy as np
 
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
@@ -32,7 +33,7 @@ def calibration_picture(calibration: Calibration) -> Image:
     rows = []
     for i in shown_views(calibration.observations):
         o = calibration.observations[i]
-        camera = _square(o.camera).resized(_HEIGHT / max(o.camera.shape))
+        camera = o.camera.crop(_square(o.camera.shape)).resized(_HEIGHT / max(o.camera.shape))
         ground, outline = _ground(o, camera)
         tiles = [captioned(ground, f"frame {o.frame_index}", "depth")]
         for name, hand, pose in (
@@ -52,18 +53,16 @@ def shown_views(observations: Sequence[Observation]) -> list[int]:
     return sorted(chosen, key=lambda i: observations[i].frame_index)
 
 
-def _square(camera: Camera) -> Camera:
-    """With as much room on all sides that rows and columns are as many: pictures of one size."""
-    side = max(camera.shape)
-    return camera.crop((camera.width - side) // 2, (camera.height - side) // 2, side, side)
+def _square(shape: tuple[int, int]) -> Rect:
+    """Return the square around an image of `shape` (height, width): pictures of one size."""
+    side = max(shape)
+    return Rect.of_size((shape[1] - side) // 2, (shape[0] - side) // 2, side, side)
 
 
 def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
     """The observed depth in colours, and the outline of the silhouette (h, w)."""
-    side, (h, w) = max(o.depth.shape), o.depth.shape
-    top, left = -((h - side) // 2), -((w - side) // 2)
-    depth, skin = np.zeros((side, side), np.float32), np.zeros((side, side), np.uint8)
-    depth[top : top + h, left : left + w], skin[top : top + h, left : left + w] = o.depth, o.skin
+    square = _square(o.camera.shape)
+    depth, skin = square.crop(o.depth), square.crop(o.skin.astype(np.uint8))
     size = (camera.width, camera.height)
     large = cv2.resize(skin, size, interpolation=cv2.INTER_NEAREST)
     readings = depth[depth > 0]

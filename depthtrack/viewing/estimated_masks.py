@@ -1,7 +1,5 @@
 """The hand as segmentation finds it, for pictures of recordings that know no true silhouette."""
 
-import numpy as np
-
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.segmenter import HandLocator
 from depthtrack.segmentation.skin_colour import SkinColourModel
@@ -15,11 +13,6 @@ def mask_estimator() -> MaskEstimator:
 
     def estimate(frame: Frame) -> Mask | None:
         found = segmenter.locate(frame)
-        if found is None:
-            return None
-        mask = np.zeros(frame.camera.shape, dtype=np.bool_)
-        left, top, right, bottom = found.window
-        mask[top:bottom, left:right] = found.skin
-        return mask
+        return None if found is None else found.region.paste(found.skin, frame.camera.rect)
 
     return estimate

@@ -44,7 +44,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
         rr, stream, estimate, frame = self._rr, self._stream, item.estimate, item.frame
         moment = run_moment(item, self._surface.model)
         self.log_moment(moment)
-        surface = None if estimate.pose is None else self._surface.seen(estimate.pose, frame.camera)
+        surface = None if estimate.pose is None else self._surface.render(estimate.pose, frame.camera)
         self._log_or_clear(f"{CAMERA}/hypothesis", None if surface is None else _picture(rr, surface))
         rendered = np.zeros(frame.camera.shape) if surface is None else surface.depth
         stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, moment.mask), -7))

@@ -7,11 +7,12 @@ import numpy as np
 
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.rendering.surface import Surface
 from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
-from depthtrack.viewing.close_ups import Window, close_ups
+from depthtrack.viewing.close_ups import close_ups
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.overlay import dimmed, draw_skeleton
 from depthtrack.viewing.panels import blank, captioned, paint, stacked, tile_grid
@@ -33,7 +34,7 @@ class RunPainter:
         run, camera = replay.run, replay.sequence.camera
         self._replay, self._surface, self._height = replay, replay.surface(), height
         keypoints = HandModel(replay.hand).keypoints(run.poses)
-        self._windows = close_ups(camera, keypoints, _trusted(replay))
+        self._regions = close_ups(camera, keypoints, _trusted(replay))
         self._near, self._far = hand_range(replay)
         self._scene_near, self._scene_far = hand_range(replay, room=0.5)
         self._timeline: Timeline | None = None
@@ -54,10 +55,10 @@ class RunPainter:
         "recording" and "overlay" show the hypothesis over the colour image, where there is one.
         """
         moment = run_moment(seen, self._surface.model)
-        close = moment.cropped(*self._windows[seen.row])
+        close = moment.cropped(self._regions[seen.row])
         if layer == "recording":
             image = self._overlay(seen, moment, self._scene_near, self._scene_far)
-            _draw_frame(image, self._windows[seen.row], self._height / moment.camera.height)
+            _draw_frame(image, self._regions[seen.row], self._height / moment.camera.height)
         elif layer == "overlay":
             image = self._overlay(seen, close, self._near, self._far)
         elif layer == "hypothesis":
@@ -95,7 +96,7 @@ class RunPainter:
         """The hypothesis as a view of this camera shows it."""
         if seen.estimate.pose is None:
             return None
-        return self._surface.seen(seen.estimate.pose, camera.resized(self._height / camera.height))
+        return self._surface.render(seen.estimate.pose, camera.resized(self._height / camera.height))
 
     def _caption(self, seen: ReplayedFrame, layer: RunLayer) -> tuple[str, str]:
         if layer == "recording":
@@ -123,10 +124,7 @@ def run_moment(seen: ReplayedFrame, model: HandModel) -> AnnotatedFrame:
     """The frame with the observed silhouette and the tracked keypoints."""
     moment = AnnotatedFrame(seen.frame)
     if seen.observation is not None:
-        mask = np.zeros(seen.frame.camera.shape, dtype=np.bool_)
-        (left, top), (height, width) = seen.observation.origin, seen.observation.camera.shape
-        mask[top : top + height, left : left + width] = seen.observation.skin
-        moment = replace(moment, mask=mask)
+        moment = replace(moment, mask=seen.observation.whole_mask(seen.frame.camera.shape))
     if seen.estimate.pose is not None:
         moment = replace(moment, keypoints=model.keypoints(seen.estimate.pose))
     return moment
@@ -151,11 +149,9 @@ def _of_width(image: Image, width: int) -> Image:
     return image[:, :width] if missing <= 0 else np.pad(image, ((0, 0), (0, missing), (0, 0)), mode="edge")
 
 
-def _draw_frame(image: Image, window: Window, factor: float) -> None:
+def _draw_frame(image: Image, region: Rect, factor: float) -> None:
     """The outline of a close-up, in place."""
-    left, top, right, bottom = (
-        round(edge * factor) for edge in (window[0], window[1], window[0] + window[2], window[1] + window[3])
-    )
+    left, top, right, bottom = region.scaled(factor)
     height, width = image.shape[:2]
     for colour, grow in ((OUTLINE, 1), (FAINT_TEXT, 0)):
         rows = slice(max(top - grow, 0), max(bottom + grow, 0))

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from depthtrack.errors import InputError
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_range
@@ -22,7 +23,7 @@ SMALLEST_SIDE = 32
 def strip(moments: Iterable[AnnotatedFrame], width: int = 1600) -> Image:
     """A banner (h, w, 3) of `width` pixels: a column a moment, a row a view, close on the hand.
 
-    Every moment is seen through a window of the same size, so that sizes compare. Rows with nothing to show are
+    Every moment is seen in a region of the same size, so that sizes compare. Rows with nothing to show are
     left out. Raises InputError without any moment to show, or with more than there is room for.
     """
     moments = list(moments)
@@ -53,15 +54,15 @@ def _has(moments: Sequence[AnnotatedFrame], layer: Layer) -> bool:
 
 
 def _close_on_the_hand(moments: Sequence[AnnotatedFrame]) -> list[AnnotatedFrame]:
-    """Square windows of one size around the hand, or around the image's middle where no hand is known."""
+    """Square regions of one size around the hand, or around the image's middle where no hand is known."""
     boxes = [moment.hand_box() for moment in moments]
-    extents = [max(right - left, bottom - top) for left, top, right, bottom in filter(None, boxes)]
+    extents = [max(box.shape) for box in boxes if box is not None]
     smallest = min(moments[0].camera.shape)
     side = min(round(1.2 * max(extents)), smallest) if extents else smallest
     out = []
     for moment, box in zip(moments, boxes, strict=True):
-        left, top, right, bottom = box or (0, 0, moment.camera.width, moment.camera.height)
-        out.append(moment.cropped((left + right - side) // 2, (top + bottom - side) // 2, side, side))
+        left, top, right, bottom = box or moment.camera.rect
+        out.append(moment.cropped(Rect.of_size((left + right - side) // 2, (top + bottom - side) // 2, side, side)))
     return out
 
 

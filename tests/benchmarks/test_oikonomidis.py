@@ -30,7 +30,7 @@ from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.geometry.rotations import quaternion_exp
 from depthtrack.hand.pose import make_pose
 from depthtrack.rendering.oracle import OracleScorer
-from depthtrack.rendering.target import Target
+from depthtrack.segmentation.roi_tracking import ROI_MARGIN
 from depthtrack.synthesis import observations as films
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.synthesis.observations import film, observe
@@ -56,7 +56,7 @@ def test_a_film_shows_the_true_hand_with_room_around(recording: Synthesis) -> No
     seen, oracle = film(recording), OracleScorer(recording.hand)
     for index in (0, 29):
         observation = seen[index]
-        oracle.set_target(Target(observation.camera, observation.skin, observation.depth))
+        oracle.set_target(observation)
         expected = oracle.render(seen.poses[index])
         np.testing.assert_array_equal(observation.skin, expected > 0)
         np.testing.assert_allclose(observation.depth, expected, atol=2e-4)
@@ -65,7 +65,7 @@ def test_a_film_shows_the_true_hand_with_room_around(recording: Synthesis) -> No
         height, width = observation.skin.shape
         pixel = np.median(expected[expected > 0]) / observation.camera.fx
         for room in (rows.min(), columns.min(), height - 1 - rows.max(), width - 1 - columns.max()):
-            assert room * pixel == pytest.approx(films.ROOM, rel=0.05)
+            assert room * pixel == pytest.approx(ROI_MARGIN, rel=0.05)
         assert np.linalg.norm(observation.centre - seen.poses[index, :3]) < 0.06
 
 

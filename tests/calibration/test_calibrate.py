@@ -46,7 +46,7 @@ def _rendered(pose: np.ndarray) -> Observation:
     vertices = skin.at(pose)
     surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
     depth = surface.depth.astype(np.float32)
-    return Observation(0, 0.0, camera, (0, 0), depth > 0, depth, pose[:3].copy(), palm_radius=0.04)
+    return Observation(camera, depth > 0, depth, 0, 0.0, camera.rect, pose[:3].copy(), palm_radius=0.04)
 
 
 def _empty_room(folder: Path) -> Path:

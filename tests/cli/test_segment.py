@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from depthtrack.cli import main
-from depthtrack.evaluation.segmentation import overlap, summary
+from depthtrack.evaluation.segmentation import summary
 from depthtrack.segmentation.skin_colour import SkinColourModel
 
 FRAMES = 16
@@ -22,16 +22,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     options = ("--sensor", "kinect1", "--background", "room", "--frames", str(FRAMES))
     assert main(["synth", "everyday", str(folder), *options]) == 0
     return folder
-
-
-def test_overlap_of_hand_counted_masks() -> None:
-    a, b = np.zeros((4, 4), np.bool_), np.zeros((4, 4), np.bool_)
-    a[0, :3] = True
-    b[0, 1:] = True
-    assert overlap(a, b) == pytest.approx(2 / 4)
-    assert overlap(None, b) == 0
-    assert overlap(None, np.zeros((4, 4), np.bool_)) == 1
-    assert overlap(np.zeros((4, 4), np.bool_), np.zeros((4, 4), np.bool_)) == 1
 
 
 def test_summary_counts_what_was_found() -> None:

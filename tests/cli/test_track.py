@@ -16,7 +16,6 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.target import Target
 
 FRAMES = 14
 RESOLUTION = 64
@@ -78,7 +77,7 @@ def test_a_run_is_replayed_exactly_as_the_tracker_saw_it(run: Path) -> None:
         for seen in replay:
             assert seen.observation is not None
             assert seen.estimate.pose is not None
-            observed = Target(seen.observation.camera, seen.observation.skin, seen.observation.depth)
+            observed = seen.observation
             scorer.set_target(observed.reduced(RESOLUTION))
             assert scorer.score(seen.estimate.pose[None])[0] == seen.estimate.energy
 

@@ -16,7 +16,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
-from depthtrack.rendering.hand_surface import ModelSurface
+from depthtrack.rendering.hand_surface import HandSurface
 from tests.support.runs import synthesise, true_poses, write_run
 
 FRAMES = 6
@@ -232,20 +232,20 @@ def test_another_recording_is_no_recording_of_this_run(
 
 
 @pytest.mark.parametrize("skin", [False, True])
-def test_the_window_holds_all_of_the_hand(recording: Path, skin: bool) -> None:
+def test_the_bounds_hold_all_of_the_hand(recording: Path, skin: bool) -> None:
     camera = open_sequence(recording).camera
-    surface = ModelSurface.of(HandShape(), skin)
+    surface = HandSurface.of(HandShape(), skin)
     for pose in true_poses(recording)[[0, 3]]:
         for x in (0.0, 0.25):  # in the middle of the image, and cut by its border
             there = moved(pose, x=x)
-            np.testing.assert_array_equal(surface.silhouette(there, camera), surface.seen(there, camera).depth > 0)
-    assert surface.window(moved(pose, x=3.0), camera) is None
+            np.testing.assert_array_equal(surface.silhouette(there, camera), surface.render(there, camera).depth > 0)
+    assert surface.bounds(moved(pose, x=3.0), camera).is_empty
     assert len(visible_points(surface, moved(pose, x=3.0), camera)) == 0
 
 
 def test_points_of_the_model_are_as_fine_far_away_as_near(recording: Path) -> None:
     camera, pose = open_sequence(recording).camera, true_poses(recording)[0]
-    surface = ModelSurface.of(HandShape(), skin=False)
+    surface = HandSurface.of(HandShape(), skin=False)
     for distance in (0.5, 2.0):
         points = visible_points(surface, moved(pose, z=distance - pose[2]), camera)
         spacing = np.asarray(cKDTree(points).query(points, k=2)[0])

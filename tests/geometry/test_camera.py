@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import PRESETS, Camera
+from depthtrack.geometry.rectangle import Rect
 
 CAMERA = Camera(640, 480, 525.0, 520.0, 319.5, 239.5)
 FIELDS = json.loads(CAMERA.to_json())
@@ -25,9 +26,9 @@ FIELDS = json.loads(CAMERA.to_json())
 def test_unprojecting_undoes_projecting_in_every_window(u: float, v: float, z: float, left: int, top: int) -> None:
     point = CAMERA.unproject([u, v], z)
     np.testing.assert_allclose(CAMERA.project(point), [u, v], atol=1e-6)
-    window = CAMERA.crop(left, top, 96, 64)
-    np.testing.assert_allclose(window.project(point), [u - left, v - top], atol=1e-6)
-    assert window.shape == (64, 96)
+    region = CAMERA.crop(Rect.of_size(left, top, 96, 64))
+    np.testing.assert_allclose(region.project(point), [u - left, v - top], atol=1e-6)
+    assert region.shape == (64, 96)
 
 
 @given(z=st.floats(0.2, 3), x=st.floats(-0.5, 0.5))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
@@ -79,7 +80,7 @@ def test_agrees_with_the_oracle_where_views_are_absurd(run: Run, name: str, seed
     run(views.assert_absurd_view_agrees, name, seed)
 
 
-def test_agrees_with_the_oracle_in_windows_beyond_the_image(run: Run) -> None:
+def test_agrees_with_the_oracle_in_regions_beyond_the_image(run: Run) -> None:
     run(views.assert_overhanging_windows_agree)
 
 
@@ -97,7 +98,7 @@ def test_a_score_does_not_depend_on_the_batch_around_it(sums: Sums) -> None:
     """No tile leaks into its neighbours, though hands hang over all their borders, and no batch is too large."""
     rng = np.random.default_rng(5)
     shape, poses = random_shape(rng), random_poses(rng, 40, (0, 0, 0.35), 0.08)
-    target = target_of(shape, poses[0], KINECT.crop(250, 180, 301, 203), rng)
+    target = target_of(shape, poses[0], KINECT.crop(Rect.of_size(250, 180, 301, 203)), rng)
     with OpenGLScorer(shape, sums=sums) as scorer:
         scorer.set_target(target)
         together = scorer.score(poses)
@@ -139,9 +140,9 @@ def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape, camera = random_shape(rng), KINECT
     poses = random_poses(rng, 1, (0, 0, 0.3), 0.02)
-    instances, windows = np.empty((37, 6, 4), np.float32), np.empty((1, 4), np.int64)
+    instances, regions = np.empty((37, 6, 4), np.float32), np.empty((1, 4), np.int64)
     intrinsics = camera.fx, camera.fy, camera.cx, camera.cy
-    assert place_impostors(poses, HandTable.of(shape), intrinsics, camera.shape, 1, instances, windows) == 37
+    assert place_impostors(poses, HandTable.of(shape), intrinsics, camera.shape, 1, instances, regions) == 37
     primitives = Primitives.of(shape)
     T = primitives.placed(HandModel(shape).transforms(poses[0]))
     for k in range(37):
@@ -155,8 +156,7 @@ def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
         assert v.max() < bottom
         if primitives.kinds[k] == 0:  # cylinders show only the wall between their ends
             assert max(u.min() - left, right - 1 - u.max(), v.min() - top, bottom - 1 - v.max()) <= 1
-    assert tuple(windows[0]) == (*instances[:, 0, [0]].min(0), *instances[:, 0, [2]].max(0),
-                                 *instances[:, 0, [1]].min(0), *instances[:, 0, [3]].max(0))  # fmt: skip
+    assert tuple(regions[0]) == (*instances[:, 0, :2].min(0), *instances[:, 0, 2:].max(0))
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -172,10 +172,10 @@ def test_the_kernel_sums_tiles_as_the_plain_evaluation_does(seed: int) -> None:
     for n in range(count):
         inverse = np.divide(1, rendered[n], out=np.zeros((h, w), np.float32), where=rendered[n] > 0)
         tiles[n // columns * h :, n % columns * w :][:h, :w] = inverse
-    windows, sums = np.tile([0, w, 0, h], (count, 1)), np.empty((count, 3))
+    regions, sums = np.tile([0, 0, w, h], (count, 1)), np.empty((count, 3))
     empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(skin.sum())
     limits = objective.match_depth, objective.clamp_depth
-    sum_tiles(tiles, columns, windows, depth, skin.astype(np.float32), empty, *limits, sums)
+    sum_tiles(tiles, columns, regions, depth, skin.astype(np.float32), empty, *limits, sums)
     expected = [evaluate(objective, skin, depth, image) for image in rendered]
     np.testing.assert_allclose(sums, expected, rtol=1e-5, atol=1e-5)
 
@@ -186,7 +186,7 @@ def test_the_observed_pose_scores_best() -> None:
     shape, poses = HandShape(), random_poses(rng, 20, (0, 0, 0.5), 0.02)
     camera = window_on(shape, poses[4], 224)
     with OpenGLScorer(shape) as scorer:
-        scorer.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+        scorer.set_target(Target.blank(camera))
         depth = scorer.render(poses[4])
         scorer.set_target(Target(camera, depth > 0, depth))
         terms = scorer.terms(poses)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from depthtrack.errors import InputError
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.opengl import context, opening, programs
 from depthtrack.rendering.opengl.context import OpenGLError
@@ -95,7 +96,7 @@ def test_a_closed_scorer_says_so() -> None:
 def test_scorers_live_together() -> None:
     """Different hands, sizes and ways to sum, used in turn, score as each does alone."""
     (target, poses), (other, _) = scene(0), scene(1)
-    small = other.window(10, 5, 30, 33)
+    small = other.crop(Rect.of_size(10, 5, 30, 33))
     alone = []
     for shape, seen, sums in ((HandShape(), target, "cpu"), (HandShape(side="left", scale=1.2), small, "gpu")):
         with OpenGLScorer(shape, sums=sums) as scorer:  # type: ignore[arg-type]

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.oracle import OracleScorer
@@ -62,14 +63,14 @@ def test_agrees_with_the_oracle_where_views_are_absurd(
 
 
 def test_regions_beyond_the_image_observe_nothing_there() -> None:
-    """A window that hangs over the image's edge scores like the same window of a larger, empty-edged image."""
+    """A region that hangs over the image's edge scores like the same region of a larger, empty-edged image."""
     rng = np.random.default_rng(7)
     shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
     full = target_of(shape, poses[0], KINECT, rng)
-    window = full.window(500, 380, 300, 300)
-    assert not window.depth[100:].any()
-    assert not window.skin[:, 140:].any()
-    assert_agrees(shape, window, poses)
+    region = full.crop(Rect.of_size(500, 380, 300, 300))
+    assert not region.depth[100:].any()
+    assert not region.skin[:, 140:].any()
+    assert_agrees(shape, region, poses)
 
 
 def test_the_best_pose_is_the_observed_one() -> None:
@@ -77,7 +78,7 @@ def test_the_best_pose_is_the_observed_one() -> None:
     shape, poses = HandShape(), random_poses(rng, 20, (0, 0, 0.5), 0.02)
     camera = window_on(shape, poses[4], 224)
     oracle = OracleScorer(shape)
-    oracle.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    oracle.set_target(Target.blank(camera))
     depth = oracle.render(poses[4])
     scorer = RasterScorer(shape)
     scorer.set_target(Target(camera, depth > 0, depth))
@@ -146,6 +147,6 @@ def test_reduced_targets_keep_the_view(seed: int, side: int) -> None:
 
 def test_a_hand_that_nobody_sees_scores_the_same_everywhere() -> None:
     camera = KINECT.resized(0.1)
-    nothing = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    nothing = Target.blank(camera)
     pose = random_poses(np.random.default_rng(0), 1, (0, 0, -1), 0)
     assert_agrees(HandShape(), nothing, pose)

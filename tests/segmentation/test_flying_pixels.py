@@ -60,8 +60,6 @@ def test_an_observation_is_rid_of_them(coloured: bool) -> None:
     depth[outline] = frame.depth[frame.mask].max() + 0.05 * rng.uniform(0.5, 1.5, np.count_nonzero(outline))
     o = Segmenter().segment(Frame(0, 0.0, depth, frame.colour if coloured else None, camera))
     assert o is not None
-    left, top = o.origin
-    seen = np.zeros(depth.shape, np.bool_)
-    seen[top : top + o.depth.shape[0], left : left + o.depth.shape[1]] = o.depth > 0
+    seen = o.region.paste(o.depth > 0, camera.rect)
     assert np.mean(seen[outline]) < 0.05
     assert np.mean(seen[frame.mask]) > 0.95

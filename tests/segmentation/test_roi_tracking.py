@@ -45,11 +45,11 @@ def test_cuts_out_the_hand_where_it_is_expected(made: Synthesiser, index: int) -
     )
     assert found is not None
     mask = np.zeros(made.sensor.camera.shape, np.bool_)
-    mask[found.window.slices] = found.skin
+    mask[found.region.slices] = found.skin
     truth = made[index].mask
     assert np.sum(mask & truth) / np.sum(mask | truth) > 0.85
     assert not np.any(found.readings & ~found.skin)
-    assert found.skin.shape == (found.window.height, found.window.width)
+    assert found.skin.shape == found.region.shape
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -97,7 +97,7 @@ def test_a_segmenter_goes_on_from_where_it_was_guided(made: Synthesiser) -> None
         assert found is not None
         assert (found.arm_direction is None) == (found.wrist is None)
         mask = np.zeros(made.sensor.camera.shape, np.bool_)
-        mask[found.window.slices] = found.skin
+        mask[found.region.slices] = found.skin
         truth = made[107].mask
         overlaps[guided] = np.sum(mask & truth) / np.sum(mask | truth)
     assert overlaps[True] > max(0.9, overlaps[False] - 0.02)

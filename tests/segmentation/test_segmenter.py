@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import SPHERE, sphere
 from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.raycast import raycast
@@ -56,7 +56,7 @@ def overlap(found: Segmentation | None, mask: Mask) -> float:
     if found is None:
         return 0.0
     whole = np.zeros_like(mask)
-    whole[found.window.slices] = found.skin
+    whole[found.region.slices] = found.skin
     return float(np.sum(whole & mask) / np.sum(whole | mask))
 
 
@@ -92,7 +92,7 @@ def test_a_ring_of_fingers_is_seen_through() -> None:
         found = segmenter.locate(frame)
     assert found is not None
     whole = np.zeros_like(mask)
-    whole[found.window.slices] = found.skin
+    whole[found.region.slices] = found.skin
     behind = ~mask & (frame.depth > 1.0)
     assert np.sum(whole & behind) < 0.01 * np.sum(mask)
 
@@ -185,13 +185,13 @@ def test_a_hand_far_from_its_last_place_is_found_again() -> None:
 def test_a_hand_at_the_border_is_found_as_far_as_it_is_seen() -> None:
     frame, mask, _ = made(Synthesis(motion="everyday", sensor="ideal", forearm=False), 0)
     top = int(np.flatnonzero(mask.any(axis=1))[0]) + 50  # through the fingers
-    camera = frame.camera.crop(0, top, frame.camera.width, frame.camera.height - top)
+    camera = frame.camera.crop(Rect(0, top, frame.camera.width, frame.camera.height))
     assert frame.colour is not None
     cut = replace(frame, depth=frame.depth[top:].copy(), colour=frame.colour[top:].copy(), camera=camera)
     found = HandLocator(SkinColourModel.default()).locate(cut)
     assert overlap(found, mask[top:]) > 0.95
     assert found is not None
-    assert found.window.top == 0
+    assert found.region.top == 0
 
 
 def test_observations_lie_where_the_frame_saw_them() -> None:
@@ -277,8 +277,8 @@ def test_pixels_are_sorted_as_described(seed: int) -> None:
     nodes[labels == ELSEWHERE] = 0
     depth = np.where(rng.random(camera.shape) < 0.3, 0, rng.uniform(0.5, 0.6, camera.shape)).astype(np.float32)
     plane = np.append(rng.normal(size=3), 0.05)
-    blocks = Window(1, 1, 6, 4)
-    roi = Window(4, 4, 24, 16)
+    blocks = Rect(1, 1, 6, 4)
+    roi = Rect(4, 4, 24, 16)
     lens = (camera.fx, camera.fy, camera.cx, camera.cy)
     out = np.empty((roi.height, roi.width), np.uint8)
     sort_pixels(depth, tuple(roi), nodes, labels, tuple(blocks), stride, lens, tuple(plane.tolist()), out)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.skin_colour import (
     BINS,
     BRIGHTEST,
@@ -41,7 +41,7 @@ def test_colours_fall_into_their_bins(r: int, g: int, b: int) -> None:
 def test_counting_equals_a_plain_loop(seed: int) -> None:
     rng = np.random.default_rng(seed)
     image = rng.integers(0, 256, (9, 12, 3), dtype=np.uint8)
-    window, step = Window(2, 1, 11, 8), 2
+    window, step = Rect(2, 1, 11, 8), 2
     skin = rng.integers(0, 2, (7, 9)).astype(np.uint8)
     hand = rng.random((7, 9)) < 0.5
     expected = np.zeros((2, BINS * BINS))
@@ -81,7 +81,7 @@ def seen(colour: tuple[int, int, int], is_skin: bool) -> tuple[np.ndarray, np.nd
 
 
 def test_adaptation_is_the_published_blend() -> None:
-    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20), (120, 110, 130)
+    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Rect(0, 0, 30, 20), (120, 110, 130)
     u, v = divmod(plain_bin(*colour), BINS)
     before = skin.posterior()
     image, found, hand = seen(colour, is_skin=True)
@@ -94,7 +94,7 @@ def test_adaptation_is_the_published_blend() -> None:
 
 
 def test_adaptation_forgets_after_its_window() -> None:
-    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20), (205, 150, 125)
+    skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Rect(0, 0, 30, 20), (205, 150, 125)
     u, v = divmod(plain_bin(*colour), BINS)
     before = skin.posterior()[u, v]
     image, nothing, nowhere = seen(colour, is_skin=False)
@@ -110,7 +110,7 @@ def test_adaptation_forgets_after_its_window() -> None:
 
 def test_what_is_skin_elsewhere_teaches_nothing() -> None:
     """A face, or the arm: skin that is not the hand's."""
-    skin, window = AdaptiveSkin(SkinColourModel.default()), Window(0, 0, 30, 20)
+    skin, window = AdaptiveSkin(SkinColourModel.default()), Rect(0, 0, 30, 20)
     before = skin.posterior()
     skin.learn(
         np.full((20, 30, 3), (205, 150, 125), np.uint8),

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.skin_colour import (
     BINS,
     MAYBE_SKIN,
@@ -59,15 +59,15 @@ def painted() -> np.ndarray:
 
 
 def test_published_statistics_know_skin_from_sky_and_leaves() -> None:
-    found = AdaptiveSkin(SkinColourModel.default()).find(painted(), Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
+    found = AdaptiveSkin(SkinColourModel.default()).find(painted(), Rect(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
     expected = np.zeros((20, 30), np.bool_)
     expected[4:12, 6:18] = True
     np.testing.assert_array_equal(found > 0, expected)
 
 
 def test_only_the_window_and_blocks_asked_for_are_looked_at() -> None:
-    skin, window = AdaptiveSkin(SkinColourModel.default()), Window(2, 3, 22, 13)
-    whole = skin.find(painted(), Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
+    skin, window = AdaptiveSkin(SkinColourModel.default()), Rect(2, 3, 22, 13)
+    whole = skin.find(painted(), Rect(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
     np.testing.assert_array_equal(skin.find(painted(), window, np.ones((1, 1), np.uint8), 20), whole[3:13, 2:22])
     blocks = np.array([[1, 0], [1, 0]], np.uint8)
     half = skin.find(painted(), window, blocks, 10)
@@ -78,9 +78,7 @@ def test_only_the_window_and_blocks_asked_for_are_looked_at() -> None:
 def test_black_and_white_are_no_skin() -> None:
     image = np.zeros((4, 8, 3), np.uint8)
     image[:, 4:] = 255
-    assert (
-        not AdaptiveSkin(SkinColourModel.default()).find(image, Window(0, 0, 8, 4), np.ones((1, 1), np.uint8), 8).any()
-    )
+    assert not AdaptiveSkin(SkinColourModel.default()).find(image, Rect(0, 0, 8, 4), np.ones((1, 1), np.uint8), 8).any()
 
 
 def test_training_learns_the_colours_it_is_shown() -> None:
@@ -89,7 +87,7 @@ def test_training_learns_the_colours_it_is_shown() -> None:
     mask[4:12, 6:18] = False
     model = SkinColourModel.train([(image, mask)])
     assert model.prior == pytest.approx(mask.mean())
-    found = AdaptiveSkin(model).find(image, Window(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30) > 0
+    found = AdaptiveSkin(model).find(image, Rect(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30) > 0
     np.testing.assert_array_equal(found, mask)
 
 

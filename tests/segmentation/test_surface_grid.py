@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.grid import MAX_JUMP, Grid
 
 CAMERA = Camera(64, 48, 60.0, 62.0, 30.5, 25.0)
@@ -20,7 +20,7 @@ def ragged_grid(seed: int) -> Grid:
     rng = np.random.default_rng(seed)
     depth = 0.5 + 0.01 * rng.normal(size=CAMERA.shape) + 0.05 * (rng.random() < 0.5) * (np.arange(64) > 30)
     depth[rng.random(CAMERA.shape) < 0.2] = 0
-    return Grid.over(depth.astype(np.float32), CAMERA, Window.whole(CAMERA), (0.3, 0.9), 4)
+    return Grid.over(depth.astype(np.float32), CAMERA, CAMERA.rect, (0.3, 0.9), 4)
 
 
 def graph_of(grid: Grid) -> coo_array:
@@ -43,7 +43,7 @@ def graph_of(grid: Grid) -> coo_array:
 def test_blocks_hold_the_mean_of_their_nearest_surface(seed: int) -> None:
     rng = np.random.default_rng(seed)
     depth = rng.choice([0.0, 0.5, 0.51, 0.6, 2.0], CAMERA.shape).astype(np.float32)
-    window, stride = Window(5, 3, 60, 41), 3
+    window, stride = Rect(5, 3, 60, 41), 3
     grid = Grid.over(depth, CAMERA, window, (0.3, 0.9), stride)
     assert grid.depth.shape == (13, 19)
     for i in range(13):
@@ -56,7 +56,7 @@ def test_blocks_hold_the_mean_of_their_nearest_surface(seed: int) -> None:
 
 
 def test_nodes_lie_in_the_middle_of_their_blocks() -> None:
-    grid = Grid.over(np.full(CAMERA.shape, 0.5, np.float32), CAMERA, Window(8, 4, 48, 44), (0.3, 0.9), 4)
+    grid = Grid.over(np.full(CAMERA.shape, 0.5, np.float32), CAMERA, Rect(8, 4, 48, 44), (0.3, 0.9), 4)
     pixels = CAMERA.project(grid.points).reshape(10, 10, 2)
     np.testing.assert_allclose(pixels[2, 3], [8 + 3 * 4 + 1.5, 4 + 2 * 4 + 1.5], atol=1e-6)
     # All blocks together cover what the window sees.
@@ -98,7 +98,7 @@ def test_distances_equal_dijkstra(seed: int) -> None:
 
 
 def test_limits_bound_the_search() -> None:
-    grid = Grid.over(np.full(CAMERA.shape, 0.5, np.float32), CAMERA, Window.whole(CAMERA), (0.3, 0.9), 4)
+    grid = Grid.over(np.full(CAMERA.shape, 0.5, np.float32), CAMERA, CAMERA.rect, (0.3, 0.9), 4)
     near, far = grid.paths([0], limit=0.1), grid.paths([0], limit=2.0)
     np.testing.assert_array_equal(near.reached(), far.reached(0.1))
     assert far.reached().all()
@@ -108,7 +108,7 @@ def test_inscribed_circles_are_metric_and_end_at_the_window() -> None:
     grid = Grid.over(
         np.full((200, 200), 0.5, np.float32),
         Camera(200, 200, 250, 250, 100, 100),
-        Window(0, 0, 200, 200),
+        Rect(0, 0, 200, 200),
         (0.3, 0.9),
         2,
     )

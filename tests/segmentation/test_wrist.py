@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.geometry.rectangle import Window
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import CYLINDER, SPHERE, cone, ellipsoid
 from depthtrack.rendering.raycast import raycast
 from depthtrack.segmentation.forearm import (
@@ -59,7 +59,7 @@ def club(slant: float) -> tuple[Grid, Palm]:
     tube = cone((0.0, 0.0, 0.0), 0.4, 0.030, 0.032)
     placed = np.stack([turn @ part for part in (palm, fingertip, tube)])
     depth = raycast(CAMERA, np.array([SPHERE, SPHERE, CYLINDER]), placed, np.arange(3)).depth.astype(np.float32)
-    grid = Grid.over(depth, CAMERA, Window.whole(CAMERA), (0.2, 0.95), 5)
+    grid = Grid.over(depth, CAMERA, CAMERA.rect, (0.2, 0.95), 5)
     # The tube's other end is free too, and about as broad.
     return grid, min(find_palms(grid, grid), key=lambda palm: float(np.linalg.norm(palm.centre - [0, 0, 0.5])))
 
@@ -98,7 +98,7 @@ def test_no_arm_is_seen_of_a_palm_alone() -> None:
     depth = raycast(
         CAMERA, np.array([SPHERE]), ellipsoid((0, 0, 0.5), (0.045, 0.09, 0.03))[None], np.array([0])
     ).depth.astype(np.float32)
-    grid = Grid.over(depth, CAMERA, Window.whole(CAMERA), (0.2, 0.95), 5)
+    grid = Grid.over(depth, CAMERA, CAMERA.rect, (0.2, 0.95), 5)
     palm = palm_near(grid, grid, next(tips(grid)))
     assert palm is not None
     assert find_arm(grid, palm, WRIST) is None
@@ -203,7 +203,7 @@ def test_a_bent_wrist_is_cut_across_the_hand(degrees: float) -> None:
         ]
     )
     depth = raycast(CAMERA, np.array([SPHERE, SPHERE, CYLINDER]), placed, np.arange(3)).depth.astype(np.float32)
-    grid = Grid.over(depth, CAMERA, Window.whole(CAMERA), (0.2, 0.95), 5)
+    grid = Grid.over(depth, CAMERA, CAMERA.rect, (0.2, 0.95), 5)
     palm = min(find_palms(grid, grid), key=lambda palm: float(np.linalg.norm(palm.centre - [0, 0, 0.5])))
     forearm = find_arm(grid, palm, WRIST)
     assert forearm is not None
@@ -229,7 +229,7 @@ def _slanted_palm(seed: int) -> tuple[Grid, Palm, Arm, np.ndarray]:
     """A random surface of which the palm reaches a part; a direction; and the reached points relative to the palm."""
     rng = np.random.default_rng(seed)
     depth = np.where(rng.random((48, 64)) < 0.2, 0, 0.5 + 0.01 * rng.random((48, 64))).astype(np.float32)
-    grid = Grid.over(depth, Camera(64, 48, 100, 100, 31.5, 23.5), Window(0, 0, 64, 48), (0.3, 0.9), 2)
+    grid = Grid.over(depth, Camera(64, 48, 100, 100, 31.5, 23.5), Rect(0, 0, 64, 48), (0.3, 0.9), 2)
     node = int(rng.choice(np.flatnonzero(grid.depth)))
     palm = Palm(node, grid.points[node], 0.04, 0.1, grid.paths([node], 0.12), ())
     direction = rng.normal(size=3) * [1, 1, 0.2]
@@ -263,7 +263,7 @@ def test_kernels_along_the_arm_equal_plain_geometry(seed: int) -> None:
 
 def test_walking_back_stops_at_the_distance_asked_for() -> None:
     grid = Grid.over(
-        np.full((48, 64), 0.5, np.float32), Camera(64, 48, 60, 60, 31.5, 23.5), Window(0, 0, 64, 48), (0.3, 0.9), 4
+        np.full((48, 64), 0.5, np.float32), Camera(64, 48, 60, 60, 31.5, 23.5), Rect(0, 0, 64, 48), (0.3, 0.9), 4
     )
     paths = grid.paths([0], limit=3.0)
     nodes = np.arange(grid.depth.size)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.opengl.context import Platform
@@ -90,7 +91,7 @@ def assert_overhanging_windows_agree(platform: Platform) -> None:
     shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
     full = target_of(shape, poses[0], KINECT.resized(0.5), rng)
     for left, top, width, height in ((250, 190, 150, 150), (-40, -30, 400, 300), (-200, -200, 64, 64)):
-        assert_agrees(platform, shape, full.window(left, top, width, height), poses, OBJECTIVE)
+        assert_agrees(platform, shape, full.crop(Rect.of_size(left, top, width, height)), poses, OBJECTIVE)
 
 
 def energies_and_depth(platform: Platform, seed: int) -> tuple[np.ndarray, np.ndarray]:

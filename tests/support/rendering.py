@@ -3,6 +3,7 @@
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose
@@ -38,7 +39,7 @@ def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, floa
 
 def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
     """An imperfect observation of a pose: holes in the depth, and skin labels that are wrong here and there."""
-    empty = Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
+    empty = Target.blank(camera)
     oracle = OracleScorer(shape)
     oracle.set_target(empty)
     depth = oracle.render(pose)
@@ -47,9 +48,9 @@ def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random
 
 
 def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
-    """A square window of the Kinect's image, `side` pixels wide, centred on the hand."""
+    """A square region of the Kinect's image, `side` pixels wide, centred on the hand."""
     uv = KINECT.project(HandModel(shape).keypoints(pose)).mean(axis=0)
-    return KINECT.crop(int(uv[0]) - side // 2, int(uv[1]) - side // 2, side, side)
+    return KINECT.crop(Rect.of_size(int(uv[0]) - side // 2, int(uv[1]) - side // 2, side, side))
 
 
 def assert_agrees(shape: HandShape, target: Target, poses: np.ndarray, objective: Objective = OBJECTIVE) -> None:

@@ -18,7 +18,6 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.status import Status
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.target import Target
 from depthtrack.solver.swarm import SwarmOptions
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
@@ -52,7 +51,7 @@ def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
     frame, wrong = 11, _shifted(made, made.poses[11])
     o = observe(made, frame)
     with RasterScorer(made.options.hand) as scorer:
-        scorer.set_target(Target(o.camera, o.skin, o.depth).reduced(96))
+        scorer.set_target(o.reduced(96))
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
         stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
         options = SearchOptions(apart=0.1)
@@ -87,7 +86,7 @@ def test_a_finger_that_is_elsewhere_is_found(made: Synthesiser) -> None:
     frame = 11
     o, truth = observe(made, frame), made.poses[frame]
     with RasterScorer(made.options.hand) as scorer:
-        scorer.set_target(Target(o.camera, o.skin, o.depth))
+        scorer.set_target(o)
         for finger in range(1, 5):
             wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
             straight = truth[angles][1:].sum() < np.radians(90)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
@@ -76,7 +77,7 @@ def test_a_crop_sees_the_same_points_of_space_in_the_same_colours() -> None:
     whole = AnnotatedFrame(
         Frame(0, 0.0, rng.random(CAMERA.shape, dtype=np.float32), colour, CAMERA), mask, True, open_hand()
     )
-    part = whole.cropped(-5, 100, 60, 170)
+    part = whole.cropped(Rect.of_size(-5, 100, 60, 170))
     assert part.mask is not None
     assert part.frame.colour is not None
     assert part.frame.depth.shape == part.camera.shape == (170, 60)

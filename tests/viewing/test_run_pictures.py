@@ -116,7 +116,7 @@ def test_residual_colours_by_hand() -> None:
     assert image[5].tolist() == list(NO_READING)
 
 
-def test_close_ups_follow_the_hand_in_windows_of_one_size() -> None:
+def test_close_ups_follow_the_hand_in_regions_of_one_size() -> None:
     camera = Camera(640, 480, 525, 525, 319.5, 239.5)
     pose = np.array([0, 0, 0.6, 0, 1, 0, 0, *np.zeros(20)])
     poses = pose + np.linspace(-0.1, 0.1, 40)[:, None] * np.eye(27)[0]
@@ -125,14 +125,14 @@ def test_close_ups_follow_the_hand_in_windows_of_one_size() -> None:
     trusted = np.ones(40, dtype=np.bool_)
     trusted[[7, 20]] = False
     keypoints = HandModel(HandShape()).keypoints(poses)
-    windows = np.array(close_ups(camera, keypoints, trusted))
-    assert len(np.unique(windows[:, 2:], axis=0)) == 1
-    assert windows[0, 2] / windows[0, 3] == pytest.approx(640 / 480, rel=0.02)
-    assert np.all(np.diff(windows[:, 0]) >= 0)
+    regions = close_ups(camera, keypoints, trusted)
+    assert len({region.shape for region in regions}) == 1
+    assert regions[0].width / regions[0].height == pytest.approx(640 / 480, rel=0.02)
+    assert np.all(np.diff([region.left for region in regions]) >= 0)
     pixels = camera.project(keypoints)
     for row in np.flatnonzero(trusted):
-        left, top, width, height = windows[row]
-        assert np.all((pixels[row] > [left, top]) & (pixels[row] < [left + width, top + height]))
+        left, top, right, bottom = regions[row]
+        assert np.all((pixels[row] > [left, top]) & (pixels[row] < [right, bottom]))
     assert close_ups(camera, keypoints, np.zeros(40, dtype=np.bool_))[5] == (0, 0, 640, 480)
 
 

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.evaluation.segmentation import overlap, whole_mask
+from depthtrack.evaluation.metrics import silhouette_iou
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.recording import open_sequence
 from depthtrack.recording.sequence import Frame
@@ -118,7 +118,7 @@ def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
             raise InputError(f"{shot.name}: no hand is seen in frame {frame.index}: give a recording that shows one")
         points.append(len(observation.points))
         if truth is not None:
-            overlaps.append(overlap(whole_mask(observation, frame.depth.shape), truth))
+            overlaps.append(silhouette_iou(observation.whole_mask(frame.depth.shape), truth))
     end = perf_counter() + seconds
     while not durations or perf_counter() < end:
         durations.append(_time_frames(segmenter, shot.frames))

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from depthtrack.geometry.camera import PRESETS
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import TANGENT_SIZE, retract
 from depthtrack.hand.shape import HandShape
@@ -25,7 +26,7 @@ FRAME_TIMES = (1.0, 4.5, 8.0, 11.0)
 """Seconds into the motion: from the open hand to the closed one."""
 DISTANCE = 0.5
 MARGIN = 1 / 7
-"""Of the hand's longer side in the image, added to make the window: room for it to move until the next frame."""
+"""Of the hand's longer side in the image, added around it: room for it to move until the next frame."""
 CHECKED = 8
 """Hypotheses of a frame that the oracle scores too."""
 
@@ -54,12 +55,12 @@ def make_workloads(rois: Iterable[Roi] = ROIS, seed: int = 0) -> list[Workload]:
     random = np.random.Generator(np.random.Philox(key=seed))
     steps = random.normal(size=(len(truth), HYPOTHESES, TANGENT_SIZE)) * _SPREAD
     poses = within_limits(retract(truth[:, None], steps))
-    windows = _windows(oracle, truth)
-    return [_workload(roi, shape, oracle, windows, poses) for roi in rois]
+    regions = _regions(oracle, truth)
+    return [_workload(roi, shape, oracle, regions, poses) for roi in rois]
 
 
-def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, windows: list[Target], poses: Array) -> Workload:
-    targets = windows if roi == "native" else [window.reduced(int(roi)) for window in windows]
+def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, regions: list[Target], poses: Array) -> Workload:
+    targets = regions if roi == "native" else [region.reduced(int(roi)) for region in regions]
     expected = []
     for target, swarm in zip(targets, poses, strict=True):
         oracle.set_target(target)
@@ -67,15 +68,15 @@ def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, windows: list[Ta
     return Workload(roi, shape, tuple(targets), poses, np.stack(expected))
 
 
-def _windows(oracle: OracleScorer, truth: Array) -> list[Target]:
-    """Square windows on the hand at full resolution, all of one size: the largest hand's, with a margin."""
+def _regions(oracle: OracleScorer, truth: Array) -> list[Target]:
+    """Square regions around the hand at full resolution, all of one size: the largest hand's, with a margin."""
     camera = PRESETS["kinect1"]
-    oracle.set_target(Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32)))
+    oracle.set_target(Target.blank(camera))
     depths = [oracle.render(pose) for pose in truth]
     extents = np.array([[(hit.min(), hit.max() + 1) for hit in np.nonzero(depth)] for depth in depths])
     side = round(float(np.diff(extents, axis=-1).max()) * (1 + MARGIN))
     corners = np.rint(extents.mean(axis=-1) - side / 2).astype(int)
     return [
-        Target(camera, depth > 0, depth).window(int(left), int(top), side, side)
+        Target(camera, depth > 0, depth).crop(Rect.of_size(left, top, side, side))
         for depth, (top, left) in zip(depths, corners, strict=True)
     ]

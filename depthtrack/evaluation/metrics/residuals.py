@@ -58,7 +58,10 @@ def e2d(rendered: Mask, observed: Mask) -> float:
     return float(distance[outside].mean())
 
 
-def silhouette_iou(rendered: Mask, observed: Mask) -> float:
-    """Pixels in both silhouettes (h, w) over pixels in either (Jaccard 1912): 1 where they agree; NaN without any."""
-    union = int(np.count_nonzero(rendered | observed))
-    return np.count_nonzero(rendered & observed) / union if union else float("nan")
+def silhouette_iou(first: Mask, second: Mask) -> float:
+    """Return the intersection over union of two silhouettes (h, w), the index of Jaccard 1912.
+
+    Two empty silhouettes agree: their IoU is 1.
+    """
+    union = int(np.count_nonzero(first | second))
+    return np.count_nonzero(first & second) / union if union else 1.0

@@ -56,33 +56,33 @@ def place_impostors(
     tile: tuple[int, int],
     columns: int,
     instances: Array32,
-    windows: Index,
+    regions: Index,
 ) -> int:
     """Write the impostors of all poses (B, 27), tile by tile from the atlas' first corner; returns how many.
 
     `intrinsics` fx, fy, cx, cy in pixels; `tile` (height, width); `columns` tiles make a row of the atlas.
-    `instances` (>= 37 B, 6, 4) receives what VECTORS says, primitives out of sight left out. `windows` (B, 4)
-    receives the pixels (u0, u1, v0, v1; ends excluded) of each tile that may be drawn.
+    `instances` (>= 37 B, 6, 4) receives what VECTORS says, primitives out of sight left out. `regions` (B, 4)
+    receives the pixels of each tile that may be drawn, in the order of `geometry.rectangle.Rect`.
     """
     placed = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
     T, M, map_ = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
-    window = np.empty(4, np.int64)
+    region = np.empty(4, np.int64)
     height, width = tile
     fx, fy, cx, cy = intrinsics
     count = 0
     for n in range(poses.shape[0]):
         forward_kinematics(hand.chain, poses[n], placed)
         left, top = n % columns * width, n // columns * height
-        windows[n, 0], windows[n, 1], windows[n, 2], windows[n, 3] = width, 0, height, 0
+        regions[n, 0], regions[n, 1], regions[n, 2], regions[n, 3] = width, height, 0, 0
         for k in range(hand.kinds.shape[0]):
             body, is_cylinder = hand.bodies[k], hand.kinds[k] == CYLINDER
             _compose(placed.T[body], hand.T_body_unit[k], T)
-            middle = _bounds(T, is_cylinder, intrinsics, tile, window)
-            u0, u1, v0, v1 = window
+            middle = _bounds(T, is_cylinder, intrinsics, tile, region)
+            u0, v0, u1, v1 = region
             if middle <= 0.0 or u1 <= u0 or v1 <= v0:
                 continue
-            windows[n, 0], windows[n, 1] = min(windows[n, 0], u0), max(windows[n, 1], u1)
-            windows[n, 2], windows[n, 3] = min(windows[n, 2], v0), max(windows[n, 3], v1)
+            regions[n, 0], regions[n, 1] = min(regions[n, 0], u0), min(regions[n, 1], v0)
+            regions[n, 2], regions[n, 3] = max(regions[n, 2], u1), max(regions[n, 3], v1)
             _uncompose(hand.T_unit_body[k], placed.T[body], M)
             anchor_u, anchor_v, w = (u0 + u1) // 2, (v0 + v1) // 2, 1.0 / middle
             dx, dy = (anchor_u - cx) / fx, (anchor_v - cy) / fy
@@ -126,9 +126,9 @@ def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
 
 @numba.njit(cache=True)
 def _bounds(
-    T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], window: Index
+    T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], region: Index
 ) -> float:
-    """Pixels (u0, u1, v0, v1; ends excluded) of the tile that a placed primitive may cover.
+    """Write the pixels of the tile that a placed primitive may cover, in the order of `geometry.rectangle.Rect`.
 
     The image of a ball is bounded by the planes through the lens that touch it, and a cone's by those of its two
     end discs. Returns the depth of the middle of what lies before NEAR, or 0 where nothing does.
@@ -158,11 +158,11 @@ def _bounds(
     if z_high < NEAR:
         return 0.0
     if z_low < 0.01 * NEAR:  # reaches the lens' plane: no bound on its image
-        window[0], window[1], window[2], window[3] = 0, width, 0, height
+        region[0], region[1], region[2], region[3] = 0, 0, width, height
     else:
         slack = 1e-6
-        window[0] = int(min(max(math.ceil(x_low * fx + cx - slack), 0.0), width))
-        window[1] = int(max(min(math.floor(x_high * fx + cx + slack) + 1.0, width), 0.0))
-        window[2] = int(min(max(math.ceil(y_low * fy + cy - slack), 0.0), height))
-        window[3] = int(max(min(math.floor(y_high * fy + cy + slack) + 1.0, height), 0.0))
+        region[0] = int(min(max(math.ceil(x_low * fx + cx - slack), 0.0), width))
+        region[1] = int(min(max(math.ceil(y_low * fy + cy - slack), 0.0), height))
+        region[2] = int(max(min(math.floor(x_high * fx + cx + slack) + 1.0, width), 0.0))
+        region[3] = int(max(min(math.floor(y_high * fy + cy + slack) + 1.0, height), 0.0))
     return (max(z_low, NEAR) + z_high) / 2

@@ -75,19 +75,19 @@ class OpenGLScorer(ScorerBase):
 
     def terms(self, poses: ArrayLike) -> Terms:
         batch, renderer = as_batch(poses), self._open
-        sums, windows = np.empty((len(batch), 3)), np.empty((len(batch), 4), np.int64)
+        sums, regions = np.empty((len(batch), 3)), np.empty((len(batch), 4), np.int64)
         with renderer.context as gl:
             grid = renderer.grid(gl, *self.target.camera.shape)
             size = self._part_size(grid, len(batch))
             drawn: slice | None = None
             for turn, start in enumerate(range(0, len(batch), size)):
                 part = slice(start, min(start + size, len(batch)))
-                self._draw(gl, turn % 2, grid, batch[part], windows[part])
+                self._draw(gl, turn % 2, grid, batch[part], regions[part])
                 if drawn is not None:
-                    self._sum(gl, 1 - turn % 2, grid, windows[drawn], sums[drawn])
+                    self._sum(gl, 1 - turn % 2, grid, regions[drawn], sums[drawn])
                 drawn = part
             if drawn is not None:
-                self._sum(gl, turn % 2, grid, windows[drawn], sums[drawn])
+                self._sum(gl, turn % 2, grid, regions[drawn], sums[drawn])
         return Terms.of_sums(self._objective, batch, *sums.T)
 
     def render(self, pose: ArrayLike) -> Depth:
@@ -112,11 +112,11 @@ class OpenGLScorer(ScorerBase):
         wanted = max(-(-count // _PARTS), _SMALLEST_PART) if self.software else count
         return max(min(wanted, grid.capacity), 1)
 
-    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, windows: Index) -> None:
+    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, regions: Index) -> None:
         if len(self._instances) < len(poses) * PRIMITIVE_COUNT:
             self._instances = np.empty((len(poses) * PRIMITIVE_COUNT, VECTORS, 4), np.float32)
         tile = grid.height, grid.width
-        count = place_impostors(poses, self._hand, self._intrinsics, tile, grid.columns, self._instances, windows)
+        count = place_impostors(poses, self._hand, self._intrinsics, tile, grid.columns, self._instances, regions)
         self._open.draw(gl, which, grid, len(poses), self._instances[:count])
 
     def _read(self, gl: Any, which: int, grid: Grid, count: int) -> Array32:
@@ -127,14 +127,14 @@ class OpenGLScorer(ScorerBase):
         self._open.read(gl, which, pixels)
         return pixels
 
-    def _sum(self, gl: Any, which: int, grid: Grid, windows: Index, sums: Array) -> None:
+    def _sum(self, gl: Any, which: int, grid: Grid, regions: Index, sums: Array) -> None:
         o, target = self._objective, self.target
         limits = o.match_depth, o.clamp_depth
         if self.sums == "gpu":
             sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], *limits)
         else:
             pixels = self._read(gl, which, grid, len(sums))
-            sum_tiles(pixels, grid.columns, windows, target.depth, self._skin, self._empty, *limits, sums)
+            sum_tiles(pixels, grid.columns, regions, target.depth, self._skin, self._empty, *limits, sums)
 
 
 def _discard(context: Context, textures: list[int]) -> None:

@@ -11,7 +11,7 @@ from depthtrack.types import Array, Array32, Index
 def sum_tiles(
     inverse_depth: Array32,
     columns: int,
-    windows: Index,
+    regions: Index,
     depth: Array32,
     skin: Array32,
     empty: tuple[float, float, float],
@@ -22,17 +22,17 @@ def sum_tiles(
     """Write (B, 3) `sums`: min(|o_d - r_d|, d_M) in metres, o_s and r_m, o_s or r_m, over each of B tiles.
 
     `inverse_depth` (rows, >= columns * w), 1/m, 0 where nothing is drawn: tiles of the size of `depth` (h, w; metres,
-    0 = missing) and `skin` (h, w; 0 or 1). Only `windows` (B, 4) can hold drawn pixels; `empty` are the sums of a tile
-    without any.
+    0 = missing) and `skin` (h, w; 0 or 1). Only `regions` (B, 4) of the tiles, in the order of
+    `geometry.rectangle.Rect`, can hold drawn pixels; `empty` are the sums of a tile without any.
     """
     height, width = depth.shape
     match_, clamp = np.float32(match_depth), np.float32(clamp_depth)
     zero, one = np.float32(0.0), np.float32(1.0)
-    for n in range(windows.shape[0]):
+    for n in range(regions.shape[0]):
         left, top = n % columns * width, n // columns * height
-        u0, u1 = windows[n, 0], windows[n, 1]
+        u0, u1 = regions[n, 0], regions[n, 2]
         sums[n, 0], sums[n, 1], sums[n, 2] = empty
-        for v in range(windows[n, 2], windows[n, 3]):
+        for v in range(regions[n, 1], regions[n, 3]):
             drawn_row = inverse_depth[top + v, left + u0 : left + u1]
             depth_row, skin_row = depth[v, u0:u1], skin[v, u0:u1]
             clamped, on_skin, off_skin = zero, zero, zero

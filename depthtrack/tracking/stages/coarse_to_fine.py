@@ -17,7 +17,6 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter, IcpOptions
 from depthtrack.solver.prior import Prior
@@ -86,8 +85,7 @@ class SingleFrameFitter:
 
     def estimate(self, observation: Observation, pose: ArrayLike) -> Array:
         """The pose (27,) of the observed hand: `pose` (27,) tells about where it is; its angles are not looked at."""
-        target = Target(observation.camera, observation.skin, observation.depth)
-        self._scorer.set_target(target.reduced(_LONGEST_SIDE))
+        self._scorer.set_target(observation.reduced(_LONGEST_SIDE))
         self._fitter.set_target(observation, self._subsample)
         generator = frame_generator(self._seed, observation.frame_index)
         start = np.array(pose, dtype=np.float64)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
@@ -63,7 +62,7 @@ class CapsuleSurface:
         self._scorer = RasterScorer(shape)
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        target = Target(observation.camera, observation.skin, observation.depth).reduced(_RESOLUTION)
+        target = observation.reduced(_RESOLUTION)
         self._scorer.set_target(target)
         c = target.camera
         self._lens = (c.fx, c.fy, c.cx, c.cy)

@@ -15,7 +15,6 @@ from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.recording.status import Status
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import PAPER_ICP, IcpFitter, IcpOptions
 from depthtrack.solver.prior import Prior
@@ -173,7 +172,7 @@ class IkTracker:
         self._recovery.close()
 
     def _observe(self, observation: Observation) -> None:
-        self._scorer.set_target(Target(observation.camera, observation.skin, observation.depth))
+        self._scorer.set_target(observation)
         self._fitter.set_target(observation, self.options.subsample)
 
     def _try_other_predictions(self, found: Array, others: Array, prior: Prior) -> Array:
@@ -193,7 +192,7 @@ class IkTracker:
         """The better of a pose and what is found close by: asked now and then where the pose explains little. Where the
         track would be lost, it is asked at once, and elsewhere too, which has to explain much more."""
         options, terms = self.options.recovery, self._scorer.terms(pose[None])
-        energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
+        energy, confidence = float(terms.energy[0]), float(terms.agreement[0])
         due = options.every > 0 and observation.frame_index % options.every == 0
         lost = self._state.is_lost(energy, confidence)
         if energy <= self.options.search.good_energy or not (due or lost):
@@ -243,5 +242,5 @@ class IkTracker:
 
     def _settle(self, pose: Array, status: Status, clock: StageClock) -> Estimate:
         terms = self._scorer.terms(pose[None])
-        energy, confidence = float(terms.energy[0]), float(1 - terms.skin[0])
+        energy, confidence = float(terms.energy[0]), float(terms.agreement[0])
         return self._state.commit(pose, energy, confidence, status, clock.milliseconds)

@@ -13,7 +13,6 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.status import Status
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.objective import Objective
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter, IcpOptions
 from depthtrack.solver.prior import Prior
@@ -151,10 +150,8 @@ class PsoTracker:
         self._scorer.close()
 
     def _observe(self, observation: Observation) -> None:
-        target = Target(observation.camera, observation.skin, observation.depth)
-        if self.options.resolution is not None:
-            target = target.reduced(self.options.resolution)
-        self._scorer.set_target(target)
+        resolution = self.options.resolution
+        self._scorer.set_target(observation if resolution is None else observation.reduced(resolution))
 
     def _space(self, reference: Array) -> SwarmSpace:
         return ParameterSpace(reference) if self.options.variant == "paper" else TangentSpace(reference)
@@ -189,7 +186,7 @@ class PsoTracker:
         options = self.options.recovery
         if self.options.variant != "default" or energy <= self.options.search.good_energy:
             return pose, energy
-        confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
+        confidence = float(self._scorer.terms(pose[None]).agreement[0])
         doubted = self._state.is_lost(energy, confidence, options.doubted)
         if not doubted and (options.every == 0 or observation.frame_index % options.every != 0):
             return pose, energy
@@ -252,6 +249,6 @@ class PsoTracker:
         return self._fitter
 
     def _settle(self, pose: Array, energy: float, status: Status, clock: StageClock) -> Estimate:
-        confidence = float(1 - self._scorer.terms(pose[None]).skin[0])
+        confidence = float(self._scorer.terms(pose[None]).agreement[0])
         clock.lap("swarm")
         return self._state.commit(pose, energy, confidence, status, clock.milliseconds)
