@@ -139,7 +139,7 @@ def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
     """Every primitive's pixels, as the ray caster sees them alone, lie in its rectangle and touch all four sides."""
     rng = np.random.default_rng(seed)
     shape, camera = random_shape(rng), KINECT
-    poses = random_poses(rng, 1, (0, 0, 0.3), 0.02)
+    poses = random_poses(rng, 1, (0, 0, 0.5), 0.02)
     instances, regions = np.empty((37, 6, 4), np.float32), np.empty((1, 4), np.int64)
     intrinsics = camera.fx, camera.fy, camera.cx, camera.cy
     assert place_impostors(poses, HandTable.of(shape), intrinsics, camera.shape, 1, instances, regions) == 37
