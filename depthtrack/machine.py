@@ -1,4 +1,4 @@
-"""The machine a measurement was made on, without which a speed means nothing."""
+"""The machine of a measurement: processor, cores and versions."""
 
 import os
 import platform
@@ -6,10 +6,7 @@ from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from llvmlite.binding import get_host_cpu_features
-
 from depthtrack import __version__
-from depthtrack.resources import usable_cores
 
 _FEATURES = ("sse4.2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 _PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "PyOpenGL", "trimesh", "embreex", "open3d", "pyrender")
@@ -17,7 +14,7 @@ _PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "PyOpenGL", "trimesh", "embr
 
 @dataclass(frozen=True)
 class Machine:
-    """Processor, its vector instructions, versions, and how busy it was (`load`: runnable processes, last minute)."""
+    """A processor, its vector instructions, versions, and `load`, the runnable processes of the last minute."""
 
     cpu: str
     cores: int
@@ -33,8 +30,15 @@ class Machine:
         return f"{self.cpu}, {self.cores} cores{busy}"
 
 
+def usable_cores() -> int:
+    """Return the number of cores that this process may use; all cores if the system does not report it."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def describe_machine() -> Machine:
-    """This machine, now."""
+    """Return this machine as it is now."""
+    from llvmlite.binding import get_host_cpu_features
+
     present = get_host_cpu_features()
     return Machine(
         cpu=_cpu_model(),

@@ -1,6 +1,5 @@
-"""What the program finds around it: data folders that travel with it (`sequences/`, `shaders/`), and cores."""
+"""The data folders that come with the program: `sequences/` and `shaders/`."""
 
-import os
 from pathlib import Path
 
 from depthtrack.errors import InputError
@@ -9,9 +8,10 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource_folder(name: str) -> Path:
-    """Folder `name` inside an installed package (wheel), or beside the package in a checkout.
+    """Return the folder `name` inside an installed package (wheel), or beside the package in a checkout.
 
-    Raises InputError when neither exists, which means a broken installation.
+    Raises:
+        InputError: if neither exists, because the installation is broken.
     """
     for folder in (_PACKAGE / name, _PACKAGE.parent / name):
         if folder.is_dir():
@@ -20,8 +20,3 @@ def resource_folder(name: str) -> Path:
         f"the folder '{name}' of depthtrack is missing beside {_PACKAGE}: "
         "reinstall with  pip install --force-reinstall depthtrack"
     )
-
-
-def usable_cores() -> int:
-    """Cores that this process may run on; where the system does not tell, all there are."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

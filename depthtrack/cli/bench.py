@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.errors import DepthtrackError
 from depthtrack.files import write_atomic
 
@@ -28,11 +29,7 @@ class _Benchmark:
         from dataclasses import asdict
         from json import dumps
 
-        from tqdm import tqdm
-
-        report = benchmark.run(
-            plan, lambda rows: tqdm(rows, total=plan.row_count, unit="row", leave=False, disable=None)
-        )
+        report = benchmark.run(plan, lambda rows: bar(rows, "row", plan.row_count))
         text = dumps(asdict(report), indent=2)
         if self.out is not None:
             write_atomic(self.out, text + "\n")

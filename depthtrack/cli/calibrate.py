@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
@@ -45,11 +46,7 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
-        from tqdm import tqdm
-
-        from depthtrack.calibration.calibrate import VIEWS, calibrate, summary
-        from depthtrack.calibration.views import choose_views
-        from depthtrack.resources import usable_cores
+        from depthtrack.calibration.calibrate import summary
         from depthtrack.segmentation.observation import Segmenter
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
@@ -62,22 +59,9 @@ class Command:
                 raise InputError(f"{path} is a folder: name a file in it")
         sequence = self.recording.open()
         segmenter = Segmenter.for_sequence(sequence, self.skin_model)
-        with tqdm(total=100, unit="%", bar_format="{desc}: {percentage:3.0f}% |{bar}|", disable=None) as bar:
-
-            def tell(what: str, share: float) -> None:
-                bar.set_description_str(what)
-                bar.update(round(100 * share) - bar.n)
-
-            tell("looking for telling frames", 0.0)
-            observations = choose_views(sequence, segmenter, VIEWS)
-            calibration = calibrate(
-                observations,
-                None if self.side == "auto" else self.side,
-                self.seed,
-                self.threads or usable_cores(),
-                f"calibrated on {sequence.name}",
-                tell,
-            )
+        side = None if self.side == "auto" else self.side
+        source = f"calibrated on {sequence.name}"
+        calibration = calibrate_sequence(sequence, segmenter, side, self.seed, self.threads, source)
         write_atomic(self.out, calibration.to_json())
         save_picture(calibration_picture(calibration), picture)
         report = {**summary(calibration), "hand_file": str(self.out), "picture": str(picture)}

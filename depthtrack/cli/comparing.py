@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tqdm import tqdm
-
 from depthtrack.cli.output_folder import check_output_folder
+from depthtrack.cli.progress import bar, counter
 from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
 from depthtrack.evaluation.evaluate import Evaluation
@@ -23,7 +22,7 @@ def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, a
         plans = compare(comparison, folder, workers, listener)
     folders = [Path(plan.folder) for plan in plans]
     looked_at = evaluate_runs(folders, workers)
-    evaluations = list(tqdm(looked_at, "measuring", len(folders), unit="run", leave=False, disable=None))
+    evaluations = list(bar(looked_at, "run", len(folders), "measuring"))
     if as_json:
         print(json.dumps([result(evaluation) for evaluation in evaluations], indent=2))
     else:
@@ -44,19 +43,19 @@ def write_everything(
 
 
 def _frames(frames: Iterable[Frame], heading: str, total: int) -> Iterable[Frame]:
-    return tqdm(frames, heading, total, unit="frame", leave=False, disable=None)
+    return bar(frames, "frame", total, heading)
 
 
 @contextmanager
 def _bar() -> Iterator[Listener]:
     """A progress bar over the frames of all runs."""
-    with tqdm(unit="frame", leave=False, disable=None) as bar:
+    with counter() as shown:
 
         def listen(progress: Progress) -> None:
-            bar.set_description(progress.what)
+            shown.set_description(progress.what)
             if progress.total:
-                bar.total, bar.n = progress.total, progress.frames
-                bar.set_postfix_str("" if progress.frames else "the first use compiles kernels")
-            bar.refresh()
+                shown.total, shown.n = progress.total, progress.frames
+                shown.set_postfix_str("" if progress.frames else "the first use compiles kernels")
+            shown.refresh()
 
         yield listen

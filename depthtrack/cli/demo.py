@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.measuring import calibrate_sequence
+from depthtrack.cli.progress import bar
 from depthtrack.cli.source_options import SourceOptions
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
@@ -77,10 +79,8 @@ class Command:
         return self._recording("skin-hand", "skin"), self._recording("primitive-hand", "primitives")
 
     def _recording(self, name: str, model: Literal["skin", "primitives"]) -> "Source":
-        from tqdm import tqdm
-
+        from depthtrack.machine import usable_cores
         from depthtrack.recording import open_sequence
-        from depthtrack.resources import usable_cores
         from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 
         folder = self.out / "recordings" / name
@@ -94,33 +94,20 @@ class Command:
                 folder,
                 overwrite=True,
                 threads=usable_cores(),
-                progress=lambda each: tqdm(each, "synthesising", frames, unit="frame", leave=False, disable=None),
+                progress=lambda each: bar(each, total=frames, heading="synthesising"),
             )
         return self.recordings.source(folder)
 
 
 def _measure_hand(source: "Source", file: Path) -> bool:
     """Write the sizes of the recording's hand to `file`; False where it does not show a hand well enough."""
-    from tqdm import tqdm
-
-    from depthtrack.calibration.calibrate import VIEWS, calibrate
-    from depthtrack.calibration.views import choose_views
-    from depthtrack.resources import usable_cores
-
     sequence = source.open()
     print(f"measuring the hand: {file}", flush=True)
-    with tqdm(total=100, unit="%", leave=False, disable=None) as bar:
-
-        def tell(what: str, share: float) -> None:
-            bar.set_description(what)
-            bar.update(round(100 * share) - bar.n)
-
-        try:
-            views = choose_views(sequence, source.segmenter(sequence), VIEWS)
-            found = calibrate(views, threads=usable_cores(), source=f"measured on {sequence.name}", progress=tell)
-        except InputError as error:
-            print(f"its sizes cannot be told, so the average adult's are used: {error}")
-            return False
+    try:
+        found = calibrate_sequence(sequence, source.segmenter(sequence), source=f"measured on {sequence.name}")
+    except InputError as error:
+        print(f"the hand cannot be measured, so the average adult's sizes are used: {error}")
+        return False
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(file, found.to_json())
     hand = found.hand

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from depthtrack.cli.progress import bar
 from depthtrack.errors import DepthtrackError, InputError
+from depthtrack.text_table import aligned
 
 if TYPE_CHECKING:
     from depthtrack.rendering.doctor import Machine, Outcome
@@ -26,8 +28,6 @@ class Command:
         from dataclasses import asdict
         from json import dumps
 
-        from tqdm import tqdm
-
         from depthtrack.rendering.doctor import Machine, examine
 
         if not 0 < self.time_limit <= 3600:
@@ -35,7 +35,7 @@ class Command:
         machine = Machine.here()
         outcomes = examine(
             self.time_limit,
-            progress=lambda trials: tqdm(trials, unit="renderer", delay=1, leave=False, disable=None),
+            progress=lambda trials: bar(trials, "renderer"),
         )
         if self.json:
             rows = [{**asdict(outcome), "works": outcome.works} for outcome in outcomes]
@@ -71,16 +71,7 @@ def _text(machine: "Machine", outcomes: "list[Outcome]") -> str:
 
 def _table(outcomes: "list[Outcome]") -> list[str]:
     head = ("renderer", "works", "hypotheses/s", "energy", "depth", "silhouette", "drawn by")
-    rows = [head, *(_row(outcome) for outcome in outcomes)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    aligned = [
-        [
-            cell.ljust(width) if k in (0, 1, 6) else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        for row in rows
-    ]
-    return ["  ".join(row).rstrip() for row in aligned]
+    return aligned([head, *(_row(outcome) for outcome in outcomes)], left=2, text=(6,))
 
 
 def _row(outcome: "Outcome") -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
 
@@ -27,7 +28,6 @@ class Command:
         from json import dumps
 
         import numpy as np
-        from tqdm import tqdm
 
         from depthtrack.recording.summary import summarise
 
@@ -40,8 +40,7 @@ class Command:
             sequence,
             indices,
             self.recording.on_damage,
-            # Shown only where people watch, and only when it takes longer than a moment.
-            progress=lambda frames: tqdm(frames, total=count, unit="frame", delay=1, leave=False, disable=None),
+            progress=lambda frames: bar(frames, total=count),
         )
         print(dumps(asdict(summary), indent=2) if self.json else _text(summary))
 

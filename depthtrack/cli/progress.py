@@ -1,17 +1,46 @@
-"""The bar that long work shows where people watch."""
+"""Progress bars of long work, shown on a terminal only."""
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from typing import TypeVar
+    from collections.abc import Callable, Iterable, Iterator
+    from typing import Any, TypeVar
 
     Item = TypeVar("Item")
 
+DELAY = 1.0
+"""Seconds that work takes before a bar appears."""
 
-def bar(items: "Iterable[Item]", unit: str = "frame") -> "Iterable[Item]":
-    """`items` with a progress bar on a terminal, after a second."""
+
+def bar(
+    items: "Iterable[Item]", unit: str = "frame", total: int | None = None, heading: str | None = None, initial: int = 0
+) -> "Iterable[Item]":
+    """Return `items` under a bar; `initial` of the `total` were done before."""
     from tqdm import tqdm
 
-    shown: Iterable[Item] = tqdm(items, unit=unit, delay=1, leave=False, disable=None)
+    shown: Iterable[Item] = tqdm(
+        items, heading, total, unit=unit, initial=initial, delay=DELAY, leave=False, disable=None
+    )
     return shown
+
+
+def counter(total: int | None = None, unit: str = "frame", initial: int = 0, leave: bool = False) -> "Any":
+    """Return a tqdm bar to update by hand, a context manager; `leave` keeps it on the terminal."""
+    from tqdm import tqdm
+
+    return tqdm(total=total, unit=unit, initial=initial, leave=leave, disable=None)
+
+
+@contextmanager
+def percent_bar() -> "Iterator[Callable[[str, float], None]]":
+    """Yield a function that shows the current step and the share done, 0 to 1."""
+    from tqdm import tqdm
+
+    with tqdm(total=100, unit="%", bar_format="{desc}: {percentage:3.0f}% |{bar}|", leave=False, disable=None) as shown:
+
+        def show(step: str, share: float) -> None:
+            shown.set_description_str(step)
+            shown.update(round(100 * share) - shown.n)
+
+        yield show

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -83,9 +84,7 @@ class Command:
 
 
 def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterable[dict[str, object]]]":
-    from tqdm import tqdm
-
-    return lambda rows, total, reused: tqdm(rows, name, total, initial=reused, unit="cell", disable=None, leave=False)
+    return lambda rows, total, reused: bar(rows, "cell", total, name, reused)
 
 
 def _as_text(done: "Reproduction", folder: Path) -> str:

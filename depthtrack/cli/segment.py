@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
@@ -84,8 +85,6 @@ class Command:
         """Pass on the figures of each frame, while video, contact sheet and table are made of the whole."""
         import csv
 
-        from tqdm import tqdm
-
         from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, sequence_depth_range
         from depthtrack.viewing.contact_sheet import contact_sheet, describe, frame_rate, save_picture
         from depthtrack.viewing.panels import panel
@@ -97,10 +96,9 @@ class Command:
             replace_atomically(folder / "segments.csv") as table,
             VideoWriter(folder / "overlay.mp4", frame_rate(sequence) or 30.0) as video,
             table.open("w", newline="", encoding="utf-8") as file,
-            tqdm(total=len(sequence), unit="frame", delay=1, leave=False, disable=None) as bar,
         ):
             rows: csv.DictWriter[str] | None = None
-            for result in results:
+            for result in bar(results, total=len(sequence)):
                 moment = AnnotatedFrame(result.frame, result.mask)
                 video.write(panel(moment, ("depth", "mask"), 360, near, far))
                 if result.frame.index in chosen:
@@ -110,7 +108,6 @@ class Command:
                     rows = csv.DictWriter(file, row)
                     rows.writeheader()
                 rows.writerow(row)
-                bar.update()
                 yield row
         save_picture(contact_sheet(shown, sequence.name, describe(sequence), near, far), folder / "contact-sheet.png")
 

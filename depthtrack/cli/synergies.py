@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,14 +37,13 @@ class Fit:
 
     def run(self) -> None:
         import numpy as np
-        from tqdm import tqdm
 
         from depthtrack.hand.limits import LOWER, UPPER
         from depthtrack.hand.synergies import Synergies, save_synergies
 
         if not self.postures:
             raise InputError("say which postures to fit: depthtrack synergies fit POSTURES... -o FILE.json")
-        sets = [self._read(path) for path in tqdm(self.postures, unit="file", delay=1, leave=False, disable=None)]
+        sets = [self._read(path) for path in bar(self.postures, "file")]
         angles = np.concatenate([one.angles for one in sets])
         outside = float(np.mean((angles < LOWER) | (angles > UPPER)))
         if self.within_limits:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.progress import bar
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,8 +73,6 @@ class Command:
         if self.threads < 1:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
 
-        from tqdm import tqdm
-
         from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 
         options = Synthesis(
@@ -97,7 +96,7 @@ class Command:
             self.out,
             overwrite=self.overwrite,
             threads=self.threads,
-            progress=lambda frames: tqdm(frames, total=len(made), unit="frame", leave=False, disable=None),
+            progress=lambda frames: bar(frames, total=len(made)),
         )
         camera = made.sensor.camera
         print(

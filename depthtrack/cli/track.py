@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.progress import counter
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.tracker_options import IkChoice, PsoChoice, chosen_options
 from depthtrack.errors import InputError
@@ -51,8 +52,6 @@ class Command:
     def run(self) -> None:
         from contextlib import closing
 
-        from tqdm import tqdm
-
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.hand.kinematics import HandModel
         from depthtrack.recording.run_folder import RunWriter
@@ -85,7 +84,7 @@ class Command:
         with (
             closing(create_tracker(self.tracker, hand, **options)) as tracker,
             RunWriter(self.out, configuration, ("segment", *tracker.stages), self.resume) as run,
-            tqdm(total=count, initial=len(run.rows), unit="frame", disable=None) as bar,
+            counter(count, initial=len(run.rows), leave=True) as bar,
         ):
             bar.set_postfix_str("the first use compiles kernels")
             for row in track_sequence(sequence, segmenter, tracker, HandModel(hand), run, start_pose, count):
@@ -100,7 +99,7 @@ class Command:
 
     def _options(self) -> dict[str, Any]:
         """What the chosen tracker is made with: what was given, and what it would do anyway."""
-        from depthtrack.resources import usable_cores
+        from depthtrack.machine import usable_cores
         from depthtrack.tracking.registry import complete_options
 
         given = {"variant": self.variant, "seed": self.seed} | chosen_options(self.tracker, self.pso, self.ik)

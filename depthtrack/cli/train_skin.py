@@ -6,6 +6,8 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.progress import bar
+
 
 @dataclass(frozen=True)
 class Command:
@@ -23,12 +25,10 @@ class Command:
     """Folder of masks; not needed for a recording."""
 
     def run(self) -> None:
-        from tqdm import tqdm
-
         from depthtrack.segmentation.labelled_images import from_folders, from_recording
         from depthtrack.segmentation.skin_colour import SkinColourModel
 
         labelled = from_recording(self.images) if self.masks is None else from_folders(self.images, self.masks)
-        model = SkinColourModel.train(tqdm(labelled, unit="image", delay=1, leave=False, disable=None))
+        model = SkinColourModel.train(bar(labelled, "image"))
         model.save(self.out)
         print(f"{self.out}: {100 * model.prior:.1f} % of the pixels were skin; use it with --skin-model {self.out}")

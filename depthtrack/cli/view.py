@@ -3,11 +3,10 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-import tyro
-
-from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.progress import bar
+from depthtrack.cli.view_options import ViewOptions
 from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
 
@@ -20,38 +19,13 @@ MOST_MOMENTS = 200
 
 
 @dataclass(frozen=True)
-class Command:
+class Command(ViewOptions):
     """Look at a recording: depth, colour, the hand's mask and the true skeleton. Or at a run (a folder that `depthtrack
     track` wrote): the tracked hand over its recording, the residual, skeletons, and the energies over time.
 
     Opens the interactive viewer where it is installed and there is a screen, and else writes a contact sheet. The
     options below write files instead; several may be given at once.
     """
-
-    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
-    """Write a contact sheet: moments evenly chosen from the recording."""
-    strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
-    """Write a banner close on the hand: a column a moment; colour, depth, hand and skeleton below each other."""
-    video: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mp4")] = None
-    """Write a video of the whole recording."""
-    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
-    """Write a recording for the interactive viewer (rerun FILE.rrd opens it)."""
-    web: bool = False
-    """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
-    frames: Annotated[tuple[int, ...], tyro.conf.arg(metavar="INDEX...")] = ()
-    """Frames to show on sheet and strip, instead of evenly chosen ones."""
-    count: Annotated[int | None, tyro.conf.arg(metavar="MOMENTS")] = None
-    """How many moments to choose: 12 on a sheet and 7 on a strip unless given."""
-    depth_range: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="NEAR FAR")] = None
-    """Metres at the ends of the depth colours; found from the recording unless given."""
-    estimate: bool = True
-    """Where the recording knows no true mask, show the hand as segmentation finds it, in another colour."""
-    codec: Literal["quick", "web"] = "quick"
-    """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
-
-    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Where the recording of a run is, if it was moved since."""
 
     def run(self) -> None:
         from depthtrack.viewing.annotated_frame import sequence_depth_range
@@ -141,18 +115,9 @@ class Command:
 
     def _all_moments(self, sequence: "Sequence") -> "Iterator[AnnotatedFrame]":
         """Every frame, with a progress bar where people watch."""
-        from tqdm import tqdm
-
         from depthtrack.viewing.annotated_frame import moments
 
-        yield from tqdm(
-            moments(sequence, None, self._estimator()),
-            total=len(sequence),
-            unit="frame",
-            delay=1,
-            leave=False,
-            disable=None,
-        )
+        yield from bar(moments(sequence, None, self._estimator()), total=len(sequence))
 
     def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
         from depthtrack.viewing.annotated_frame import evenly_chosen, moments

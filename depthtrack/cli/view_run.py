@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.view_options import ViewOptions
 from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
-    from depthtrack.cli.view import Command
     from depthtrack.evaluation.replay import Replay
 
 _NOT_FOR_RUNS = ("strip", "depth_range")
@@ -16,7 +16,7 @@ _CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy", "depth_scale")
 """A run brings its own."""
 
 
-def view_run(options: "Command") -> None:
+def view_run(options: ViewOptions) -> None:
     """Show the run that the options name. Raises InputError, and MissingExtraError for a viewer without its extra."""
     from depthtrack.evaluation.replay import Replay
     from depthtrack.recording.run_folder import Run
@@ -41,7 +41,7 @@ def view_run(options: "Command") -> None:
         _show(replay, options)
 
 
-def _show(replay: "Replay", options: "Command") -> None:
+def _show(replay: "Replay", options: ViewOptions) -> None:
     """The interactive viewer, or the next best thing."""
     reason = why_no_window()
     if reason is not None:
@@ -73,7 +73,7 @@ def _serve(replay: "Replay") -> None:
         print()
 
 
-def _write_sheet(replay: "Replay", options: "Command", path: Path) -> None:
+def _write_sheet(replay: "Replay", options: ViewOptions, path: Path) -> None:
     from depthtrack.viewing.annotated_frame import evenly_chosen
     from depthtrack.viewing.contact_sheet import save_picture
     from depthtrack.viewing.run_sheet import run_sheet
@@ -89,7 +89,7 @@ def _write_sheet(replay: "Replay", options: "Command", path: Path) -> None:
     print(f"wrote the contact sheet {path}")
 
 
-def _write_video(replay: "Replay", options: "Command", path: Path) -> None:
+def _write_video(replay: "Replay", options: ViewOptions, path: Path) -> None:
     from depthtrack.viewing.run_film import write_run_film
     from depthtrack.viewing.video import WEB_CODECS
 

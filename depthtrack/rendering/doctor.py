@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, Self
 
 import depthtrack
+from depthtrack.machine import usable_cores
 from depthtrack.rendering.selfcheck import SelfCheck
-from depthtrack.resources import usable_cores
 
 _LIBRARIES = (
     *("numpy", "scipy", "numba", "llvmlite", "opencv-python-headless", "PyOpenGL", "trimesh", "matplotlib", "tyro"),

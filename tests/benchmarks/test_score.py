@@ -20,9 +20,8 @@ from depthtrack.geometry.camera import PRESETS
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import HandShape
-from depthtrack.machine import describe_machine
+from depthtrack.machine import describe_machine, usable_cores
 from depthtrack.rendering.oracle import OracleScorer
-from depthtrack.resources import usable_cores
 
 
 def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:

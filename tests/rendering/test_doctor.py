@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from depthtrack.cli import main
+from depthtrack.machine import usable_cores
 from depthtrack.rendering import doctor, selfcheck
 from depthtrack.rendering.doctor import Machine, Outcome, Trial, attempt
 from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.selfcheck import SelfCheck, self_check
-from depthtrack.resources import usable_cores
 
 GOOD = SelfCheck("numba", True, 1e-5, 1e-7, 0, 70000, 123456.0)
 TRIAL = Trial("a renderer", "egl", {"device": "gpu"})

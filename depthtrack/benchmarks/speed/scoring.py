@@ -18,10 +18,9 @@ from depthtrack.benchmarks.speed.timing import time_calls
 from depthtrack.benchmarks.speed.workload import CHECKED, HYPOTHESES, ROIS, Roi, Workload, make_workloads
 from depthtrack.errors import DepthtrackError, InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.machine import Machine, describe_machine
+from depthtrack.machine import Machine, describe_machine, usable_cores
 from depthtrack.rendering.backends import BACKENDS, create_scorer
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.resources import usable_cores
 from depthtrack.text_table import aligned
 
 CONTENDERS = (*BACKENDS, *RIVALS)

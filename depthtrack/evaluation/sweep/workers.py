@@ -4,7 +4,7 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.cluster import DaskWorkers
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.evaluation.sweep.run import Workers
-from depthtrack.resources import usable_cores
+from depthtrack.machine import usable_cores
 
 
 def chosen_workers(jobs: int | None, scheduler: str | None = None) -> Workers:
