@@ -1,4 +1,4 @@
-"""Record and compare SHA-256 digests of tracked poses, so that a restructuring can be shown to change no bit.
+"""Record and compare SHA-256 digests of tracked poses, to show that no bit changes.
 
     python tools/golden_runs.py record golden.json     # before a change
     python tools/golden_runs.py check golden.json      # after it; exit code 1 if a digest differs
@@ -41,7 +41,10 @@ TRACKERS = {
 
 
 def digest(run: Path) -> str:
-    """Return the SHA-256 of frame, time, status and pose in the run's table; energies may differ in the last bit."""
+    """Return the SHA-256 of frame, time, status and pose in the run's table.
+
+    Energies are left out: they may differ in the last bit.
+    """
     with (run / "poses.csv").open(newline="", encoding="utf-8") as file:
         rows = [[*row[:3], *row[5:]] for row in csv.reader(file)]
     return hashlib.sha256(repr(rows).encode()).hexdigest()

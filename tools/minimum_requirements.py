@@ -1,4 +1,4 @@
-"""Print the lowest stated version of each dependency, one requirement a line, for a second test environment.
+"""Print the lowest stated version of each dependency, for a second test environment.
 
     python tools/minimum_requirements.py test gltf > minimum.txt
 
@@ -15,7 +15,7 @@ _REQUIREMENT = re.compile(r"(?P<name>[\w.-]+(?:\[[\w,.-]+\])?)\s*(?:>=\s*(?P<low
 
 
 def lowest(requirement: str) -> str:
-    """Return a requirement pinned to its lowest version; one without a lower bound stays as it is.
+    """Return a requirement pinned to its lowest version, unchanged if it has no lower bound.
 
     Raises:
         ValueError: the text is no requirement.

@@ -1,4 +1,4 @@
-"""Functions of SIMD vectors: roots and reciprocals, exact and estimated, and what goes across lanes."""
+"""Functions of SIMD vectors: exact and estimated roots, reciprocals, reductions."""
 
 from collections.abc import Callable
 from typing import Any

@@ -62,7 +62,7 @@ def element_of(value: types.Type) -> types.Type | None:
 
 
 def operands(a: types.Type, b: types.Type) -> Vector | None:
-    """The vector type two operands meet in, where one may be a scalar; None when neither is a float vector."""
+    """Return the common vector type of two operands, None if neither is a vector of floats."""
     vector = a if isinstance(a, Vector) else b
     other = b if vector is a else a
     if not isinstance(vector, Vector) or vector.element == types.boolean:
@@ -102,7 +102,10 @@ def _binary(emit: Emit) -> Any:
 
 
 def _operator(symbol: Any, emit: Emit, compares: bool = False) -> None:
-    """Teach numba an operator on vectors, directly: an @overload would be compiled anew for every use."""
+    """Register an operator on vectors with numba.
+
+    An `@overload` would be compiled again for every use.
+    """
 
     class Typing(AbstractTemplate):
         def generic(self, arguments: Any, _: Any) -> Any:
@@ -173,7 +176,7 @@ def _address(
 
 
 def loader(vector: Vector) -> Any:
-    """A function `load(array, index)`: lanes of a contiguous 1-d array from any index on, unchecked."""
+    """Return `load(array, index)`, which reads a vector of a contiguous 1-d array, unchecked."""
 
     @intrinsic
     def load(typing_context: Any, array: types.Type, index: types.Type) -> Any:

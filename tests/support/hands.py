@@ -12,7 +12,7 @@ def random_pose(rng: np.random.Generator) -> np.ndarray:
 
 
 def random_pose_in_view(seed: int, *batch: int) -> np.ndarray:
-    """Return poses (*batch, 27) within the limits and within 0.3 m of the optical axis, 0.3 to 0.9 m away."""
+    """Return poses (*batch, 27) within the limits, in view of a camera 0.3 to 0.9 m away."""
     rng = np.random.default_rng(seed)
     return make_pose(
         rng.uniform([-0.3, -0.3, 0.3], [0.3, 0.3, 0.9], (*batch, 3)),

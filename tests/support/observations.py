@@ -1,4 +1,4 @@
-"""Observations of synthetic frames as a perfect segmentation would make them, for tests of trackers."""
+"""Observations of synthetic frames by a perfect segmentation, for the tests of trackers."""
 
 import numpy as np
 

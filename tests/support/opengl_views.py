@@ -1,4 +1,7 @@
-"""Hands seen in ordinary and absurd ways, held to the oracle: for EGL in the tests' process, for OSMesa in its own."""
+"""Comparisons of the OpenGL renderers with the oracle, in ordinary and in degenerate views.
+
+They run in the tests' process for EGL and in a process of its own for OSMesa.
+"""
 
 import numpy as np
 
@@ -28,7 +31,7 @@ ABSURD = {
 def assert_agrees(
     platform: Platform, shape: HandShape, target: Target, poses: np.ndarray, objective: Objective
 ) -> None:
-    """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3, by either way to sum.
+    """Check depth to 0.1 mm, silhouettes to 0.1 % of their pixels and energies to 1e-3.
 
     The energies are compared where no match hangs on the last bits of a depth: such readings are taken out first.
     """
@@ -63,7 +66,7 @@ def assert_window_agrees(platform: Platform, seed: int, reduced: int | None) -> 
 
 
 def assert_any_camera_agrees(platform: Platform, seed: int) -> None:
-    """Any image size, field of view and principal point; hands near and far, mostly partly outside."""
+    """Check any image size, field of view and principal point, with hands near, far and cut off."""
     rng = np.random.default_rng(seed)
     width, height = (int(n) for n in rng.integers(1, 200, 2))
     focal = rng.uniform(0.5, 2) * max(width, height)
@@ -73,7 +76,7 @@ def assert_any_camera_agrees(platform: Platform, seed: int) -> None:
 
 
 def assert_absurd_view_agrees(platform: Platform, name: str, seed: int) -> None:
-    """Where a view makes little sense, it is still defined; behind the lens and outside the image, nothing shows."""
+    """Check degenerate views; a hand behind the lens or outside the image must not show."""
     rng, (centre, spread) = np.random.default_rng(seed), ABSURD[name]
     camera = KINECT.resized(0.25)
     shape, poses = random_shape(rng), random_poses(rng, 6, centre, spread)

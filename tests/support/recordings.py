@@ -61,7 +61,7 @@ def write_sample(path: Path) -> Path:
 
 
 def write_plain_tum(path: Path) -> Path:
-    """A folder as the TUM RGB-D benchmark gives it: no camera, 5000 units a metre, colour taken at other times."""
+    """Write a folder of the TUM RGB-D benchmark: no camera, 5000 units a metre, late colour."""
     (path / "depth").mkdir(parents=True)
     (path / "rgb").mkdir()
     depth_lines, colour_lines = ["# depth maps", "# timestamp filename"], ["# colour images"]

@@ -1,4 +1,4 @@
-"""Random hands, imperfect observations of them, and the comparison of the rasteriser with the oracle."""
+"""Random hands, imperfect observations of them, and the comparison of rasteriser and oracle."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, floa
 
 
 def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
-    """An imperfect observation of a pose: holes in the depth, and skin labels that are wrong here and there."""
+    """Return an imperfect observation of a pose, with holes in the depth and wrong skin labels."""
     empty = Target.blank(camera)
     oracle = OracleScorer(shape)
     oracle.set_target(empty)
@@ -54,8 +54,10 @@ def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
 
 
 def assert_agrees(shape: HandShape, target: Target, poses: np.ndarray, objective: Objective = OBJECTIVE) -> None:
-    """Depth within 0.1 mm, silhouettes equal but for 0.1 % of their pixels, energies within 1e-3 but for pixels whose
-    match hangs on the last bit of a depth."""
+    """Check depth to 0.1 mm, silhouettes to 0.1 % of their pixels and energies to 1e-3.
+
+    The energies may differ more by the pixels whose match depends on the last bit of a depth.
+    """
     fast, oracle = RasterScorer(shape, objective), OracleScorer(shape, objective)
     fast.set_target(target)
     oracle.set_target(target)

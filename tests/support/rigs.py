@@ -51,7 +51,7 @@ def write_rig(
     heads: Array,
     inverse_bind: Array | Literal["heads"] | None = "heads",
 ) -> Path:
-    """Write a GLB as other programs do: unrotated joints at the bones' heads, eight influences, bytes and shorts."""
+    """Write a GLB of another make: unrotated joints, eight influences, bytes and shorts."""
     strongest = np.argsort(-weights, axis=1, kind="stable")[:, :8]
     share = np.take_along_axis(weights, strongest, axis=1)
     matrices = np.tile(np.eye(4), (len(names), 1, 1))
