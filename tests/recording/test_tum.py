@@ -22,20 +22,15 @@ TUM_CAMERA = Camera(CAMERA.width, CAMERA.height, 30.0, 30.0, 15.5, 11.5, 1 / 500
 milliseconds = st.lists(st.integers(0, 400), unique=True, max_size=40).map(sorted)
 
 
-def all_pairs_association(depth: list[float], colour: list[float], max_difference: float) -> dict[int, int]:
-    """As the benchmark's tool does it: every pair, closest first, each image once."""
-    pairs = sorted((abs(a - b), a, b) for a in depth for b in colour if abs(a - b) < max_difference)
-    partner: dict[int, int] = {}
-    for _, a, b in pairs:
-        if depth.index(a) not in partner and colour.index(b) not in partner.values():
-            partner[depth.index(a)] = colour.index(b)
-    return partner
+def all_pairs_association(depth: list[int], colour: list[int], max_difference: int) -> dict[int, int]:
+    """Compare every pair; the earlier of two equally near colour images wins."""
+    nearest = {i: min(range(len(colour)), key=lambda j: abs(colour[j] - t)) for i, t in enumerate(depth) if colour}
+    return {i: j for i, j in nearest.items() if abs(colour[j] - depth[i]) < max_difference}
 
 
 @given(depth=milliseconds, colour=milliseconds, max_difference=st.integers(1, 60))
 def test_association_is_that_of_all_pairs(depth: list[int], colour: list[int], max_difference: int) -> None:
-    found = associate(depth, colour, max_difference)
-    assert found == all_pairs_association(list(depth), list(colour), max_difference)
+    assert associate(depth, colour, max_difference) == all_pairs_association(depth, colour, max_difference)
 
 
 def test_a_plain_tum_folder_opens_with_a_camera_given(tmp_path: Path) -> None:
