@@ -9,7 +9,7 @@ from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.surface_grid import disc
-from depthtrack.types import Index
+from depthtrack.selection import distinct
 
 _LOOKED_AT = 240
 """Frames of a recording that are looked at, at most, spread over all of it."""
@@ -41,7 +41,12 @@ def choose_views(
             f"a hand was found in {len(seen)} of {len(looked_at)} frames of {sequence.name}: calibrating needs at "
             f"least {_FEWEST} frames that show a bare hand, best with open fingers towards the camera"
         )
-    open_ones = _apart(np.argsort(openness)[::-1], (count + 1) // 2, max(1, len(seen) // (2 * count)))
+    open_ones = distinct(
+        np.argsort(openness)[::-1],
+        lambda i, chosen: np.abs(i - np.array(chosen, dtype=np.float64)),
+        max(1, len(seen) // (2 * count)),
+        (count + 1) // 2,
+    )
     others = np.linspace(0, len(seen) - 1, count).round().astype(int)
     chosen = dict.fromkeys([*open_ones, *others.tolist()])
     return [seen[i] for i in list(chosen)[:count]]
@@ -53,14 +58,3 @@ def finger_area(observation: Observation) -> float:
     skin = observation.skin.astype(np.uint8)
     palm = cv2.morphologyEx(skin, cv2.MORPH_OPEN, disc(max(1, round(_FINGER_HALF_BREADTH / pixel))))
     return float(np.count_nonzero(observation.skin & (palm == 0)) * pixel**2)
-
-
-def _apart(ranked: Index, count: int, gap: int) -> list[int]:
-    """The first `count` numbers, in order, that differ by at least `gap` from those before."""
-    chosen: list[int] = []
-    for i in ranked.tolist():
-        if all(abs(i - j) >= gap for j in chosen):
-            chosen.append(i)
-        if len(chosen) == count:
-            break
-    return chosen

@@ -8,6 +8,7 @@ import numpy as np
 from depthtrack.evaluation.compare.results import Line, figures_of
 from depthtrack.evaluation.metrics.success import LIMIT_MM, share_within
 from depthtrack.hand.pose import FINGERS
+from depthtrack.selection import distinct
 from depthtrack.types import Array
 
 POINTS = 900
@@ -99,14 +100,10 @@ def stage_medians(line: Line) -> dict[str, float]:
 
 
 def worst_frames(values: Array, timestamps: Array, count: int, apart: float = 0.5) -> list[int]:
-    """Rows of the `count` largest values, worst first, none within `apart` seconds of a worse one."""
-    chosen: list[int] = []
-    for row in np.argsort(-np.nan_to_num(values, nan=-np.inf), kind="stable"):
-        if len(chosen) == count or not np.isfinite(values[row]):
-            break
-        if all(abs(timestamps[row] - timestamps[other]) >= apart for other in chosen):
-            chosen.append(int(row))
-    return chosen
+    """Return the rows of the `count` largest values, worst first, at least `apart` seconds from each other."""
+    ranked = np.argsort(-np.nan_to_num(values, nan=-np.inf), kind="stable")
+    judged = ranked[np.isfinite(values[ranked])]
+    return distinct(judged, lambda row, chosen: np.abs(timestamps[row] - timestamps[chosen]), apart, count)
 
 
 def top_of_scale(curves: Sequence[OverTime]) -> tuple[float, float]:
