@@ -30,8 +30,8 @@ class Command:
     """Depth camera to imitate: its image, noise, missing readings, shadows."""
     background: Literal["none", "wall", "room"] = "none"
     """What is behind the hand; the room is cluttered, with a face and other things of skin's colour."""
-    model: Literal["primitives", "skin"] = "primitives"
-    """The hand: the 37 spheres and cylinders of trackers, or a smooth skin."""
+    model: Annotated[str, tyro.conf.arg(metavar="primitives|skin|RIG.glb")] = "primitives"
+    """The hand: 37 spheres and cylinders, a smooth skin, or a rigged mesh (.glb, .gltf) with its own sizes."""
     forearm: Literal["auto", "on", "off"] = "auto"
     """With its bare forearm, which trackers must cut off; auto is on before a wall and in a room."""
 
@@ -46,11 +46,11 @@ class Command:
     """Frames a second."""
 
     hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.JSON")] = None
-    """Sizes of the hand; the average adult's unless given."""
+    """Sizes of the hand (default: the average adult's)."""
     scale: float = 1.0
     """Factor on all sizes of the hand."""
     side: Annotated[Literal["right", "left"] | None, tyro.conf.arg(metavar="{right,left}")] = None
-    """Right or left hand; unless told, what --hand says, or right."""
+    """Right or left hand (default: the side of --hand or --model, or right). Of a rigged mesh, the hand to read."""
 
     depth_noise: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
     """Add Gaussian noise of this deviation to the depth, on top of the sensor's."""
@@ -80,7 +80,7 @@ class Command:
             distance=self.distance,
             viewpoint=self.viewpoint,
             hand=self._hand(),
-            model=self.model,
+            model="primitives" if self.model == "primitives" else "skin",
             forearm={"auto": None, "on": True, "off": False}[self.forearm],
             background=self.background,
             sensor=self.sensor,
@@ -106,9 +106,17 @@ class Command:
         )
 
     def _hand(self) -> "HandShape":
+        from depthtrack.hand.hand_file import is_rig, load_hand
         from depthtrack.hand.shape import HandShape
 
-        shape = HandShape() if self.hand is None else HandShape.from_json(self.hand)
+        if self.model in ("primitives", "skin"):
+            shape = HandShape() if self.hand is None else load_hand(self.hand)
+        elif not is_rig(Path(self.model)):
+            raise InputError(f"--model must be primitives, skin or a .glb or .gltf file, found {self.model!r}")
+        elif self.hand is not None:
+            raise InputError("--hand and a rigged mesh as --model both give sizes: leave --hand out")
+        else:
+            shape = load_hand(Path(self.model), self.side)
         return shape.with_(scale=shape.scale * self.scale, side=self.side or shape.side)
 
 

@@ -59,31 +59,45 @@ def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
 
 
 def bias_warning(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
-    """A warning where a synthetic hand was drawn from the very model that some trackers fit, and others do not."""
+    """Return a warning if a synthetic hand was drawn from the model that some trackers fit, and others do not."""
     favoured = matched_model(description, lines)
     others = [label for label in dict.fromkeys(line.label for line in lines) if label not in favoured]
     if not favoured:
         return ""
-    hand = "the skin" if description.get("model") == "skin" else "the spheres and cylinders"
+    names = {"skin": "the skin", "primitives": "the spheres and cylinders"}
+    hand = names.get(_drawn_surface(description), "the rigged mesh")
     fit, do = ("fits" if len(favoured) == 1 else "fit"), ("does" if len(others) == 1 else "do")
     first, rest = listed(favoured), listed(others)
     return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
 
 
 def matched_model(description: Mapping[str, Any], lines: Sequence[Line]) -> tuple[str, ...]:
-    """The trackers whose very model a synthetic hand was drawn from, where others fit another; else none."""
-    drawn = description.get("model")
-    if drawn not in ("skin", "primitives"):
+    """Return the trackers that fit the model that a synthetic hand was drawn from, if others fit another; else none."""
+    drawn = _drawn_surface(description)
+    if not drawn:
         return ()
     labels = dict.fromkeys(line.label for line in lines)
     favoured = tuple(label for label in labels if all(_surface(line) == drawn for line in lines if line.label == label))
     return favoured if len(favoured) < len(labels) else ()
 
 
+def _drawn_surface(description: Mapping[str, Any]) -> str:
+    """Return "skin", "primitives" or the digest of the rig that a synthetic hand was drawn from; else ""."""
+    model = description.get("model")
+    if model == "rig":
+        return str(description.get("sha256", ""))
+    return str(model) if model in ("skin", "primitives") else ""
+
+
 def _surface(line: Line) -> str:
-    """What the line's tracker takes the hand for."""
+    """Return the surface that the line's tracker fits: see `_drawn_surface`."""
     configuration = line.evaluations[0].run.configuration
-    return str(configuration.get("model", "primitives" if configuration.get("tracker") == "pso" else ""))
+    finished = configuration.get("finish") == "skin"
+    of_pso = ("skin" if finished else "primitives") if configuration.get("tracker") == "pso" else ""
+    model = str(configuration.get("model", of_pso))
+    hand = configuration.get("hand")
+    rig = hand.get("rig") if isinstance(hand, dict) else None
+    return str(rig.get("sha256")) if isinstance(rig, dict) and model == "skin" else model
 
 
 def _together(values: Sequence[Any]) -> str:

@@ -164,6 +164,8 @@ class Synthesiser:
         """What `sequence.json` tells: how the recording was made, completely."""
         options = asdict(self.options) | {"distance": self.distance, "forearm": self.has_forearm, "frames": len(self)}
         options["hand"] = self.options.hand.side
+        if self.options.hand.rig is not None and self.options.model == "skin":
+            options |= {"model": "rig", "rig": self.options.hand.rig.path.name, "sha256": self.options.hand.rig.sha256}
         return {"made_by": f"depthtrack {__version__} synth", "about": self.motion.about, **options}
 
     def _backdrop(self, rng: np.random.Generator) -> Backdrop:
@@ -212,7 +214,7 @@ def write_recording(
     with SequenceWriter(
         folder,
         made.sensor.camera,
-        hand=made.options.hand,
+        hand=made.options.hand.with_(rig=None),
         description=made.description(),
         # JPEG shares colour between neighbouring pixels, which would undo flips of single ones.
         colour_format="png" if made.options.skin_flips > 0 else "jpg",

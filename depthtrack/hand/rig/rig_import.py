@@ -67,8 +67,7 @@ def read_rigged_hand(path: Path, side: Side | None = None, unit: float | None = 
         mapping = _read_mapping(path)
         rig, phalanges = _rig_of_hand(read_rigs(path), side, mapping)
         wrist = _wrist(rig, phalanges, mapping)
-        side = side or _side(rig, phalanges, wrist)
-        return _measured(_hand_alone(rig, wrist), phalanges, wrist, side, unit, path)
+        return _measured(_hand_alone(rig, wrist), phalanges, wrist, _side(rig, phalanges, wrist, side), unit, path)
     except InputError as error:
         raise error if str(path) in str(error) else InputError(f"{path}: {error}") from error
 
@@ -165,13 +164,17 @@ def _hand_alone(rig: Rig, wrist: int) -> Rig:
     return close_holes(rig)
 
 
-def _side(rig: Rig, phalanges: Index, wrist: int) -> Side:
-    """Return the side by the bend of fingers and thumb, both towards the palm, and by the joints' names."""
+def _side(rig: Rig, phalanges: Index, wrist: int, asked: Side | None) -> Side:
+    """Return the side by the bend of fingers and thumb, both towards the palm, or as asked, or by the joints' names."""
     first, second, third = (rig.joints[phalanges[:, k]] for k in range(3))
     palmar_if_right = _unit(np.cross(first[1] - first[4], first[2] - rig.joints[wrist]))
     bend = _unit(third - second) - _unit(second - first)
     evidence = float(np.sum(bend[1:] @ palmar_if_right) + _unit(third[0] - first[0]) @ palmar_if_right)
     shown: Side = "right" if evidence > 0 else "left"
+    if asked is not None:
+        if asked != shown and abs(evidence) >= _CLEAR_SIDE:
+            raise InputError(f"the rig must hold a {asked} hand as asked, found a {shown} one: leave the side out")
+        return asked
     named = {side for joint in phalanges.ravel() if (side := side_of(rig.names[joint])) is not None}
     if len(named) == 1 and abs(evidence) < _CLEAR_SIDE:
         return named.pop()

@@ -39,6 +39,8 @@ def finger_joints(names: Sequence[str], parents: Index, loads: Array, side: Side
     sides = {s for name in names if finger_of(name) is not None and (s := side_of(name)) is not None}
     if side is None and len(sides) == 2:
         raise InputError("the rig holds both hands: give the one to read, side 'left' or 'right'")
+    if side is not None and len(sides) == 1 and side not in sides:
+        raise InputError(f"the rig must hold a {side} hand as asked, found a {sides.pop()} one: leave the side out")
     found = np.empty((5, 3), dtype=np.int64)
     missing = []
     for finger in range(5):
