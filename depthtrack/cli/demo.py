@@ -36,8 +36,7 @@ class Command:
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Processes; as many as there are cores unless given."""
     calibrate: bool = True
-    """Measure the hand of your recording first, unless it brings its sizes or --hand tells them; takes a minute or two
-    on two cores."""
+    """Measure the hand of your recording first, unless --hand gives it; takes a minute or two on two cores."""
     open: bool = False
     """Open the report in the browser."""
 
@@ -64,11 +63,9 @@ class Command:
             webbrowser.open((self.out / "report.html").resolve().as_uri())
 
     def _own(self, path: Path) -> "Source":
-        """The user's recording, with its hand measured."""
+        """Return the user's recording, with its hand measured unless --hand was given."""
         source, file = self.recordings.source(path), self.out / f"hand-of-{path.resolve().name}.json"
-        truth = source.open().ground_truth
-        told = source.hand is not None or (truth is not None and truth.hand is not None)
-        if told or not self.calibrate:
+        if source.hand is not None or not self.calibrate:
             return source
         if not file.exists() and not _measure_hand(source, file):
             return source
@@ -104,7 +101,8 @@ def _measure_hand(source: "Source", file: Path) -> bool:
     sequence = source.open()
     print(f"measuring the hand: {file}", flush=True)
     try:
-        found = calibrate_sequence(sequence, source.segmenter(sequence), source=f"measured on {sequence.name}")
+        named = f"measured on {sequence.name}"
+        found = calibrate_sequence(sequence, source.segmenter(sequence), side=source.side, source=named)
     except InputError as error:
         print(f"the hand cannot be measured, so the average adult's sizes are used: {error}")
         return False

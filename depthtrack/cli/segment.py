@@ -1,11 +1,12 @@
 """`depthtrack segment`: the hand in every frame, to look at and in figures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
@@ -39,8 +40,7 @@ class Command:
     """Keep so much of the forearm beyond the wrist, to compare with silhouettes that do."""
     tracker: Literal["pso", "ik"] | None = None
     """Let a tracker tell where hand and wrist are, as it does in `depthtrack track`: slower, and surer of the wrist."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
-    """Sizes of the tracker's hand; unless given, the recording's own, or the average adult's right hand."""
+    hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     json: bool = False
     """Print JSON instead of text."""
 
@@ -50,10 +50,9 @@ class Command:
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
         from depthtrack.segmentation.observation import Segmenter
-        from depthtrack.tracking.configuration import chosen_hand
 
-        if self.hand is not None and self.tracker is None:
-            raise InputError("--hand is for a tracker: say which, with --tracker ik or --tracker pso")
+        if self.hands != HandOptions() and self.tracker is None:
+            raise InputError("--hand and --side are for a tracker: give one with --tracker ik or --tracker pso")
         if not -50 <= self.wrist_margin <= 200:
             raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
         sequence = self.recording.open()
@@ -64,7 +63,7 @@ class Command:
         check_output_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with self._tracker(sequence) as tracker:
-            results = segment_sequence(sequence, segmenter, tracker, chosen_hand(sequence, self.hand))
+            results = segment_sequence(sequence, segmenter, tracker, self.hands.chosen(sequence))
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
         print(dumps(report, indent=2) if self.json else _text(report))
@@ -72,12 +71,11 @@ class Command:
     def _tracker(self, sequence: "Sequence") -> "AbstractContextManager[Tracker | None]":
         from contextlib import closing, nullcontext
 
-        from depthtrack.tracking.configuration import chosen_hand
         from depthtrack.tracking.registry import create_tracker
 
         if self.tracker is None:
             return nullcontext()
-        return closing(create_tracker(self.tracker, chosen_hand(sequence, self.hand)))
+        return closing(create_tracker(self.tracker, self.hands.chosen(sequence)))
 
     def _written(
         self, sequence: "Sequence", results: "Iterator[SegmentedFrame]", folder: Path

@@ -1,11 +1,12 @@
 """Options of the commands that track many recordings alike."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.recording_options import PresetName
 from depthtrack.errors import InputError
 
@@ -19,8 +20,7 @@ class SourceOptions:
 
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Only the first so many frames of each recording."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
-    """Sizes of the hand; unless given, each recording's own, or the average adult's right hand."""
+    hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
     camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
@@ -36,13 +36,15 @@ class SourceOptions:
 
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
-        files = {name: getattr(self, name) for name in ("hand", "skin_model")}
+        hand, skin_model = self.hands.hand, self.skin_model
         return Source(
             path=str(path.resolve()),
             camera=self._camera(),
             on_damage=self.on_damage,
+            hand=hand if hand in (None, "truth") else str(Path(hand).resolve()),
+            skin_model=None if skin_model is None else str(skin_model.resolve()),
             frames=self.frames,
-            **{name: None if file is None else str(file.resolve()) for name, file in files.items()},
+            side=self.hands.side,
         )
 
     def _camera(self) -> dict[str, Any] | None:

@@ -93,6 +93,7 @@ class Info:
             self._draw(synergies, self.picture)
 
     def _draw(self, synergies: "Synergies", path: Path) -> None:
+        from depthtrack.hand.hand_file import load_hand
         from depthtrack.hand.shape import HandShape
         from depthtrack.hand.skin.mesh import Skin
         from depthtrack.viewing.contact_sheet import save_picture
@@ -100,7 +101,7 @@ class Info:
 
         if not 1 <= self.components <= len(synergies):
             raise InputError(f"--components must be 1 to {len(synergies)}, found {self.components}")
-        shape = HandShape() if self.hand is None else HandShape.from_json(self.hand)
+        shape = HandShape() if self.hand is None else load_hand(self.hand)
         save_picture(synergy_sheet(synergies, Skin.of(shape), self.components), path)
         if not self.json:
             print(f"\nwrote the picture {path}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import counter
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.tracker_options import IkChoice, PsoChoice, chosen_options
@@ -30,8 +31,7 @@ class Command:
     tracker: Literal["pso", "ik"] = "pso"
     """How to track: pso renders hypotheses (Oikonomidis et al. 2011), ik fits a surface to the point cloud (Schroeder
     et al. 2014)."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
-    """Sizes of the hand; unless given, the recording's own, or the average adult's right hand."""
+    hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     start: Literal["auto", "truth"] = "auto"
     """Begin by searching, or from the recording's true pose of its first frame."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
@@ -56,7 +56,7 @@ class Command:
         from depthtrack.hand.kinematics import HandModel
         from depthtrack.recording.run_folder import RunWriter
         from depthtrack.segmentation.observation import Segmenter
-        from depthtrack.tracking.configuration import chosen_hand, run_configuration
+        from depthtrack.tracking.configuration import run_configuration
         from depthtrack.tracking.pipeline import track_sequence
         from depthtrack.tracking.registry import create_tracker
 
@@ -64,7 +64,7 @@ class Command:
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
         sequence = self.recording.open()
-        hand = chosen_hand(sequence, self.hand)
+        hand = self.hands.chosen(sequence)
         options = self._options()
         configuration = run_configuration(
             self.recording.path,
@@ -93,9 +93,8 @@ class Command:
         lost = sum(not row.status.is_trusted for row in run.rows)
         print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
         print(f"see how good they are:  depthtrack evaluate {self.out}")
-        truth = sequence.ground_truth
-        if self.hand is None and (truth is None or truth.hand is None):
-            print(f"sizes: the average adult's; measure this hand with  depthtrack calibrate {self.recording.path}")
+        if (note := self.hands.note(sequence, self.recording.path)) is not None:
+            print(note)
 
     def _options(self) -> dict[str, Any]:
         """What the chosen tracker is made with: what was given, and what it would do anyway."""

@@ -57,9 +57,12 @@ class Replay:
         return cls(run, recording, run_hand(run))
 
     def surface(self) -> HandSurface:
-        """The surface that the run fitted. Raises InputError for hand sizes that no skin fits."""
+        """Return the surface that the run fitted; a user's rig if the hand has one.
+
+        Raises: InputError if the sizes give no skin, or if the rig's file is missing or changed.
+        """
         fitted = {self.run.configuration.get(name) for name in ("model", "finish")}
-        return HandSurface.of(self.hand, skin="skin" in fitted)
+        return HandSurface.of(self.hand, skin="skin" in fitted or self.hand.rig is not None)
 
     def __len__(self) -> int:
         return len(self.run.index)

@@ -52,11 +52,3 @@ def run_configuration(
             **{name: version(name) for name in ("depthtrack", "numpy", "numba")},
         },
     }
-
-
-def chosen_hand(sequence: Sequence, file: Path | None) -> HandShape:
-    """The hand of a file; without one the recording's own, or the average adult's right hand. Raises InputError."""
-    if file is not None:
-        return HandShape.from_json(file)
-    truth = sequence.ground_truth
-    return truth.hand if truth is not None and truth.hand is not None else HandShape()

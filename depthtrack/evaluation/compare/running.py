@@ -17,13 +17,14 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.files import write_atomic
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.machine import describe_machine
 from depthtrack.recording import open_sequence
+from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.run_folder import RunWriter, check_same, read_configuration
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.segmentation.observation import Segmenter
-from depthtrack.tracking.configuration import chosen_hand, run_configuration
+from depthtrack.tracking.configuration import run_configuration
 from depthtrack.tracking.pipeline import track_sequence
 from depthtrack.tracking.registry import create_tracker
 
@@ -33,7 +34,12 @@ DONE = "done.json"
 
 @dataclass(frozen=True)
 class Source:
-    """A recording, and what to know beside it: `camera` None is its own, `hand` a file of sizes, `frames` None all."""
+    """A recording and how to track it.
+
+    `camera`: its own if None.
+    `hand`, `side`: see `recording.hand_choice.chosen_hand`.
+    `frames`: number of frames; all if None.
+    """
 
     path: str
     camera: dict[str, Any] | None = None
@@ -41,13 +47,15 @@ class Source:
     hand: str | None = None
     skin_model: str | None = None
     frames: int | None = None
+    side: Side | None = None
 
     def open(self) -> Sequence:
         camera = None if self.camera is None else Camera(**self.camera)
         return open_sequence(self.path, camera, self.on_damage)
 
     def hand_of(self, sequence: Sequence) -> HandShape:
-        return chosen_hand(sequence, None if self.hand is None else Path(self.hand))
+        """Return the hand to track with."""
+        return chosen_hand(sequence, self.hand, self.side)
 
     def segmenter(self, sequence: Sequence) -> Segmenter:
         return Segmenter.for_sequence(sequence, None if self.skin_model is None else Path(self.skin_model))

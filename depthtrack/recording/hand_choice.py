@@ -1,0 +1,39 @@
+"""Choose the hand that a recording is tracked with."""
+
+from pathlib import Path
+
+from depthtrack.errors import InputError
+from depthtrack.hand.hand_file import load_hand
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording.sequence import Sequence
+
+TRUTH = "truth"
+"""The name that asks for the recording's own sizes."""
+
+
+def chosen_hand(sequence: Sequence, hand: str | None = None, side: Side | None = None) -> HandShape:
+    """Return the hand of a file, the recording's own if its name is "truth", else the average adult's.
+
+    Ground truth is used only by that name.
+
+    `hand`: path of a hand file (hand.json) or a rigged mesh (.glb, .gltf), or "truth"; None for the average adult's.
+    `side`: the side of the average hand, right if None; otherwise the side that the hand must have.
+
+    Raises:
+        InputError: if the file is no hand or is the other side's, or if the recording has no sizes.
+    """
+    if hand is None:
+        return HandShape(side=side or "right")
+    if hand != TRUTH:
+        return load_hand(Path(hand), side)
+    truth = sequence.ground_truth
+    if truth is None or truth.hand is None:
+        raise InputError(
+            f"the recording {sequence.name} must have a hand.json for --hand truth, found none: leave --hand out, or "
+            "measure the hand with `depthtrack calibrate`"
+        )
+    if side not in (None, truth.hand.side):
+        raise InputError(
+            f"the recording {sequence.name} shows a {truth.hand.side} hand, but --side {side} was given: leave it out"
+        )
+    return truth.hand
