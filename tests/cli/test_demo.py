@@ -62,7 +62,7 @@ def test_the_hand_of_ones_own_recording_is_measured_first(
     """That measuring is right is tested elsewhere; here, that it is asked for once, and used."""
     asked: list[int] = []
 
-    def measured(observations: Sequence[Observation], **options: Any) -> SimpleNamespace:
+    def measured(observations: Sequence[Observation], *_: Any) -> SimpleNamespace:
         asked.append(len(observations))
         hand = HandShape(scale=1.07)
         return SimpleNamespace(hand=hand, to_json=hand.to_json)
