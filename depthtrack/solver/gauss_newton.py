@@ -1,237 +1,139 @@
-"""Damped Gauss-Newton on fixed correspondences (Schroeder et al. 2014, Sec. IV-A and IV-B), compiled.
+"""One projected, damped Gauss-Newton with step halving for every `Problem` of a posed hand, compiled.
 
-The inner iterations see the observation only through its moments, so they are nearly free.
+The step is that of Schroeder et al. 2014, Eq. (4). A parameter at a limit takes no part in a step that would push it
+beyond (Bertsekas, "Projected Newton methods", SIAM J. Control and Optimization 20(2), 1982). A step is halved until it
+decreases the energy.
 """
-
-from typing import NamedTuple
 
 import numba
 import numpy as np
 
-from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics, retract
-from depthtrack.solver.normal_equations import NormalEquations, energy, normal_equations
-from depthtrack.solver.subspace import PostureSubspace
+from depthtrack.hand.compiled_kinematics import BodyPoses, forward_kinematics, retract
+from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
+from depthtrack.solver.normal_equations import energy, normal_equations
+from depthtrack.solver.prior import add_prior, prior_energy, reduced_precision
+from depthtrack.solver.problem import (
+    Outcome,
+    Problem,
+    Solution,
+    SolverOptions,
+    SolverState,
+    SolverStatus,
+    limit_gradient,
+)
+from depthtrack.solver.subspace import PostureSubspace, reduce_to_subspace, write_angle_step
 from depthtrack.types import Array
 
-_ENOUGH = 3e-5
-"""Metres or radians below which a step is the last one on these correspondences."""
 
-
-class Damping(NamedTuple):
-    """What holds the solution back.
-
-    `posture` lambda of Eq. (4), m^2 / rad^2, on each finger angle or synergy; `pose` on translation (unitless) and
-    rotation (m^2 / rad^2), only to keep the system solvable. `precision` (20, 20) and `mean` (20,): a pull towards
-    likely postures, m^2 / rad^2. `avoid_limits`: whether damping grows towards the limits (Sec. IV-B).
-    """
-
-    posture: float
-    pose: float
-    precision: Array
-    mean: Array
-    avoid_limits: bool
-
-
-class SolverState(NamedTuple):
-    """Working state of one frame: `pose` (27,), `coordinates` (l,) of its angles, and `slope` (l,), |dH/dtheta| of the
-    joint limit function one step before."""
-
-    pose: Array
-    coordinates: Array
-    slope: Array
+def minimise(problem: Problem, options: SolverOptions, start: Array) -> Solution:
+    """Return the solution reached from the pose `start` (27,); correspondences of the problem stay as they are."""
+    state, trace = SolverState.at(start, problem.space), np.empty(options.iterations + 1)
+    outcome = solve(problem, options, BodyPoses.empty(), state, trace)
+    return Solution.of(state.pose, outcome, trace)
 
 
 @numba.njit(cache=True, nogil=True)
-def limit_gradient(x: float, low: float, high: float) -> float:
-    """|dH/dx| for H = (high - low)^2 / ((high - x) (x - low)), the joint limit function of Sec. IV-B."""
-    allocate = max((high - x) * (x - low), 1e-9)
-    return (high - low) ** 2 * abs(2 * x - high - low) / (allocate * allocate)
+def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: SolverState, trace: Array) -> Outcome:
+    """Move `state` to a minimum of the energy; write the energies to `trace` (at least iterations + 1,).
 
-
-@numba.njit(cache=True, nogil=True)
-def solve(
-    chain: Chain,
-    equations: NormalEquations,
-    space: PostureSubspace,
-    damping: Damping,
-    iterations: int,
-    bodies: BodyPoses,
-    state: SolverState,
-) -> float:
-    """Move `state` to lessen Eq. (3), by at most `iterations` steps; returns the final energy (m^2).
-
-    `bodies` are left where the final pose puts them.
+    `bodies` are left where the final pose places them.
     """
+    chain, space, prior = problem.chain, problem.space, problem.prior
     pose, coordinates, slope = state.pose, state.coordinates, state.slope
     count = coordinates.shape[0]
     size = 6 + count
     H, gradient = np.empty((26, 26)), np.empty(26)
     A, b, tangent = np.empty((size, size)), np.empty(size), np.empty(26)
     trial, trial_coordinates = np.empty(27), np.empty(count)
-    pull = _reduced_precision(damping, space)
+    pull = reduced_precision(prior, space)
     forward_kinematics(chain, pose, bodies)
-    for _ in range(iterations):
-        current = normal_equations(equations, bodies, H, gradient)
-        _reduce(H, gradient, space, A, b)
-        current += _add_prior(pose, damping, space, pull, A, b)
-        for i in range(3):
-            A[i, i] += damping.pose
-            A[3 + i, 3 + i] += damping.pose * 1e-2
+    status, steps, reached, best = SolverStatus.ITERATION_LIMIT, 0, False, 0.0
+    for _ in range(options.iterations):
+        current = normal_equations(problem.equations, problem.points, bodies, H, gradient)
+        reduce_to_subspace(H, gradient, space, A, b)
+        current += add_prior(pose, prior, space, pull, A, b)
+        if steps == 0:
+            best, trace[0], reached = current, current, True
+        _damp(A, coordinates, slope, space, options)
         for i in range(count):
-            here = limit_gradient(coordinates[i], space.lower[i], space.upper[i])
-            scale = 1.0 + here if damping.avoid_limits and here >= slope[i] else 1.0
-            slope[i] = here
-            A[6 + i, 6 + i] += damping.posture * scale
-            # At its limit and pushed beyond, a parameter takes no part.
+            # A parameter at its limit that would be pushed beyond takes no part in the step.
             push = -b[6 + i]
             if (coordinates[i] <= space.lower[i] and push < 0) or (coordinates[i] >= space.upper[i] and push > 0):
-                for j in range(size):
-                    A[6 + i, j] = A[j, 6 + i] = 0.0
-                A[6 + i, 6 + i] = 1.0
-                b[6 + i] = 0.0
+                hold_parameter(A, b, 6 + i)
         if not cholesky_solve(A, b):
+            status = SolverStatus.SINGULAR
             break
-        length, improved = 1.0, False
-        for _ in range(8):
+        length, largest, improved = 1.0, 0.0, False
+        for _ in range(options.halvings):
             largest = 0.0
             for i in range(6):
                 tangent[i] = -length * b[i]
             for i in range(count):
                 moved = coordinates[i] - length * b[6 + i]
                 trial_coordinates[i] = min(max(moved, space.lower[i]), space.upper[i])
-            _tangent_angles(space, pose, trial_coordinates, tangent)
+            write_angle_step(space, pose, trial_coordinates, tangent)
             for i in range(26):
                 largest = max(largest, abs(tangent[i]))
             retract(pose, tangent, trial)
             forward_kinematics(chain, trial, bodies)
-            if energy(equations, bodies) + _prior(trial, damping) < current:
+            best = energy(problem.equations, problem.points, bodies) + prior_energy(trial, prior)
+            if best < current:
                 improved = True
                 break
             length *= 0.5
         if not improved:
             forward_kinematics(chain, pose, bodies)
+            best, status = current, SolverStatus.NO_PROGRESS
             break
         for i in range(27):
             pose[i] = trial[i]
         for i in range(count):
             coordinates[i] = trial_coordinates[i]
-        if largest < _ENOUGH:
+        steps += 1
+        trace[steps] = best
+        gain = current - best
+        if largest < options.step_tolerance or gain < options.energy_tolerance * current + options.energy_floor:
+            status = SolverStatus.CONVERGED
             break
-    return energy(equations, bodies) + _prior(pose, damping)
+    if not reached:
+        best = energy(problem.equations, problem.points, bodies) + prior_energy(pose, prior)
+        trace[0] = best
+    return Outcome(status, steps, best)
 
 
 @numba.njit(cache=True, nogil=True)
-def _tangent_angles(space: PostureSubspace, pose: Array, coordinates: Array, tangent: Array) -> None:
-    """The change of the angles that leads to `coordinates`."""
-    for j in range(20):
-        if space.full:
-            tangent[6 + j] = coordinates[j] - pose[7 + j]
-        else:
-            angle = space.mean[j]
-            for i in range(coordinates.shape[0]):
-                angle += space.basis[j, i] * coordinates[i]
-            tangent[6 + j] = angle - pose[7 + j]
+def solve_each(
+    problem: Problem, options: SolverOptions, targets: Array, weights: Array, poses: Array, energies: Array
+) -> None:
+    """Fit the points of the problem to each row of targets, from each pose; poses change in place.
 
-
-@numba.njit(cache=True, nogil=True)
-def _reduce(H: Array, gradient: Array, space: PostureSubspace, A: Array, b: Array) -> None:
-    """Normal equations of the space's parameters: J_PC = J M, Eq. (8)."""
-    B, count, size = space.basis, space.basis.shape[1], b.shape[0]
-    for i in range(size):
-        kept = space.full or i < 6
-        b[i] = gradient[i] if kept else 0.0
-        for j in range(size):
-            A[i, j] = H[i, j] if kept and (space.full or j < 6) else 0.0
-    if space.full:
-        return
-    HB = np.empty(count)
-    for j in range(20):
-        row, first = 6 + j, j - j % 4
-        for k in range(count):
-            b[6 + k] += B[j, k] * gradient[row]
-            # What an angle shares with those of other fingers is nothing.
-            HB[k] = H[row, 6 + first] * B[first, k] + H[row, 7 + first] * B[first + 1, k]
-            HB[k] += H[row, 8 + first] * B[first + 2, k] + H[row, 9 + first] * B[first + 3, k]
-        for i in range(6):
-            for k in range(count):
-                A[i, 6 + k] += H[i, row] * B[j, k]
+    targets: (B, N, 3) metres, camera frame; weights: (B, N); poses: (B, 27) within the limits; energies: (B,) m^2, out.
+    """
+    bodies = BodyPoses(np.empty((16, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
+    trace, count = np.empty(options.iterations + 1), problem.space.lower.shape[0]
+    coordinates, slope, angles = np.empty(count), np.zeros(count), np.empty(20)
+    for n in range(poses.shape[0]):
+        points, pose = problem.points, poses[n]
+        points.target[:], points.weight[:] = targets[n], weights[n]
+        problem.equations.centre[:] = pose[:3]
+        for j in range(20):
+            angles[j] = pose[7 + j] - problem.space.mean[j]
         for i in range(count):
-            for k in range(i + 1):
-                A[6 + i, 6 + k] += B[j, i] * HB[k]
-    for i in range(6):
-        for k in range(count):
-            A[6 + k, i] = A[i, 6 + k]
-    for i in range(count):
-        for k in range(i):
-            A[6 + k, 6 + i] = A[6 + i, 6 + k]
-
-
-@numba.njit(cache=True, nogil=True)
-def _reduced_precision(damping: Damping, space: PostureSubspace) -> Array:
-    """The prior's precision (l, 20) between the space's parameters and the angles."""
-    if space.full:
-        return damping.precision
-    count = space.basis.shape[1]
-    pull = np.zeros((count, 20))
-    for i in range(count):
-        for k in range(20):
+            coordinates[i] = 0.0
             for j in range(20):
-                pull[i, j] += space.basis[k, i] * damping.precision[k, j]
-    return pull
+                coordinates[i] += problem.space.basis[j, i] * angles[j]
+        outcome = solve(problem, options, bodies, SolverState(pose, coordinates, slope), trace)
+        energies[n] = outcome.energy
 
 
 @numba.njit(cache=True, nogil=True)
-def _prior(pose: Array, damping: Damping) -> float:
-    """Half the squared distance, by `precision`, of the angles from rest."""
-    total = 0.0
-    for i in range(20):
-        row = 0.0
-        for j in range(20):
-            row += damping.precision[i, j] * (pose[7 + j] - damping.mean[j])
-        total += row * (pose[7 + i] - damping.mean[i])
-    return 0.5 * total
-
-
-@numba.njit(cache=True, nogil=True)
-def _add_prior(pose: Array, damping: Damping, space: PostureSubspace, pull: Array, A: Array, b: Array) -> float:
-    """Add the prior to the space's normal equations, `pull` being its `_reduced_precision`; returns `_prior`."""
-    count = pull.shape[0]
-    for i in range(count):
-        for j in range(20):
-            b[6 + i] += pull[i, j] * (pose[7 + j] - damping.mean[j])
-            if space.full:
-                A[6 + i, 6 + j] += pull[i, j]
-            else:
-                for k in range(count):
-                    A[6 + i, 6 + k] += pull[i, j] * space.basis[j, k]
-    return _prior(pose, damping)
-
-
-@numba.njit(cache=True, nogil=True)
-def cholesky_solve(A: Array, b: Array) -> bool:
-    """Solve A x = b in place: A (n, n) is spent and b becomes x. False unless A is symmetric positive definite."""
-    n = b.shape[0]
-    for j in range(n):
-        d = A[j, j]
-        for k in range(j):
-            d -= A[j, k] * A[j, k]
-        if not d > 1e-14:
-            return False
-        d = np.sqrt(d)
-        A[j, j] = d
-        for i in range(j + 1, n):
-            s = A[i, j]
-            for k in range(j):
-                s -= A[i, k] * A[j, k]
-            A[i, j] = s / d
-    for i in range(n):
-        s = b[i]
-        for k in range(i):
-            s -= A[i, k] * b[k]
-        b[i] = s / A[i, i]
-    for i in range(n - 1, -1, -1):
-        s = b[i]
-        for k in range(i + 1, n):
-            s -= A[k, i] * b[k]
-        b[i] = s / A[i, i]
-    return True
+def _damp(A: Array, coordinates: Array, slope: Array, space: PostureSubspace, options: SolverOptions) -> None:
+    """Add the damping to the diagonal of A, and keep the slope of the joint limit function for the next step."""
+    for i in range(3):
+        A[i, i] += options.pose_damping
+        A[3 + i, 3 + i] += options.pose_damping * 1e-2
+    for i in range(coordinates.shape[0]):
+        here = limit_gradient(coordinates[i], space.lower[i], space.upper[i])
+        scale = 1.0 + here if options.avoid_limits and here >= slope[i] else 1.0
+        slope[i] = here
+        A[6 + i, 6 + i] += options.posture_damping * scale

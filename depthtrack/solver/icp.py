@@ -1,4 +1,4 @@
-"""Fits the hand to one observation: matches and damped Gauss-Newton in turn (Schroeder et al. 2014, Sec. IV-C)."""
+"""ICP fit of the hand to an observation: correspondences and Gauss-Newton by turns (Schroeder et al. 2014, IV-C)."""
 
 from dataclasses import dataclass
 
@@ -11,37 +11,35 @@ from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud, Surface
-from depthtrack.solver.gauss_newton import Damping, SolverState, limit_gradient, solve
+from depthtrack.solver.fixed_points import FixedPoints
+from depthtrack.solver.gauss_newton import solve
 from depthtrack.solver.normal_equations import NormalEquations, clear
 from depthtrack.solver.prior import Prior
+from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradient
 from depthtrack.solver.residuals import Residual, add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.types import Array
 
-_COARSE = 4
-"""The whole hand is aligned by every so many-th point of the cloud."""
-_STANDARD_COUNT = 3000.0
-"""Points that damping is stated for: with more or fewer, it grows and shrinks alongside their sum."""
-
 
 @dataclass(frozen=True)
 class IcpOptions:
-    """How an observation is fitted.
+    """Iterations, correspondences and damping of an ICP fit.
 
-    `rounds` of correspondences with at most `inner` Gauss-Newton steps each, after `rigid` rounds that move the hand
-    as a whole. `residual` and `kernel_scale` (m, in the first and in the last round, 0 for none) say how
-    correspondences
-    count, `max_distance` (m) and `min_normal_cosine` (least cosine between normals, in the first and in the last
-    round) which do.
-    `damping` is lambda of Eq. (4) and `temporal_weight` how firmly the angles are tied to those of the frame before,
-    both in
-    m^2/rad^2 beside the sum over 3000 points; `synergy_weight` (m^2) how firmly to what synergies call likely: see
-    `prior.Prior`.
+    icp_iterations: searches for correspondences. gn_iterations: largest number of Gauss-Newton steps for each.
+    rigid_iterations: searches before, each followed by a motion of the whole hand (Sec. IV-C). residual: see
+    `Residual`. kernel_scale: m, scale of the Geman-McClure kernel in the first and in the last iteration, 0 for none.
+    max_distance: m, largest distance of a correspondence. min_normal_cosine: smallest cosine between its normals, in
+    the first and in the last iteration. damping: lambda of Eq. (4), m^2/rad^2. temporal_weight: precision of the prior
+    towards the angles of the frame before, m^2/rad^2. synergy_weight: m^2, see `Prior.synergy_weight`. avoid_limits:
+    increase the damping towards the joint limits (Sec. IV-B). coarse_every: the rigid motion uses every n-th point.
+    reference_count: number of points that damping and priors are stated for; they scale with the number of points.
+    pose_damping, align_damping: damping of the global pose, and of the fixed posture during a rigid motion.
+    Values without a section of the paper were tuned on synthetic recordings.
     """
 
-    rounds: int = 5
-    inner: int = 5
-    rigid: int = 2
+    icp_iterations: int = 5
+    gn_iterations: int = 5
+    rigid_iterations: int = 2
     residual: Residual = "symmetric"
     kernel_scale: tuple[float, float] = (0.03, 0.007)
     max_distance: float = 0.04
@@ -50,17 +48,20 @@ class IcpOptions:
     temporal_weight: float = 5e-5
     synergy_weight: float = 3e-7
     avoid_limits: bool = False
+    coarse_every: int = 4
+    reference_count: float = 3000.0
+    pose_damping: float = 1e-9
+    align_damping: float = 1.0
 
     def annealed(self, progress: float) -> tuple[float, float]:
-        """Softness and agreement when `progress` (0 to 1) of the rounds is done: outliers lose their say as the fit
-        improves."""
+        """Return kernel scale (m) and smallest normal cosine at `progress` (0 to 1); outliers lose weight."""
         (soft, firm), (low, high) = self.kernel_scale, self.min_normal_cosine
         kernel_scale = soft * (firm / soft) ** progress if soft > 0 and firm > 0 else 0.0
         return float(kernel_scale), low + progress * (high - low)
 
 
 PAPER_ICP = IcpOptions(
-    rigid=1,
+    rigid_iterations=1,
     residual="point",
     kernel_scale=(0.0, 0.0),
     min_normal_cosine=(0.0, 0.0),
@@ -69,23 +70,28 @@ PAPER_ICP = IcpOptions(
     synergy_weight=0.0,
     avoid_limits=True,
 )
-"""Schroeder et al. 2014: point to point, all points alike, damping by the step alone, joint limit avoidance."""
+"""Schroeder et al. 2014: point to point, equal weights, damping of the step alone, joint limit avoidance."""
 
 
 class IcpFitter:
-    """Fits one hand; holds the working memory."""
+    """Fits one hand to observations, and holds the working memory for it.
+
+    `solution` describes the last run of Gauss-Newton in the last fit: its energy is that of the last correspondences.
+    """
+
+    solution: Solution | None = None
 
     def __init__(self, shape: HandShape, surface: Surface, options: IcpOptions) -> None:
         self.options = options
         self._surface = surface
-        self._chain = Chain.of(shape)
-        self._bodies, self._moments = BodyPoses.empty(), NormalEquations.empty()
+        self._chain, self._points = Chain.of(shape), FixedPoints.none()
+        self._bodies, self._equations = BodyPoses.empty(), NormalEquations.empty()
 
     def set_target(self, observation: Observation, every: int) -> None:
-        """Set what the next fits are to: every so many-th point of this observation."""
+        """Set the observation that the next fits are to, and use every n-th of its points."""
         self._cloud = PointCloud.of(observation, every)
         self._matches = Correspondences.allocate(len(self._cloud.points))
-        self._coarse = PointCloud.of(observation, every * _COARSE)
+        self._coarse = PointCloud.of(observation, every * self.options.coarse_every)
         self._coarse_matches = Correspondences.allocate(len(self._coarse.points))
         self._surface.set_target(observation, self._cloud, self.options.max_distance)
 
@@ -93,49 +99,62 @@ class IcpFitter:
         self,
         pose: Array,
         space: PostureSubspace = FULL,
-        rounds: int | None = None,
+        iterations: int | None = None,
         prior: Prior | None = None,
         coarse: bool = False,
         align: bool = True,
     ) -> Array:
-        """The pose (27,) reached from `pose` by moving what `space` lets move.
+        """Return the pose (27,) that fits the observation, reached from `pose` (27,) by the parameters of `space`.
 
-        `coarse` looks at every fourth of the points alone; without `align`, the hand is not moved as a whole before.
+        iterations: instead of `IcpOptions.icp_iterations`; coarse: use the subset of the points that the rigid motion
+        uses; align: move the whole hand first.
         """
         options = self.options
         cloud, correspondences = (self._coarse, self._coarse_matches) if coarse else (self._cloud, self._matches)
-        share = len(cloud.points) / _STANDARD_COUNT
+        share = len(cloud.points) / options.reference_count
         pull = (prior or Prior.none()).scaled(share)
         pose = pose.copy()
         coordinates = space.project(pose[ANGLES])
         pose[ANGLES] = space.angles(coordinates)
-        for _ in range(options.rigid if align else 0):
+        for _ in range(options.rigid_iterations if align else 0):
             self._align(pose)
         slope = np.array([limit_gradient(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
         state = SolverState(pose, coordinates, slope)
-        damping = Damping(options.damping * share, 1e-9, pull.precision, pull.mean, options.avoid_limits)
-        rounds = options.rounds if rounds is None else rounds
-        for k in range(rounds):
-            self._match(pose, cloud, correspondences, k / max(rounds - 1, 1))
-            solve(self._chain, self._moments, space, damping, options.inner, self._bodies, state)
+        problem = Problem(self._chain, self._equations, self._points, pull, space)
+        solver = SolverOptions(
+            options.gn_iterations, options.damping * share, options.pose_damping, options.avoid_limits
+        )
+        iterations = options.icp_iterations if iterations is None else iterations
+        trace = np.empty(options.gn_iterations + 1)
+        self.solution = None
+        for k in range(iterations):
+            self._match(pose, cloud, correspondences, k / max(iterations - 1, 1))
+            outcome = solve(problem, solver, self._bodies, state, trace)
+            if k == iterations - 1:
+                self.solution = Solution.of(pose, outcome, trace)
         return pose
 
     def _match(self, pose: Array, cloud: PointCloud, correspondences: Correspondences, progress: float) -> None:
+        """Find the correspondences of a pose (27,), and accumulate their residuals."""
         kernel_scale, min_normal_cosine = self.options.annealed(progress)
         forward_kinematics(self._chain, pose, self._bodies)
         self._surface.match(pose, self._bodies, cloud, min_normal_cosine, correspondences)
-        clear(self._moments, self._bodies)
-        add_correspondences(self._moments, correspondences, cloud, self.options.residual, kernel_scale)
+        clear(self._equations, self._bodies)
+        add_correspondences(self._equations, correspondences, cloud, self.options.residual, kernel_scale)
 
     def _align(self, pose: Array) -> None:
-        """Move the whole hand onto its correspondences: in closed form for points (Horn 1987), else by solving."""
-        correspondences = self._coarse_matches
+        """Move the whole hand onto its correspondences, `pose` (27,) in place.
+
+        In closed form for point residuals (Horn 1987), otherwise by the solver with a fixed posture.
+        """
+        correspondences, options = self._coarse_matches, self.options
         self._match(pose, self._coarse, correspondences, 0.0)
-        if self.options.residual != "point":
-            still = SolverState(pose, np.zeros(1), np.zeros(1))
-            towards = PostureSubspace(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
-            free = Damping(1.0, 1e-9, np.zeros((20, 20)), np.zeros(20), False)
-            solve(self._chain, self._moments, towards, free, self.options.inner, self._bodies, still)
+        if options.residual != "point":
+            fixed = PostureSubspace(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
+            problem = Problem(self._chain, self._equations, self._points, Prior.none(), fixed)
+            solver = SolverOptions(options.gn_iterations, options.align_damping, options.pose_damping)
+            state = SolverState(pose, np.zeros(1), np.zeros(1))
+            solve(problem, solver, self._bodies, state, np.empty(options.gn_iterations + 1))
             return
         found = correspondences.body >= 0
         if found.sum() >= 3:

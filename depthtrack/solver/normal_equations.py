@@ -1,10 +1,10 @@
-"""The squared distances between hand and observation, gathered in a 6 x 6 matrix for each body.
+"""The normal equations of the hand, accumulated in a 6 x 6 matrix for each body.
 
-While correspondences stand still, a body's residuals are a quadratic function of how it moved. That function is all
-the solver needs: its inner iterations cost the same for ten points as for ten thousand.
+While correspondences are fixed, a body's residuals are a quadratic function of its motion. That function is all that
+the solver needs: its iterations cost the same for ten correspondences and for ten thousand.
 
-A body's motion since the correspondences were found is a twist (v, w): v (m) is how far it carried the point
-`centre`, w (rad) how it turned. A residual n . (x - y) of a surface point x with direction n grows by
+A body's motion since the correspondences were found is a twist (v, w): v (m) is the motion of the point `centre` with
+the body, w (rad) its turn. A residual n . (x - y) of a surface point x with direction n grows by
 n . v + ((x - centre) x n) . w.
 """
 
@@ -14,16 +14,19 @@ import numba
 import numpy as np
 
 from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses
+from depthtrack.solver.fixed_points import FixedPoints, accumulate, squared_residuals
 from depthtrack.types import Array
 
 ROW = 8
-"""Places of a row of the sums: six of a a^T, one of a e, and one to spare."""
+"""Elements of a row of the sums: six of a a^T, one of a e, and one of padding."""
 
 
 class NormalEquations(NamedTuple):
-    """Sums over residuals e with gradients a (6,) by twist: `sums` (16, 6, ROW), in each row of a body six of a a^T
-    and one of a e; `e` (16,) of e^2 (m^2); `T` (16, 3, 4) where the bodies were, `centre` (3,) the point the twists
-    refer to."""
+    """Sums over the residuals e of found correspondences, with gradients a (6,) by the twist of their body.
+
+    sums: (16, 6, ROW): in each row of a body, six elements of a a^T and one of a e; e: (16,) sums of e^2, m^2;
+    T: (16, 3, 4) T_camera_body when the correspondences were found; centre: (3,) m, the point that twists refer to.
+    """
 
     sums: Array
     e: Array
@@ -32,13 +35,13 @@ class NormalEquations(NamedTuple):
 
     @staticmethod
     def empty() -> "NormalEquations":
-        """No residuals yet."""
+        """Return the equations of no residuals."""
         n = BODY_COUNT
         return NormalEquations(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
 
 
 def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
-    """Forget all residuals; the bodies are where they are now."""
+    """Remove all residuals, and refer those to come to the bodies where they are now."""
     equations.sums.fill(0.0)
     equations.e.fill(0.0)
     equations.T[:] = bodies.T
@@ -47,7 +50,7 @@ def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> None:
-    """Twist (6,) of body b from where it was when the residuals were added, to first order in its turn."""
+    """Write the twist (6,) of body b since the residuals were added to `out`, to first order in its turn."""
     now, was, c = bodies.T[b], equations.T[b], equations.centre
     R = np.empty((3, 3))
     for i in range(3):
@@ -62,8 +65,8 @@ def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> 
 
 
 @numba.njit(cache=True, nogil=True)
-def energy(equations: NormalEquations, bodies: BodyPoses) -> float:
-    """Half the sum of squared residuals, weighted, with the bodies where they are now (m^2)."""
+def energy(equations: NormalEquations, points: FixedPoints, bodies: BodyPoses) -> float:
+    """Return half the weighted sum of squared residuals, m^2, with the bodies where they are now."""
     total, s = 0.0, np.empty(6)
     for b in range(equations.e.shape[0]):
         twist(equations, bodies, b, s)
@@ -72,15 +75,17 @@ def energy(equations: NormalEquations, bodies: BodyPoses) -> float:
             row = equations.sums[b, j]
             Ms = row[0] * s[0] + row[1] * s[1] + row[2] * s[2] + row[3] * s[3] + row[4] * s[4] + row[5] * s[5]
             total += s[j] * (2 * row[6] + Ms)
-    return 0.5 * total
+    return 0.5 * (total + squared_residuals(points, bodies))
 
 
 @numba.njit(cache=True, nogil=True)
-def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gradient: Array) -> float:
-    """J^T J into `H` (26, 26) and J^T e into `gradient` (26,), with the bodies where they are now; returns `energy`.
+def normal_equations(
+    equations: NormalEquations, points: FixedPoints, bodies: BodyPoses, H: Array, gradient: Array
+) -> float:
+    """Write J^T J to `H` (26, 26) and J^T e to `gradient` (26,) for the current bodies; returns `energy`.
 
-    A joint moves everything beyond it alike, so sums over bodies are carried from the fingertips inward and each joint
-    meets them once, as in Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
+    A joint moves all bodies beyond it alike, so the sums of bodies are added up from the fingertips inward. Each joint
+    uses them once: Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
     """
     total = 0.0
     n = equations.e.shape[0]
@@ -96,6 +101,7 @@ def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gr
             total += s[j] * (2 * equations.sums[b, j, 6] + Ms)
             g[b, j] = equations.sums[b, j, 6] + Ms
         _shift(M[b], g[b], s[0], s[1], s[2])
+    total += accumulate(points, bodies, equations.centre, M, g)
     for i in range(26):
         for j in range(26):
             H[i, j] = 0.0
@@ -104,7 +110,7 @@ def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gr
     for j in range(3):
         columns[j, j] = 1.0
         columns[3 + j, 3 + j] = 1.0
-    # Turning about the palm carries the centre along.
+    # A turn about the palm moves the centre too.
     px, py, pz = c[0] - palm[0, 3], c[1] - palm[1, 3], c[2] - palm[2, 3]
     columns[3, 1], columns[3, 2] = -pz, py
     columns[4, 0], columns[4, 2] = pz, -px
@@ -119,7 +125,7 @@ def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gr
                 gradient[6 + a] = _dot(columns[6 + a], g[b])
                 for j in range(6):
                     H[6 + a, j] = _dot(columns[j], F)
-                # What this joint shares with those further out was entered by them.
+                # The joints further out have entered their elements already.
                 for inner in range(4 * finger, a + 1):
                     _hinge(bodies, inner, c, columns[6 + inner])
                     H[6 + a, 6 + inner] = _dot(columns[6 + inner], F)
@@ -141,7 +147,7 @@ def normal_equations(equations: NormalEquations, bodies: BodyPoses, H: Array, gr
 
 @numba.njit(cache=True, nogil=True)
 def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
-    """Refer a body's sums to the centre itself, from the point (dx, dy, dz) beyond it: v there is v + w x d."""
+    """Refer the sums of a body to the centre, from the point (dx, dy, dz) away from it: v there is v + w x d."""
     for i in range(6):
         x, y, z = M[i, 0], M[i, 1], M[i, 2]
         M[i, 3] += dy * z - dz * y
@@ -160,7 +166,7 @@ def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _hinge(bodies: BodyPoses, a: int, c: Array, out: Array) -> None:
-    """Twist (6,) at the centre of a unit turn of angle a."""
+    """Write the twist (6,) at the centre `c` of a unit turn of angle a to `out`."""
     ux, uy, uz = bodies.axes[a, 0], bodies.axes[a, 1], bodies.axes[a, 2]
     px, py, pz = c[0] - bodies.origins[a, 0], c[1] - bodies.origins[a, 1], c[2] - bodies.origins[a, 2]
     out[0], out[1], out[2] = uy * pz - uz * py, uz * px - ux * pz, ux * py - uy * px

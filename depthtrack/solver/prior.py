@@ -1,46 +1,91 @@
-"""What draws finger angles that the observation says little of: those of a moment ago, or likely ones."""
+"""Quadratic priors on the finger angles: towards angles of a moment ago, or towards likely postures."""
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from depthtrack.hand.synergies import Synergies
+from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.types import Array
-
-_RESIDUAL_SPREAD = np.radians(2.0)
-"""How far postures usually lie from what a few synergies make of them: standard deviation of an angle."""
 
 
 class Prior(NamedTuple):
-    """A pull of the finger angles x towards `mean` (20,): (x - rest)^T `precision` (x - rest) is added to the squared
-    distances. `precision` (20, 20) is in m^2/rad^2 beside the sum over 3000 points."""
+    """A quadratic prior: half of (x - mean)^T precision (x - mean) is added to the energy at finger angles x.
+
+    precision: (20, 20) m^2/rad^2, beside half the sum of squared residuals; mean: (20,) rad. Trackers state the
+    precision beside a sum over 3000 points, and scale it by their number.
+    """
 
     precision: Array
     mean: Array
 
     @staticmethod
     def none() -> "Prior":
-        """No pull at all."""
+        """Return the prior without effect."""
         return Prior(np.zeros((20, 20)), np.zeros(20))
 
     @staticmethod
     def towards(angles: Array, strength: float) -> "Prior":
-        """Towards these angles (20,), alike for all of them: `strength` m^2/rad^2."""
+        """Return the prior towards angles (20,), rad, of the same strength (m^2/rad^2) for each."""
         return Prior(strength * np.eye(20), angles.copy())
 
     @staticmethod
-    def synergy_weight(synergies: Synergies, strength: float) -> "Prior":
-        """Towards postures that are common among those of the synergies.
+    def synergy_weight(synergies: Synergies, strength: float, residual_spread: float = np.radians(2.0)) -> "Prior":
+        """Return the prior towards postures that are common among those of the synergies.
 
-        They are taken as probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along
-        each, and a little variance in all other directions. `strength` (m^2) is the variance of a point's distance
-        for which the result is the likeliest pose.
+        The synergies are probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along
+        each, and a small variance in all other directions.
+
+        strength: m^2, variance of a residual for which the minimum is the likeliest pose; residual_spread: rad,
+        standard deviation of an angle from its reconstruction by a few synergies.
         """
         C = synergies.components
-        along = C * (1 / (synergies.variances + _RESIDUAL_SPREAD**2)) @ C.T
-        across = (np.eye(20) - C @ C.T) / _RESIDUAL_SPREAD**2
+        along = C * (1 / (synergies.variances + residual_spread**2)) @ C.T
+        across = (np.eye(20) - C @ C.T) / residual_spread**2
         return Prior(strength * (along + across), synergies.mean.copy())
 
     def scaled(self, factor: float) -> "Prior":
-        """The same pull, so many times as strong."""
+        """Return the prior with its precision times `factor`."""
         return Prior(factor * self.precision, self.mean)
+
+
+@numba.njit(cache=True, nogil=True)
+def reduced_precision(prior: Prior, space: PostureSubspace) -> Array:
+    """Return the precision (l, 20) of the prior between the coordinates and the angles."""
+    if space.full:
+        return prior.precision
+    count = space.basis.shape[1]
+    pull = np.zeros((count, 20))
+    for i in range(count):
+        for k in range(20):
+            for j in range(20):
+                pull[i, j] += space.basis[k, i] * prior.precision[k, j]
+    return pull
+
+
+@numba.njit(cache=True, nogil=True)
+def prior_energy(pose: Array, prior: Prior) -> float:
+    """Return half the squared distance, by the precision, of the angles from the mean of the prior."""
+    total = 0.0
+    for i in range(20):
+        row = 0.0
+        for j in range(20):
+            row += prior.precision[i, j] * (pose[7 + j] - prior.mean[j])
+        total += row * (pose[7 + i] - prior.mean[i])
+    return 0.5 * total
+
+
+@numba.njit(cache=True, nogil=True)
+def add_prior(pose: Array, prior: Prior, space: PostureSubspace, pull: Array, A: Array, b: Array) -> float:
+    """Add the prior to the normal equations; `pull` is its `reduced_precision`. Returns its energy."""
+    count = pull.shape[0]
+    for i in range(count):
+        for j in range(20):
+            b[6 + i] += pull[i, j] * (pose[7 + j] - prior.mean[j])
+            if space.full:
+                A[6 + i, 6 + j] += pull[i, j]
+            else:
+                for k in range(count):
+                    A[6 + i, 6 + k] += pull[i, j] * space.basis[j, k]
+    return prior_energy(pose, prior)

@@ -1,7 +1,8 @@
-"""The parameters a solver moves: all 26, or the global pose and a few synergies (Schroeder et al. 2014, Sec. V-A)."""
+"""Parameters of the solver: all 26, or the global pose and a few synergies (Schroeder et al. 2014, Sec. V-A)."""
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from depthtrack.hand.limits import LOWER, UPPER
@@ -10,8 +11,11 @@ from depthtrack.types import Array
 
 
 class PostureSubspace(NamedTuple):
-    """Finger angles as `mean` (20,) + `basis` (20, l) @ coordinates (l,): Eq. (6) and (7), less the global pose, which
-    no basis changes. `lower`, `upper` (l,) are the coordinates' limits; `full` tells the plain angles (basis: I)."""
+    """Finger angles as mean + basis @ coordinates: Eq. (6) and (7), without the global pose, which stays free.
+
+    basis: (20, l) orthonormal; mean: (20,) rad; lower, upper: (l,) limits of the coordinates; full: whether the
+    coordinates are the plain angles (the basis is I).
+    """
 
     basis: Array
     mean: Array
@@ -21,20 +25,70 @@ class PostureSubspace(NamedTuple):
 
     @staticmethod
     def of(synergies: Synergies, count: int | None = None) -> "PostureSubspace":
-        """The global pose and the first `count` synergies, or all of them. Raises InputError if there are fewer."""
+        """Return the global pose and the first `count` synergies, by default all.
+
+        Raises:
+            InputError: if there are fewer synergies.
+        """
         s = synergies if count is None else synergies.truncated(count)
         return PostureSubspace(
             np.ascontiguousarray(s.components), np.array(s.mean), np.array(s.lower), np.array(s.upper), False
         )
 
     def project(self, angles: Array) -> Array:
-        """Coordinates (l,) of the nearest angles that the space holds, moved within the limits."""
+        """Return the coordinates (l,), within the limits, of the angles of the subspace nearest to `angles` (20,)."""
         return np.clip((angles - self.mean) @ self.basis, self.lower, self.upper)
 
     def angles(self, coordinates: Array) -> Array:
-        """Angles (20,) at coordinates (l,)."""
+        """Return the angles (20,), rad, at coordinates (l,)."""
         return self.mean + self.basis @ coordinates
 
 
 FULL = PostureSubspace(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER), True)
-"""All twenty angles within the hand's limits."""
+"""All twenty angles within the limits of the hand."""
+
+
+@numba.njit(cache=True, nogil=True)
+def write_angle_step(space: PostureSubspace, pose: Array, coordinates: Array, tangent: Array) -> None:
+    """Write the change of the angles that leads to `coordinates` to `tangent`."""
+    for j in range(20):
+        if space.full:
+            tangent[6 + j] = coordinates[j] - pose[7 + j]
+        else:
+            angle = space.mean[j]
+            for i in range(coordinates.shape[0]):
+                angle += space.basis[j, i] * coordinates[i]
+            tangent[6 + j] = angle - pose[7 + j]
+
+
+@numba.njit(cache=True, nogil=True)
+def reduce_to_subspace(H: Array, gradient: Array, space: PostureSubspace, A: Array, b: Array) -> None:
+    """Write the normal equations of the parameters of the subspace to A and b: J_PC = J M, Eq. (8)."""
+    B, count, size = space.basis, space.basis.shape[1], b.shape[0]
+    for i in range(size):
+        kept = space.full or i < 6
+        b[i] = gradient[i] if kept else 0.0
+        for j in range(size):
+            A[i, j] = H[i, j] if kept and (space.full or j < 6) else 0.0
+    if space.full:
+        return
+    HB = np.empty(count)
+    for j in range(20):
+        row, first = 6 + j, j - j % 4
+        for k in range(count):
+            b[6 + k] += B[j, k] * gradient[row]
+            # The angles of different fingers share no element of H.
+            HB[k] = H[row, 6 + first] * B[first, k] + H[row, 7 + first] * B[first + 1, k]
+            HB[k] += H[row, 8 + first] * B[first + 2, k] + H[row, 9 + first] * B[first + 3, k]
+        for i in range(6):
+            for k in range(count):
+                A[i, 6 + k] += H[i, row] * B[j, k]
+        for i in range(count):
+            for k in range(i + 1):
+                A[6 + i, 6 + k] += B[j, i] * HB[k]
+    for i in range(6):
+        for k in range(count):
+            A[6 + k, i] = A[i, 6 + k]
+    for i in range(count):
+        for k in range(i):
+            A[6 + k, 6 + i] = A[6 + i, 6 + k]

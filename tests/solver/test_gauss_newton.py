@@ -10,18 +10,21 @@ from hypothesis import strategies as st
 
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.limits import LOWER, UPPER
+from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import load_synergies
-from depthtrack.solver import gauss_newton as solver
 from depthtrack.solver import normal_equations as sums
+from depthtrack.solver import problem as problems
 from depthtrack.solver.correspondences import Correspondences, PointCloud
-from depthtrack.solver.gauss_newton import Damping, SolverState
+from depthtrack.solver.fixed_points import FixedPoints
+from depthtrack.solver.gauss_newton import minimise
+from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.solver.normal_equations import NormalEquations
-from depthtrack.solver.prior import Prior
+from depthtrack.solver.prior import Prior, add_prior, reduced_precision
+from depthtrack.solver.problem import Solution, SolverOptions, SolverStatus, limit_gradient
 from depthtrack.solver.residuals import Residual, add_correspondences, weight
-from depthtrack.solver.subspace import FULL, PostureSubspace
+from depthtrack.solver.subspace import FULL, PostureSubspace, reduce_to_subspace
 from tests.support.hands import random_pose
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -29,6 +32,7 @@ RESIDUALS = st.sampled_from(["point", "plane", "symmetric"])
 SOFTNESS = st.sampled_from([0.0, 0.01])
 SHAPE = HandShape()
 CHAIN, HAND = Chain.of(SHAPE), HandModel(SHAPE)
+NO_POINTS = FixedPoints.none()
 
 
 class Problem:
@@ -82,12 +86,12 @@ def _slope(function: Callable[[np.ndarray], float], size: int, h: float = 1e-6) 
 def test_normal_equations_are_those_of_the_dense_jacobian(seed: int, residual: Residual, kernel_scale: float) -> None:
     problem = Problem(seed, residual, kernel_scale)
     H, gradient = np.empty((26, 26)), np.empty(26)
-    found = sums.normal_equations(problem.equations, problem.bodies, H, gradient)
+    found = sums.normal_equations(problem.equations, NO_POINTS, problem.bodies, H, gradient)
     expected_H, expected_gradient = problem.normal_equations()
     np.testing.assert_allclose(H, expected_H, atol=1e-9 * np.abs(expected_H).max())
     np.testing.assert_allclose(gradient, expected_gradient, atol=1e-9)
     assert found == pytest.approx(problem.energy(problem.pose), rel=1e-9)
-    assert found == pytest.approx(sums.energy(problem.equations, problem.bodies), rel=1e-9)
+    assert found == pytest.approx(sums.energy(problem.equations, NO_POINTS, problem.bodies), rel=1e-9)
 
 
 @settings(max_examples=10)
@@ -95,7 +99,7 @@ def test_normal_equations_are_those_of_the_dense_jacobian(seed: int, residual: R
 def test_the_gradient_is_the_energys_slope(seed: int, residual: Residual, kernel_scale: float) -> None:
     problem = Problem(seed, residual, kernel_scale)
     gradient = np.empty(26)
-    sums.normal_equations(problem.equations, problem.bodies, np.empty((26, 26)), gradient)
+    sums.normal_equations(problem.equations, NO_POINTS, problem.bodies, np.empty((26, 26)), gradient)
     slope = _slope(lambda step: problem.energy(retract(problem.pose, step)), 26)
     np.testing.assert_allclose(gradient, slope, atol=1e-7)
 
@@ -107,9 +111,9 @@ def test_after_small_steps_sums_still_tell_energy_and_slope(seed: int, residual:
     problem = Problem(seed, residual, 0.01)
     pose = retract(problem.pose, np.random.default_rng(seed).normal(0, 0.004, 26))
     bodies, gradient = BodyPoses.at(CHAIN, pose), np.empty(26)
-    found = sums.normal_equations(problem.equations, bodies, np.empty((26, 26)), gradient)
+    found = sums.normal_equations(problem.equations, NO_POINTS, bodies, np.empty((26, 26)), gradient)
     assert found == pytest.approx(problem.energy(pose), rel=1e-2)
-    assert found == pytest.approx(sums.energy(problem.equations, bodies), rel=1e-9)
+    assert found == pytest.approx(sums.energy(problem.equations, NO_POINTS, bodies), rel=1e-9)
     slope = _slope(lambda step: problem.energy(retract(pose, step)), 26)
     assert np.linalg.norm(gradient - slope) < 0.02 * np.linalg.norm(slope)
 
@@ -127,7 +131,7 @@ def test_synergies_reduce_the_system_as_in_equation_8(seed: int, count: int) -> 
     problem, space = Problem(seed, "plane", 0.0), PostureSubspace.of(load_synergies("leap-grasps"), count)
     H, gradient = problem.normal_equations()
     A, b = np.empty((6 + count, 6 + count)), np.empty(6 + count)
-    solver._reduce(H, gradient, space, A, b)
+    reduce_to_subspace(H, gradient, space, A, b)
     M = np.zeros((26, 6 + count))
     M[:6, :6], M[6:, 6:] = np.eye(6), space.basis
     np.testing.assert_allclose(A, M.T @ H @ M, atol=1e-9 * np.abs(H).max())
@@ -146,8 +150,8 @@ def test_the_limit_slope_is_that_of_the_papers_function(low: float, width: float
         return (high - low) ** 2 / ((high - x) * (x - low))
 
     slope = (limit_function(x + h) - limit_function(x - h)) / (2 * h)
-    assert solver.limit_gradient(x, low, high) == pytest.approx(abs(slope), rel=1e-4, abs=1e-3 / width)
-    assert math.isfinite(solver.limit_gradient(low, low, high))
+    assert limit_gradient(x, low, high) == pytest.approx(abs(slope), rel=1e-4, abs=1e-3 / width)
+    assert math.isfinite(limit_gradient(low, low, high))
 
 
 @given(seed=SEEDS, size=st.integers(1, 26))
@@ -156,17 +160,13 @@ def test_cholesky_solves_as_numpy_does(seed: int, size: int) -> None:
     factor, b = rng.normal(size=(size + 2, size)), rng.normal(size=size)
     A = factor.T @ factor
     expected, x = np.linalg.solve(A, b), b.copy()
-    assert solver.cholesky_solve(A.copy(), x)
+    assert cholesky_solve(A.copy(), x)
     np.testing.assert_allclose(A @ x, b, atol=1e-9 * max(1, float(np.abs(expected).max())) * np.abs(A).max())
-    assert not solver.cholesky_solve(A - (np.linalg.eigvalsh(A)[0] + 0.1) * np.eye(size), b.copy())
+    assert not cholesky_solve(A - (np.linalg.eigvalsh(A)[0] + 0.1) * np.eye(size), b.copy())
 
 
-def solved(problem: Problem, space: PostureSubspace, damping: Damping, iterations: int) -> tuple[SolverState, float]:
-    coordinates = space.project(problem.pose[ANGLES])
-    pose = problem.pose.copy()
-    pose[ANGLES] = space.angles(coordinates)
-    state = SolverState(pose, coordinates, np.zeros(len(coordinates)))
-    return state, solver.solve(CHAIN, problem.equations, space, damping, iterations, BodyPoses.empty(), state)
+def solved(problem: Problem, space: PostureSubspace, prior: Prior, options: SolverOptions) -> Solution:
+    return minimise(problems.Problem(CHAIN, problem.equations, NO_POINTS, prior, space), options, problem.pose)
 
 
 @given(seed=SEEDS, residual=RESIDUALS, strength=st.sampled_from([1e-4, 1e-2]))
@@ -176,14 +176,13 @@ def test_one_step_is_the_damped_least_squares_one(seed: int, residual: Residual,
     problem.pose[ANGLES] = (LOWER + UPPER) / 2
     problem = _nearly_met(problem, 1e-3)
     prior = Prior.towards(problem.pose[ANGLES] + 1e-4, strength)
-    damping = Damping(1e-3, 1e-9, *prior, avoid_limits=False)
-    state, _ = solved(problem, FULL, damping, 1)
+    solution = solved(problem, FULL, prior, SolverOptions(1, 1e-3))
     H, gradient = problem.normal_equations()
     H[6:, 6:] += strength * np.eye(20)
     gradient[6:] -= strength * 1e-4
     D = np.diag(np.repeat([1e-9, 1e-11, 1e-3], [3, 3, 20]))
     step = np.linalg.solve(H + D, -gradient)
-    np.testing.assert_allclose(state.pose, retract(problem.pose, step), atol=1e-9 + 1e-6 * np.abs(step).max())
+    np.testing.assert_allclose(solution.pose, retract(problem.pose, step), atol=1e-9 + 1e-6 * np.abs(step).max())
 
 
 def _nearly_met(problem: Problem, share: float) -> Problem:
@@ -207,13 +206,51 @@ def test_solving_lessens_the_energy_within_the_limits(
     space = FULL if count is None else PostureSubspace.of(load_synergies(), count)
     problem.pose[ANGLES] = space.angles(space.project(problem.pose[ANGLES]))
     problem = _nearly_met(problem, 0.05)
-    damping = Damping(1e-6, 1e-9, *Prior.none(), avoid_limits=avoid)
-    after, energy = solved(problem, space, damping, 8)
-    assert energy < sums.energy(problem.equations, problem.bodies)
+    after = solved(problem, space, Prior.none(), SolverOptions(8, 1e-6, avoid_limits=avoid))
+    assert after.energy < sums.energy(problem.equations, NO_POINTS, problem.bodies)
     assert problem.energy(after.pose) < problem.energy(problem.pose)
-    assert energy == pytest.approx(sums.energy(problem.equations, BodyPoses.at(CHAIN, after.pose)), rel=1e-9)
-    assert np.all((after.coordinates >= space.lower) & (after.coordinates <= space.upper))
-    np.testing.assert_allclose(after.pose[ANGLES], space.angles(after.coordinates), atol=1e-9)
+    energy = sums.energy(problem.equations, NO_POINTS, BodyPoses.at(CHAIN, after.pose))
+    assert after.energy == pytest.approx(energy, rel=1e-9)
+    coordinates = space.project(after.pose[ANGLES])
+    np.testing.assert_allclose(after.pose[ANGLES], space.angles(coordinates), atol=1e-9)
+
+
+@given(seed=SEEDS, residual=RESIDUALS, iterations=st.integers(0, 12))
+def test_the_trace_falls_and_the_status_says_why_it_ends(seed: int, residual: Residual, iterations: int) -> None:
+    problem = Problem(seed, residual, 0.0)
+    problem.pose = within_limits(problem.pose)
+    solution = solved(problem, FULL, Prior.none(), SolverOptions(iterations, 1e-5))
+    assert len(solution.trace) == solution.iterations + 1
+    assert np.all(np.diff(solution.trace) < 0)
+    assert solution.trace[-1] == solution.energy
+    assert solution.trace[0] == pytest.approx(sums.energy(problem.equations, NO_POINTS, problem.bodies), rel=1e-9)
+    if solution.status == SolverStatus.ITERATION_LIMIT:
+        assert solution.iterations == iterations
+        assert not solution.converged
+    else:
+        assert solution.converged
+
+
+def test_undetermined_parameters_are_singular() -> None:
+    problem = Problem(3, "plane", 0.0)
+    sums.clear(problem.equations, problem.bodies)
+    solution = solved(problem, FULL, Prior.none(), SolverOptions(5, 0.0, pose_damping=0.0))
+    assert solution.status == SolverStatus.SINGULAR
+    assert solution.iterations == 0
+    assert not solution.converged
+
+
+@given(seed=SEEDS, size=st.integers(2, 12))
+def test_a_held_parameter_leaves_the_system_of_the_others(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    factor, b = rng.normal(size=(size + 2, size)), rng.normal(size=size)
+    A, held = factor.T @ factor, int(rng.integers(size))
+    others = np.delete(np.arange(size), held)
+    expected = np.linalg.solve(A[np.ix_(others, others)], b[others])
+    hold_parameter(A, b, held)
+    x = np.linalg.solve(A, b)
+    assert x[held] == 0
+    np.testing.assert_allclose(x[others], expected, rtol=1e-9)
 
 
 def _pulled_up(by: float) -> Problem:
@@ -231,19 +268,17 @@ def _pulled_up(by: float) -> Problem:
 
 
 def test_limits_hold() -> None:
-    pulled, _ = solved(_pulled_up(0.3), FULL, Damping(1e-6, 1e-9, *Prior.none(), avoid_limits=False), 10)
+    pulled = solved(_pulled_up(0.3), FULL, Prior.none(), SolverOptions(10, 1e-6))
     assert np.all(pulled.pose[ANGLES] <= UPPER)
     assert np.mean(pulled.pose[ANGLES] > UPPER - 1e-3) > 0.6
 
 
 def test_limit_avoidance_slows_what_moves_towards_a_limit_and_nothing_that_leaves_it() -> None:
-    damping = Damping(1e-5, 1e-9, *Prior.none(), avoid_limits=False)
-
     def bent(by: float, avoid: bool) -> float:
         """Mean bend after two steps."""
         problem = _pulled_up(by)
-        state, _ = solved(problem, FULL, damping._replace(avoid_limits=avoid), 2)
-        return float(np.mean(state.pose[ANGLES] - problem.pose[ANGLES]))
+        solution = solved(problem, FULL, Prior.none(), SolverOptions(2, 1e-5, avoid_limits=avoid))
+        return float(np.mean(solution.pose[ANGLES] - problem.pose[ANGLES]))
 
     assert bent(0.03, avoid=False) == pytest.approx(0.03, rel=0.1)
     assert bent(0.03, avoid=True) < 0.75 * bent(0.03, avoid=False)
@@ -257,12 +292,12 @@ def test_likely_postures_are_those_of_probabilistic_components(seed: int, count:
     covariance = synergies.components * synergies.variances @ synergies.components.T + np.radians(2) ** 2 * np.eye(20)
     np.testing.assert_allclose(prior.precision @ covariance, 1e-6 * np.eye(20), atol=1e-12)
     pose = random_pose(np.random.default_rng(seed))
-    damping = Damping(0.0, 0.0, *prior.scaled(2.0), avoid_limits=False)
+    doubled = prior.scaled(2.0)
     for space in (FULL, PostureSubspace.of(load_synergies("leap-grasps"), 4)):
         size = 6 + space.basis.shape[1]
         A, b = np.zeros((size, size)), np.zeros(size)
-        pull = solver._reduced_precision(damping, space)
-        energy = solver._add_prior(pose, damping, space, pull, A, b)
+        pull = reduced_precision(doubled, space)
+        energy = add_prior(pose, doubled, space, pull, A, b)
         away = pose[ANGLES] - synergies.mean
         assert energy == pytest.approx(away @ prior.precision @ away)
         np.testing.assert_allclose(A[6:, 6:], 2 * space.basis.T @ prior.precision @ space.basis, atol=1e-15)

@@ -205,7 +205,7 @@ def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> _
 def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
     """How long each fit to a frame took, from `pose` (27,), without the alignment of the whole hand before it."""
     options = setting.options(film)
-    fitting = replace(options.fitting, rigid=0)
+    fitting = replace(options.fitting, rigid_iterations=0)
     synergies = options.chosen_synergies
     space = FULL if synergies is None else PostureSubspace.of(synergies)
     fitter = IcpFitter(film.hand, make_surface(setting.model, film.hand), fitting)

@@ -69,7 +69,9 @@ class IkOptions:
     def fitting(self) -> IcpOptions:
         """How each observation is fitted."""
         base = self.fit or (PAPER_ICP if self.variant == "paper" else IcpOptions())
-        return replace(base, rounds=self.rounds, inner=self.inner, residual=self.residual or base.residual)
+        return replace(
+            base, icp_iterations=self.rounds, gn_iterations=self.inner, residual=self.residual or base.residual
+        )
 
     @property
     def chosen_synergies(self) -> Synergies | None:

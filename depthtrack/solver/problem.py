@@ -1,0 +1,127 @@
+"""Problems of a posed hand and what solving them returns: residual blocks, prior, subspace, options, status, trace.
+
+The energy is half the weighted sum of squared residuals (m^2), plus half a quadratic prior on the finger angles. The
+residuals come from found correspondences, accumulated in `NormalEquations`, and from `FixedPoints`. The parameters are
+the six of the global pose and the coordinates of a `PostureSubspace` within its limits.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from depthtrack.hand.compiled_kinematics import Chain
+from depthtrack.hand.pose import ANGLES
+from depthtrack.solver.fixed_points import FixedPoints
+from depthtrack.solver.normal_equations import NormalEquations
+from depthtrack.solver.prior import Prior
+from depthtrack.solver.subspace import PostureSubspace
+from depthtrack.types import Array
+
+
+class SolverStatus(IntEnum):
+    """The reason for which a solver stopped.
+
+    CONVERGED: the last step, or the decrease of the energy by it, fell below its tolerance. NO_PROGRESS: no halved step
+    decreased the energy. ITERATION_LIMIT: all iterations were used. SINGULAR: the damped normal equations were not
+    positive definite, so that the residuals and the damping leave a parameter undetermined.
+    """
+
+    CONVERGED = 0
+    NO_PROGRESS = 1
+    ITERATION_LIMIT = 2
+    SINGULAR = 3
+
+
+class Problem(NamedTuple):
+    """A hand, its residuals, a prior on its angles, and the parameters that may move, with their limits."""
+
+    chain: Chain
+    equations: NormalEquations
+    points: FixedPoints
+    prior: Prior
+    space: PostureSubspace
+
+
+class SolverOptions(NamedTuple):
+    """Iterations, damping and tolerances of the solver.
+
+    iterations: largest number of steps. posture_damping: lambda of Eq. (4) on each finger angle or synergy, m^2/rad^2.
+    pose_damping: damping of the translation (unitless), and a hundredfold smaller one of the rotation (m^2/rad^2); it
+    only keeps the system solvable. avoid_limits: increase the damping towards the limits (Schroeder et al. 2014,
+    Sec. IV-B). step_tolerance: the solver stops after a step whose largest element is smaller, m or rad.
+    energy_tolerance: it stops after a step that decreases the energy by a smaller share. energy_floor: it stops after
+    a step that decreases the energy by less, m^2. halvings: lengths tried for a step, each half of the one before.
+    """
+
+    iterations: int
+    posture_damping: float
+    pose_damping: float = 1e-9
+    avoid_limits: bool = False
+    step_tolerance: float = 3e-5
+    energy_tolerance: float = 0.0
+    energy_floor: float = 0.0
+    halvings: int = 8
+
+
+class SolverState(NamedTuple):
+    """The iterate: a pose and its coordinates in the subspace; the solver changes the arrays in place.
+
+    pose: (27,); coordinates: (l,) of its angles; slope: (l,) |dH/dx| of the joint limit function at the step before.
+    """
+
+    pose: Array
+    coordinates: Array
+    slope: Array
+
+    @staticmethod
+    def at(pose: Array, space: PostureSubspace) -> "SolverState":
+        """Return the state at the pose (27,) of the subspace that is nearest to `pose` (27,)."""
+        start = np.array(pose, dtype=np.float64)
+        coordinates = space.project(start[ANGLES])
+        start[ANGLES] = space.angles(coordinates)
+        slope = np.array([limit_gradient(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
+        return SolverState(start, coordinates, slope)
+
+
+class Outcome(NamedTuple):
+    """What the compiled solver returns: why it stopped, the steps it took, and the final energy, m^2."""
+
+    status: SolverStatus
+    iterations: int
+    energy: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solved problem.
+
+    pose: (27,); status: why the solver stopped; iterations: accepted steps; energy: m^2, prior included; trace:
+    (iterations + 1,) m^2, the energy at the start and after each step.
+    """
+
+    pose: Array
+    status: SolverStatus
+    iterations: int
+    energy: float
+    trace: Array
+
+    @staticmethod
+    def of(pose: Array, outcome: Outcome, trace: Array) -> "Solution":
+        """Return the solution of a run of the compiled solver; `trace` may be longer than its steps."""
+        energies = trace[: outcome.iterations + 1].copy()
+        return Solution(pose, outcome.status, outcome.iterations, outcome.energy, energies)
+
+    @property
+    def converged(self) -> bool:
+        """Whether a tolerance was reached, or no step could decrease the energy further."""
+        return self.status in (SolverStatus.CONVERGED, SolverStatus.NO_PROGRESS)
+
+
+@numba.njit(cache=True, nogil=True)
+def limit_gradient(x: float, low: float, high: float) -> float:
+    """Return |dH/dx| of the joint limit function H = (high - low)^2 / ((high - x) (x - low)) of Sec. IV-B."""
+    room = max((high - x) * (x - low), 1e-9)
+    return (high - low) ** 2 * abs(2 * x - high - low) / (room * room)
