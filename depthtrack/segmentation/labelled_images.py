@@ -6,7 +6,7 @@ from pathlib import Path
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import MAX_SIDE
 from depthtrack.recording import open_sequence
-from depthtrack.recording.images import read_colour, read_header, read_mask
+from depthtrack.recording.images import read_colour, read_mask, read_size
 from depthtrack.types import Labels, Mask
 
 Labelled = tuple[Labels, Mask]
@@ -23,10 +23,10 @@ def from_folders(images: Path, masks: Path) -> Iterator[Labelled]:
     for stem, path in sorted(pictures.items()):
         if stem not in partners:
             raise InputError(f"{path.name} has no mask of the same name in {masks}")
-        header = read_header(path)
-        if max(header.width, header.height) > MAX_SIDE:
-            raise InputError(f"{path} is {header.width}x{header.height} pixels: at most {MAX_SIDE} a side are read")
-        shape = (header.height, header.width)
+        width, height = read_size(path)
+        if max(width, height) > MAX_SIDE:
+            raise InputError(f"{path} is {width}x{height} pixels: at most {MAX_SIDE} a side are read")
+        shape = (height, width)
         yield read_colour(path, shape), read_mask(partners[stem], shape)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.skin_colour import AdaptiveSkin
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.surface_grid import dilated, disc
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Depth, Labels, Mask

@@ -12,7 +12,8 @@ from depthtrack.segmentation.hand_detection import find_start, nearest_palm
 from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.pixel_labels import hand_masks, label_hand
 from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior, segment_roi
-from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinColourModel
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
 from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
 from depthtrack.segmentation.wrist_filter import WristFilter

@@ -10,7 +10,7 @@ import numpy as np
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.grid import Grid
-from depthtrack.segmentation.skin_colour import AdaptiveSkin
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.types import Array32, Labels, Mask
 
 

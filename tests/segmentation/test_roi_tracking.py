@@ -11,7 +11,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.roi_tracking import READING, RoiPrior, mark_reachable, segment_roi
 from depthtrack.segmentation.segmenter import HandLocator
-from depthtrack.segmentation.skin_colour import AdaptiveSkin, SkinColourModel
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
+from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 

@@ -1,4 +1,4 @@
-"""Skin colour on images: the table of colours against the plain conversion, and adaptation to the light."""
+"""Segmentation by colour: hysteresis against a flood fill, and adaptation to the light."""
 
 import numpy as np
 import pytest
@@ -6,53 +6,39 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.segmentation.skin_colour import (
-    BINS,
-    BRIGHTEST,
-    DARKEST,
+from depthtrack.segmentation.chroma import BINS, bins_of_colours
+from depthtrack.segmentation.skin_adaptation import (
+    MAYBE_SKIN,
+    NOT_SKIN,
     OFFLINE_WEIGHT,
+    SURELY_SKIN,
     WINDOW,
     AdaptiveSkin,
-    SkinColourModel,
-    chroma_distribution,
-    count_colours,
+    grow_skin,
 )
-from depthtrack.segmentation.skin_colour import _bin_of_colour as bin_of_colour
+from depthtrack.segmentation.skin_colour import SkinColourModel, chroma_distribution
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
 
 
-def plain_bin(r: int, g: int, b: int) -> int:
-    """Flat bin of the colour in the middle of the cube of 8 levels that holds (r, g, b); -1 without luminance."""
-    red, green, blue = (8 * (level // 8) + 3.5 for level in (r, g, b))
-    y = 0.299 * red + 0.587 * green + 0.114 * blue
-    u = 128 - 0.168736 * red - 0.331264 * green + 0.5 * blue
-    v = 128 + 0.5 * red - 0.418688 * green - 0.081312 * blue
-    if not DARKEST <= y <= BRIGHTEST:
-        return -1
-    return int(u * BINS / 256 + 1e-9) * BINS + int(v * BINS / 256 + 1e-9)
-
-
-@given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255))
-def test_colours_fall_into_their_bins(r: int, g: int, b: int) -> None:
-    assert bin_of_colour()[(r >> 3) << 10 | (g >> 3) << 5 | b >> 3] == plain_bin(r, g, b)
+def bin_of(r: int, g: int, b: int) -> tuple[int, int]:
+    """U and V bin of a colour."""
+    u, v = divmod(int(bins_of_colours()[(r >> 3) << 10 | (g >> 3) << 5 | b >> 3]), BINS)
+    return u, v
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_counting_equals_a_plain_loop(seed: int) -> None:
+def test_hysteresis_equals_a_plain_flood_fill(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    image = rng.integers(0, 256, (9, 12, 3), dtype=np.uint8)
-    window, step = Rect(2, 1, 11, 8), 2
-    skin = rng.integers(0, 2, (7, 9)).astype(np.uint8)
-    hand = rng.random((7, 9)) < 0.5
-    expected = np.zeros((2, BINS * BINS))
-    for v in range(0, 7, step):
-        for u in range(0, 9, step):
-            chroma = plain_bin(*map(int, image[v + 1, u + 2]))
-            if chroma >= 0 and bool(skin[v, u]) == hand[v, u]:
-                expected[int(hand[v, u]), chroma] += 1
-    counts = np.zeros_like(expected)
-    count_colours(image, tuple(window), skin, hand, step, bin_of_colour(), counts)
-    np.testing.assert_array_equal(counts, expected)
+    classes = rng.choice([NOT_SKIN, MAYBE_SKIN, SURELY_SKIN], (9, 13), p=[0.55, 0.4, 0.05]).astype(np.uint8)
+    expected = classes == SURELY_SKIN
+    while True:
+        padded = np.pad(expected, 1)
+        near = np.any([padded[1 + j : 10 + j, 1 + i : 14 + i] for j in (-1, 0, 1) for i in (-1, 0, 1)], axis=0)
+        grown = expected | (near & (classes == MAYBE_SKIN))
+        if np.array_equal(grown, expected):
+            break
+        expected = grown
+    np.testing.assert_array_equal(grow_skin(classes) > 0, expected)
 
 
 def test_mixtures_keep_their_mean_and_spread_in_chroma() -> None:
@@ -82,7 +68,7 @@ def seen(colour: tuple[int, int, int], is_skin: bool) -> tuple[np.ndarray, np.nd
 
 def test_adaptation_is_the_published_blend() -> None:
     skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Rect(0, 0, 30, 20), (120, 110, 130)
-    u, v = divmod(plain_bin(*colour), BINS)
+    u, v = bin_of(*colour)
     before = skin.posterior()
     image, found, hand = seen(colour, is_skin=True)
     skin.learn(image, window, found, hand)
@@ -95,7 +81,7 @@ def test_adaptation_is_the_published_blend() -> None:
 
 def test_adaptation_forgets_after_its_window() -> None:
     skin, window, colour = AdaptiveSkin(SkinColourModel.default()), Rect(0, 0, 30, 20), (205, 150, 125)
-    u, v = divmod(plain_bin(*colour), BINS)
+    u, v = bin_of(*colour)
     before = skin.posterior()[u, v]
     image, nothing, nowhere = seen(colour, is_skin=False)
     skin.learn(image, window, nothing, nowhere)

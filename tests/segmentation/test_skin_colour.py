@@ -1,24 +1,16 @@
-"""Skin colour models: Bayes' rule by hand, hysteresis against a flood fill, training, and files."""
+"""Skin colour models: Bayes' rule by hand, training, and files."""
 
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.segmentation.skin_colour import (
-    BINS,
-    MAYBE_SKIN,
-    NOT_SKIN,
-    SURELY_SKIN,
-    AdaptiveSkin,
-    SkinColourModel,
-    grow_skin,
-)
+from depthtrack.segmentation.chroma import BINS
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
+from depthtrack.segmentation.skin_colour import SkinColourModel
 
 SKIN_RGB, BLUE_RGB, LEAF_RGB = (205, 150, 125), (40, 70, 180), (60, 120, 50)
 
@@ -33,21 +25,6 @@ def test_posterior_is_bayes_rule() -> None:
     assert posterior[11, 20] == 1
     assert posterior[40, 40] == 0
     assert posterior[0, 0] == 0
-
-
-@given(seed=st.integers(0, 2**32 - 1))
-def test_hysteresis_equals_a_plain_flood_fill(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    classes = rng.choice([NOT_SKIN, MAYBE_SKIN, SURELY_SKIN], (9, 13), p=[0.55, 0.4, 0.05]).astype(np.uint8)
-    expected = classes == SURELY_SKIN
-    while True:
-        padded = np.pad(expected, 1)
-        near = np.any([padded[1 + j : 10 + j, 1 + i : 14 + i] for j in (-1, 0, 1) for i in (-1, 0, 1)], axis=0)
-        grown = expected | (near & (classes == MAYBE_SKIN))
-        if np.array_equal(grown, expected):
-            break
-        expected = grown
-    np.testing.assert_array_equal(grow_skin(classes) > 0, expected)
 
 
 def painted() -> np.ndarray:

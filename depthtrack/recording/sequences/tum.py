@@ -22,7 +22,7 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import check_size, read_text
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.ground_truth import read_ground_truth
-from depthtrack.recording.images import read_colour, read_depth, read_header, read_mask
+from depthtrack.recording.images import read_colour, read_depth, read_mask, read_size
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.recording.sequences.tum_lists import associate, is_inside, read_list
 from depthtrack.types import Array, Depth, Image, Mask
@@ -135,10 +135,9 @@ def image_size(folder: Path) -> tuple[int, int]:
     """(width, height) of the first readable depth image, for making a camera. Raises InputError."""
     for file in read_list(folder, "depth.txt"):
         try:
-            header = read_header(folder / file.name)
+            return read_size(folder / file.name)
         except DamagedFrameError:
             continue
-        return header.width, header.height
     raise InputError(f"{folder}: none of the depth images can be read")
 
 

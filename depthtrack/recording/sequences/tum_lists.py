@@ -1,14 +1,15 @@
-"""The text files of a TUM RGB-D folder (`timestamp filename` a line) and how two of them are brought together.
+"""The text files of a TUM RGB-D folder (`timestamp filename` per line), and the association of two of them.
 
-Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, and its tool `associate.py`.
+Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
 """
 
-import heapq
 import math
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines
@@ -30,9 +31,9 @@ class ListedFile:
 
 
 def read_list(folder: Path, list_name: str) -> list[ListedFile]:
-    """Lines of `depth.txt` or `rgb.txt`: at least one, strictly in order of time, every file within `folder`.
+    """Return the lines of `depth.txt` or `rgb.txt`; whether the files exist is checked frame by frame.
 
-    Whether the files exist and are sound is found out frame by frame. Raises InputError.
+    Raises: InputError if no image is listed, timestamps do not increase, or a file lies outside `folder`.
     """
     path = folder / list_name
     files: list[ListedFile] = []
@@ -58,45 +59,21 @@ def read_list(folder: Path, list_name: str) -> list[ListedFile]:
     return files
 
 
-def associate(
-    depth: Sequence[float], colour: Sequence[float], max_difference: float = MAX_COLOUR_DELAY
-) -> dict[int, int]:
-    """Index into `colour` for each index into `depth` that has a partner; both strictly increasing, in seconds.
+def associate(depth: ArrayLike, colour: ArrayLike, max_difference: float = MAX_COLOUR_DELAY) -> dict[int, int]:
+    """Return the index of the nearest colour image for each depth image that has one within `max_difference`.
 
-    As TUM's associate.py: of all pairs closer than `max_difference` the closest is joined first, each image once.
-    That tool looks at every pair. The closest pair of what is left is always adjacent in time, so a heap of adjacent
-    pairs gives the same answer in O(n log n).
+    `depth` (D,) and `colour` (C,) are strictly increasing timestamps in seconds. Of two equally near colour images the
+    earlier one is taken. Unlike in TUM's associate.py, a colour image may serve two depth images: with cameras half a
+    period apart, a one-to-one association leaves up to a third of the depth images without colour.
     """
-    events = sorted([(t, 0, i) for i, t in enumerate(depth)] + [(t, 1, i) for i, t in enumerate(colour)])
-    before, after = list(range(-1, len(events) - 1)), list(range(1, len(events) + 1))
-    heap: list[tuple[float, float, float, int, int]] = []
-
-    def offer(left: int, right: int) -> None:
-        """Make two neighbours in time a candidate, unless they are of one kind or too far apart."""
-        if left < 0 or right >= len(events) or events[left][1] == events[right][1]:
-            return
-        first, second = (left, right) if events[left][1] == 0 else (right, left)
-        difference = abs(events[left][0] - events[right][0])
-        if difference < max_difference:
-            heapq.heappush(heap, (difference, events[first][0], events[second][0], first, second))
-
-    for left in range(len(events) - 1):
-        offer(left, left + 1)
-    partner: dict[int, int] = {}
-    joined = [False] * len(events)
-    while heap:
-        *_, first, second = heapq.heappop(heap)
-        if joined[first] or joined[second]:
-            continue
-        joined[first] = joined[second] = True
-        partner[events[first][2]] = events[second][2]
-        left, right = before[min(first, second)], after[max(first, second)]
-        if left >= 0:
-            after[left] = right
-        if right < len(events):
-            before[right] = left
-        offer(left, right)
-    return partner
+    times, candidates = np.asarray(depth, dtype=np.float64), np.asarray(colour, dtype=np.float64)
+    if not len(candidates):
+        return {}
+    after = np.searchsorted(candidates, times).clip(0, len(candidates) - 1)
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(times - candidates[before] <= candidates[after] - times, before, after)
+    rows = np.flatnonzero(np.abs(candidates[nearest] - times) < max_difference)
+    return dict(zip(rows.tolist(), nearest[rows].tolist(), strict=True))
 
 
 def _parse(line: str, where: str) -> ListedFile:
@@ -111,9 +88,9 @@ def _parse(line: str, where: str) -> ListedFile:
 
 
 class _Inside:
-    """Tells whether a listed name stays within a folder; links are followed, each directory once.
+    """Checks that a listed name stays within a folder; follows links, each directory once.
 
-    Plain strings: a list has one name for every frame, and path objects would take longer than reading it.
+    It works on strings: a list has one name per frame, and path objects would take longer than reading the list.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -142,5 +119,5 @@ class _Inside:
 
 
 def is_inside(folder: Path, name: str) -> bool:
-    """Whether the file `name` of `folder` lies within it, links followed."""
+    """Return whether the file `name` of `folder` lies within it, links followed."""
     return _Inside(folder).holds(name)
