@@ -14,8 +14,7 @@ from depthtrack.tracking.registry import create_tracker
 def main(path: str, tracker_name: str = "ik") -> int:
     """Print a line a frame; gives the number of frames with a trusted pose."""
     recording = open_sequence(path)
-    truth = recording.ground_truth
-    hand = truth.hand if truth is not None and truth.hand is not None else HandShape()
+    hand = recording.hand or HandShape()
     model, segmenter, tip, trusted = HandModel(hand), Segmenter.for_sequence(recording), "index_tip", 0
     with closing(create_tracker(tracker_name, hand)) as tracker:
         for frame in recording:

@@ -30,11 +30,11 @@ class HandOptions:
         """Return a line on the hand to use for the recording at `path` instead; None if one was given."""
         if self.hand is not None:
             return None
-        truth = sequence.ground_truth
-        if truth is None or truth.hand is None:
+        own = sequence.hand
+        if own is None:
             return f"sizes: the average adult's; measure this hand with  depthtrack calibrate {path}"
-        if truth.hand.side != (self.side or "right"):
-            return f"side: the recording's ground truth is of a {truth.hand.side} hand: give --side or --hand truth"
-        if truth.hand == self.chosen(sequence):
+        if own.side != (self.side or "right"):
+            return f"side: the recording shows a {own.side} hand: give --side or --hand truth"
+        if own == self.chosen(sequence):
             return None
         return "sizes: the average adult's; the recording's own are used with  --hand truth"

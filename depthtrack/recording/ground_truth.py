@@ -1,4 +1,4 @@
-"""Ground truth beside the images: `hand_poses.csv`, `joints.csv` and `hand.json`."""
+"""The tables beside the images, `hand_poses.csv` and `joints.csv`, and the recorded hand, `hand.json`."""
 
 import math
 from array import array
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import check_size, read_lines
+from depthtrack.files import read_lines
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
@@ -23,13 +23,15 @@ POSES_HEADER = ("timestamp", *POSE_NAMES)
 JOINTS_HEADER = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"))
 
 
-def read_ground_truth(folder: Path) -> GroundTruth | None:
-    """What `folder` knows, or None where it has none of the files. Raises InputError for a malformed one."""
+def read_ground_truth(folder: Path, hand: HandShape | None) -> GroundTruth | None:
+    """Return the annotations in `folder` of frames that show `hand`, or None without any.
+
+    Raises: InputError if a table is malformed.
+    """
     poses = _read_table(folder / POSES_FILE, POSES_HEADER)
     joints = _read_table(folder / JOINTS_FILE, JOINTS_HEADER)
-    hand = _read_hand(folder / HAND_FILE)
     tables = [table for table in (poses, joints) if table is not None]
-    if not tables and hand is None:
+    if not tables:
         return None
     if poses is not None and joints is not None and not _same_times(poses[:, 0], joints[:, 0]):
         raise InputError(f"{folder}: {POSES_FILE} and {JOINTS_FILE} must annotate the same timestamps, line by line")
@@ -42,7 +44,7 @@ def read_ground_truth(folder: Path) -> GroundTruth | None:
                 f" at timestamp {poses[worst, 0]}"
             )
     return GroundTruth(
-        timestamps=tables[0][:, 0] if tables else np.zeros(0),
+        timestamps=tables[0][:, 0],
         poses=None if poses is None else poses[:, 1:],
         joints=None if joints is None else joints[:, 1:].reshape(-1, len(KEYPOINT_NAMES), 3),
         hand=hand,
@@ -53,11 +55,13 @@ def _same_times(a: Array, b: Array) -> bool:
     return len(a) == len(b) and bool(np.all(np.abs(a - b) < 1e-6))
 
 
-def _read_hand(path: Path) -> HandShape | None:
-    if not path.exists():
-        return None
-    check_size(path, 1 << 20)
-    return HandShape.from_json(path)
+def read_hand(folder: Path) -> HandShape | None:
+    """Return the hand of `hand.json` in `folder`, or None without that file.
+
+    Raises: InputError if the file is malformed.
+    """
+    path = folder / HAND_FILE
+    return HandShape.from_json(path) if path.exists() else None
 
 
 def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:

@@ -26,14 +26,14 @@ def chosen_hand(sequence: Sequence, hand: str | None = None, side: Side | None =
         return HandShape(side=side or "right")
     if hand != TRUTH:
         return load_hand(Path(hand), side)
-    truth = sequence.ground_truth
-    if truth is None or truth.hand is None:
+    own = sequence.hand
+    if own is None:
         raise InputError(
             f"the recording {sequence.name} must have a hand.json for --hand truth, found none: leave --hand out, or "
             "measure the hand with `depthtrack calibrate`"
         )
-    if side not in (None, truth.hand.side):
+    if side not in (None, own.side):
         raise InputError(
-            f"the recording {sequence.name} shows a {truth.hand.side} hand, but --side {side} was given: leave it out"
+            f"the recording {sequence.name} shows a {own.side} hand, but --side {side} was given: leave it out"
         )
-    return truth.hand
+    return own

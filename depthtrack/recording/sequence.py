@@ -1,4 +1,4 @@
-"""What every recording offers, whatever its format: frames one at a time, a camera, ground truth if it has any."""
+"""The protocol of recordings of every format: frames one at a time, a camera, ground truth if there is any."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -29,11 +29,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """What is known about a recording beside its images; each part may be absent.
+    """The annotations of a recording; `poses` or `joints` may be absent.
 
-    `timestamps` (T,) of the annotated frames in seconds, increasing; `poses` (T, 27); `joints` (T, 21, 3) keypoints
-    in metres, camera frame, MediaPipe order; `hand` the sizes of the recorded hand. An annotated frame may be missing
-    from the images and the other way round: look a frame up by its timestamp with `at`.
+    `timestamps` (T,) of the annotated frames in seconds, increasing; `poses` (T, 27) of `hand`; `joints` (T, 21, 3)
+    keypoints in metres, camera frame, MediaPipe order. Frames and annotations need not match one to one: `at` finds
+    the annotation of a frame by its timestamp.
     """
 
     timestamps: Array
@@ -42,14 +42,14 @@ class GroundTruth:
     hand: HandShape | None = None
 
     def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
-        """Row of the annotation at `timestamp`, or None when none lies within `tolerance` seconds."""
+        """Return the row of the annotation at `timestamp`, or None if none is within `tolerance` seconds."""
         after = int(np.searchsorted(self.timestamps, timestamp))
         rows = [row for row in (after - 1, after) if 0 <= row < len(self.timestamps)]
         nearest = min(rows, key=lambda row: abs(self.timestamps[row] - timestamp), default=None)
         return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
 
     def keypoints_at(self, timestamp: float) -> Array | None:
-        """The 21 keypoints (21, 3) at `timestamp`, metres: the joints as annotated, else those of the pose."""
+        """Return the annotated keypoints (21, 3) at `timestamp`, else those of the pose; metres, camera frame."""
         row = self.at(timestamp)
         if row is None:
             return None
@@ -61,7 +61,7 @@ class GroundTruth:
 
 
 OnDamage = Literal["refuse", "skip"]
-"""What iterating does at a frame that cannot be read: raise DamagedFrameError, or count it and go on."""
+"""What iteration does at a frame that cannot be read: raise DamagedFrameError, or skip and count it."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,11 @@ class DamagedFrame:
 
 
 class Sequence(Protocol):
-    """A recording. Frames stream: each is read when asked for, and memory does not grow with the length.
+    """A recording. Frames are read one at a time, so memory does not grow with the length.
 
-    The length counts every frame the recording lists. `sequence[i]` raises DamagedFrameError where frame i cannot be
-    read; iteration raises it too, or skips the frame and notes it in `damaged`, as was chosen at opening. A frame's
-    `index` is its place in the list either way.
+    The length counts all frames of the recording. `sequence[i]` raises DamagedFrameError if frame i cannot be read.
+    Iteration raises it too, or skips the frame and adds it to `damaged`, as chosen at opening. The `index` of a frame
+    is its place in the recording in both cases.
     """
 
     @property
@@ -91,11 +91,21 @@ class Sequence(Protocol):
     def timestamps(self) -> Array: ...
 
     @property
+    def has_colour(self) -> bool:
+        """Whether any frame has colour; no image is decoded."""
+        ...
+
+    @property
+    def hand(self) -> HandShape | None:
+        """Sizes of the recorded hand, if the recording states them."""
+        ...
+
+    @property
     def ground_truth(self) -> GroundTruth | None: ...
 
     @property
     def description(self) -> Mapping[str, Any]:
-        """How the recording was made (sensor, motion, seed, ...), as far as it says; may be empty."""
+        """How the recording was made (sensor, motion, seed, ...); may be empty."""
         ...
 
     @property
@@ -110,13 +120,16 @@ class Sequence(Protocol):
     def __iter__(self) -> Iterator[Frame]: ...
 
     def frames(self, indices: Iterable[int]) -> Iterator[Frame]:
-        """Iterate over some of the frames only, damage treated alike; raises InputError if none can be read."""
+        """Yield some of the frames; damaged ones are treated as by iteration.
+
+        Raises: InputError if no frame can be read.
+        """
         ...
 
     def hand_mask(self, index: int) -> Mask | None:
-        """True silhouette (h, w) of the hand without its forearm, where the recording knows it."""
+        """Return the true silhouette (h, w) of the hand without its forearm, if the recording has it."""
         ...
 
     def exact_depth(self, index: int) -> Depth | None:
-        """Noise-free depth (h, w) of the whole scene in metres, 0 = none, where the recording knows it."""
+        """Return the noise-free depth (h, w) of the whole scene in metres, 0 = none, if the recording has it."""
         ...

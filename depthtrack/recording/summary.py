@@ -88,7 +88,7 @@ def summarise(
         exact_depths=counts.exact_depths,
         poses=annotated if truth and truth.poses is not None else 0,
         joints=annotated if truth and truth.joints is not None else 0,
-        hand=f"{truth.hand.side}, scale {truth.hand.scale:g}" if truth and truth.hand else None,
+        hand=f"{sequence.hand.side}, scale {sequence.hand.scale:g}" if sequence.hand else None,
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),
     )

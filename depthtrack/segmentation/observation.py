@@ -85,9 +85,12 @@ class Segmenter:
     def for_sequence(
         cls, sequence: Sequence, skin_model: Path | None = None, use_colour: bool = True, wrist_margin: float = 0.0
     ) -> Self:
-        """With skin colours, those of a file or the published ones, for a recording that has colour."""
-        first = next(iter(sequence), None)
-        if not use_colour or first is None or first.colour is None:
+        """Return a segmenter that uses skin colour if the recording has colour.
+
+        `skin_model` is the file of a trained model; the default is the published statistics.
+        Raises: InputError if the file cannot be read.
+        """
+        if not use_colour or not sequence.has_colour:
             return cls(None, wrist_margin)
         return cls(SkinColourModel.default() if skin_model is None else SkinColourModel.load(skin_model), wrist_margin)
 

@@ -104,8 +104,8 @@ REFUSALS: dict[str, tuple[Change, str]] = {
     "hand is no JSON": (text("hand.json", "{"), "cannot read the hand file"),
     "hand nests deep": (text("hand.json", "[" * 100_000), "cannot read the hand file"),
     "hand without fingers": (text("hand.json", "{}"), "'fingers' is missing"),
-    "description is no JSON": (text("sequence.json", "motion: wave"), "must be a JSON object"),
-    "description is a list": (text("sequence.json", "[]"), "must be a JSON object"),
+    "description is no JSON": (text("sequence.json", "motion: wave"), "cannot read the description"),
+    "description is a list": (text("sequence.json", "[]"), "expected a JSON object"),
     "description with NaN": (text("sequence.json", '{"noise": NaN}'), "JSON has no NaN"),
     "exact depth scale absurd": (text("sequence.json", '{"exact_depth_scale": 0}'), "must be metres per unit"),
 }

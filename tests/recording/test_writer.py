@@ -43,7 +43,8 @@ def test_everything_written_is_read_back(tmp_path: Path) -> None:
     assert sequence.description["motion"] == "plane"
     assert sequence.description["seed"] == 3
     assert truth is not None
-    assert truth.hand == HandShape(side="left")
+    assert truth.hand == sequence.hand == HandShape(side="left")
+    assert sequence.has_colour
     assert truth.poses is not None
     assert truth.joints is not None
     np.testing.assert_allclose(sequence.timestamps, TIMES, atol=5e-7)
@@ -104,7 +105,9 @@ def test_writing_what_was_read_changes_nothing(tmp_path: Path) -> None:
     assert truth is not None
     assert truth.poses is not None
     assert truth.joints is not None
-    with SequenceWriter(tmp_path / "second", sequence.camera, hand=truth.hand, description=sequence.description) as out:
+    with SequenceWriter(
+        tmp_path / "second", sequence.camera, hand=sequence.hand, description=sequence.description
+    ) as out:
         for frame in sequence:
             out.append(
                 frame.timestamp,

@@ -41,8 +41,7 @@ def write_run(
 ) -> Path:
     """A run with these poses (T, 27); `status` by row where a frame is not plainly tracked."""
     sequence = open_sequence(recording)
-    truth = sequence.ground_truth
-    hand = HandShape() if truth is None or truth.hand is None else truth.hand
+    hand = sequence.hand or HandShape()
     settings = {
         "sequence": str(recording),
         "tracker": "pso",

@@ -17,7 +17,8 @@ from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.recording.sequences.tum import FolderSequence
+from depthtrack.recording.images import read_mask
+from depthtrack.recording.sequences.tum import TumSequence
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.forearm import LARGEST_BEND, Forearm
@@ -293,7 +294,7 @@ def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
     arguments = ["synth", "grasp", str(out), "--frames", "3", "--sensor", "kinect2", "--background", "room"]
     assert main([*arguments, "--side", "left", "--scale", "0.9", "--viewpoint", "2", "--seed", "8"]) == 0
     assert "depthtrack view" in capsys.readouterr().out
-    sequence = FolderSequence(out)
+    sequence = TumSequence(out)
     truth = sequence.ground_truth
     assert truth is not None
     assert truth.poses is not None
@@ -321,17 +322,18 @@ def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
     assert main(["synth", "grasp", str(out), "--frames", "1"]) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["synth", "grasp", str(out), "--frames", "1", "--overwrite"]) == 0
-    assert len(FolderSequence(out)) == 1
+    assert len(TumSequence(out)) == 1
 
 
 def test_flipped_labels_and_their_colours_survive_the_file(tmp_path: Path) -> None:
     made = _made(frames=1, skin_flips=0.1)
     write_recording(made, tmp_path / "flipped")
-    sequence = FolderSequence(tmp_path / "flipped")
+    sequence = TumSequence(tmp_path / "flipped")
     colour = sequence[0].colour
     assert colour is not None
     np.testing.assert_array_equal(colour, made[0].colour)
-    np.testing.assert_array_equal(sequence.skin_mask(0), made[0].skin)
+    (skin,) = (tmp_path / "flipped" / "skin_mask").iterdir()
+    np.testing.assert_array_equal(read_mask(skin, sequence.camera.shape), made[0].skin)
     np.testing.assert_array_equal(sequence.hand_mask(0), made[0].mask)
 
 

@@ -1,0 +1,124 @@
+"""What readers of every format share: indexing, iteration and the record of damaged frames."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
+from depthtrack.types import Array, Depth, Image, Mask
+
+
+class BaseSequence(ABC):
+    """A recording of one format; see `Sequence` for the contract.
+
+    A format sets `format_name`, overrides `matches`, `image_size` and `read_depth`, and in its constructor, after this
+    one, sets `camera` and `timestamps` (N,), seconds, increasing. It overrides the rest if its recordings hold more.
+    """
+
+    format_name: ClassVar[str]
+    """What a recording of this format is, for errors: "a folder with depth.txt (TUM RGB-D layout)"."""
+
+    camera: Camera
+    timestamps: Array
+    has_colour: bool = False
+    hand: HandShape | None = None
+    ground_truth: GroundTruth | None = None
+
+    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
+        """Open a recording; `camera` replaces the recording's own.
+
+        Raises: InputError if the recording is unusable for a reason that shows without decoding images.
+        """
+        self.path = path
+        self.description: Mapping[str, Any] = {}
+        self._on_damage = on_damage
+        self._damaged: dict[int, DamagedFrame] = {}
+
+    @classmethod
+    @abstractmethod
+    def matches(cls, path: Path) -> bool:
+        """Return whether the existing `path` holds a recording of this format."""
+
+    @classmethod
+    @abstractmethod
+    def image_size(cls, path: Path) -> tuple[int, int]:
+        """Return (width, height) of the depth images, without a camera.
+
+        Raises: InputError if no depth image can be read.
+        """
+
+    @classmethod
+    def open(cls, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> Self:
+        """Open a recording; see the constructor."""
+        return cls(path, camera, on_damage)
+
+    @abstractmethod
+    def read_depth(self, index: int) -> Depth:
+        """Return the depth image (h, w) of a frame, metres, 0 = no measurement.
+
+        Raises: DamagedFrameError if it cannot be read.
+        """
+
+    def read_colour(self, index: int) -> Image | None:
+        """Return the RGB image (h, w, 3) registered to the depth image, or None if the frame has no colour.
+
+        Raises: DamagedFrameError if it cannot be read.
+        """
+        return None
+
+    def hand_mask(self, index: int) -> Mask | None:
+        """See `Sequence`."""
+        return None
+
+    def exact_depth(self, index: int) -> Depth | None:
+        """See `Sequence`."""
+        return None
+
+    @property
+    def name(self) -> str:
+        """Return the name of the file or folder."""
+        return self.path.resolve().name
+
+    @property
+    def damaged(self) -> list[DamagedFrame]:
+        """See `Sequence`."""
+        return [self._damaged[index] for index in sorted(self._damaged)]
+
+    def __len__(self) -> int:
+        return len(self.timestamps)
+
+    def __getitem__(self, index: int) -> Frame:
+        index = range(len(self))[index]
+        return Frame(
+            index=index,
+            timestamp=float(self.timestamps[index]),
+            depth=self.read_depth(index),
+            colour=self.read_colour(index),
+            camera=self.camera,
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.frames(range(len(self)))
+
+    def frames(self, indices: Iterable[int]) -> Iterator[Frame]:
+        """See `Sequence`."""
+        readable, last_error = 0, None
+        for index in indices:
+            try:
+                frame = self[index]
+            except DamagedFrameError as error:
+                if self._on_damage == "refuse":
+                    raise DamagedFrameError(
+                        f"frame {index}: {error} (--on-damage skip leaves such frames out)"
+                    ) from error
+                self._damaged[index] = DamagedFrame(index, float(self.timestamps[index]), str(error))
+                last_error = error
+                continue
+            readable += 1
+            yield frame
+        if last_error is not None and not readable:
+            raise InputError(f"{self.path}: not one frame can be read; the last: {last_error}") from last_error

@@ -1,0 +1,75 @@
+"""A new format is one small class: what it does not override comes from BaseSequence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.recording import Sequence, open_sequence, registry
+from depthtrack.recording.sequence import OnDamage
+from depthtrack.recording.sequences.base import BaseSequence
+from depthtrack.recording.sequences.tum import TumSequence
+from depthtrack.types import Depth
+
+CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
+
+
+class ArraySequence(BaseSequence):
+    """Depth images (N, h, w) in a .npy file, 30 a second; a negative value damages its frame."""
+
+    format_name = "a .npy file"
+
+    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
+        super().__init__(path, camera, on_damage)
+        self._depth = np.load(path, allow_pickle=False)
+        self.camera = camera or CAMERA
+        self.timestamps = np.arange(len(self._depth)) / 30
+
+    @classmethod
+    def matches(cls, path: Path) -> bool:
+        return path.suffix == ".npy"
+
+    @classmethod
+    def image_size(cls, path: Path) -> tuple[int, int]:
+        return CAMERA.width, CAMERA.height
+
+    def read_depth(self, index: int) -> Depth:
+        depth: Depth = self._depth[index].astype(np.float32)
+        if depth.min() < 0:
+            raise DamagedFrameError("depth is negative")
+        return depth
+
+
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(registry, "FORMATS", (TumSequence, ArraySequence))
+    np.save(tmp_path / "film.npy", np.array([0.5, -1.0, 0.7])[:, None, None] * np.ones(CAMERA.shape))
+    return tmp_path / "film.npy"
+
+
+def test_a_new_format_opens_with_defaults_for_what_it_lacks(path: Path) -> None:
+    sequence: Sequence = open_sequence(path, on_damage="skip")
+    assert (sequence.name, len(sequence), sequence.camera) == ("film.npy", 3, CAMERA)
+    assert registry.image_size(path) == (4, 3)
+    assert sequence.hand is None
+    assert sequence.ground_truth is None
+    assert not sequence.has_colour
+    assert sequence.description == {}
+    assert sequence.hand_mask(0) is None
+    assert sequence.exact_depth(0) is None
+    assert sequence[-1].timestamp == pytest.approx(2 / 30)
+
+
+def test_damaged_frames_of_a_new_format_are_skipped_or_refused(path: Path) -> None:
+    sequence = open_sequence(path, on_damage="skip")
+    assert [(frame.index, frame.depth.mean()) for frame in sequence] == [(0, 0.5), (2, np.float32(0.7))]
+    assert [(frame.index, frame.reason) for frame in sequence.damaged] == [(1, "depth is negative")]
+    with pytest.raises(DamagedFrameError, match=r"frame 1: depth is negative .*--on-damage skip"):
+        list(open_sequence(path))
+
+
+def test_an_unknown_format_names_the_known_ones(path: Path) -> None:
+    with pytest.raises(InputError, match=r"expected a folder with depth\.txt .* or a \.npy file"):
+        open_sequence(path.parent)
