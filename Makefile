@@ -3,14 +3,27 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test quick lint kernels clean
+
+# Workers of pytest; 0 runs all tests in one process.
+WORKERS ?= 2
+PYTEST = $(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadgroup --no-loadscope-reorder
 
 demo: .venv/.ready
 	$(BIN)/depthtrack demo -o out/demo
 	@echo "All commands: $(BIN)/depthtrack --help"
 
-test: .venv/.ready-test lint
-	$(BIN)/python -m pytest
+# One core compiles the kernels while the other one checks the sources.
+test: .venv/.ready-test
+	$(MAKE) --no-print-directory -j2 kernels lint
+	$(PYTEST)
+
+quick: .venv/.ready-test
+	$(MAKE) --no-print-directory -j2 kernels lint
+	$(PYTEST) -m "not slow"
+
+kernels: .venv/.ready-test
+	$(BIN)/python -m tests.support.compile_kernels
 
 lint: .venv/.ready-test
 	$(BIN)/ruff format --check .

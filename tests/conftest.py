@@ -1,4 +1,4 @@
-"""Shared fixtures."""
+"""Shared fixtures, and how tests are divided among the workers of pytest-xdist."""
 
 import os
 from pathlib import Path
@@ -14,6 +14,20 @@ from depthtrack.synthesis.generate import Synthesis, Synthesiser
 # A first call compiles, and a loaded machine is slow: time limits of single examples mean nothing here.
 settings.register_profile("depthtrack", deadline=None, max_examples=30, derandomize=True)
 settings.load_profile("depthtrack")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep each module on one worker, which makes its fixtures once, and start with slow modules.
+
+    A module may name another group by `pytest.mark.xdist_group`, to share a worker with other modules.
+    """
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    for item in items:
+        if item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(str(item.path.relative_to(item.config.rootpath))))
+    if os.environ.get("PYTEST_XDIST_WORKER"):
+        items.sort(key=lambda item: item.path not in slow)
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ def film() -> Film:
     return Film(Synthesis(model="skin", distance=DISTANCE))
 
 
+@pytest.mark.slow
 def test_the_headline_is_3000_points_and_five_by_five(film: Film) -> None:
     assert SETTINGS[0] == HEADLINE
     row = ik.measure(film, HEADLINE, 1e-6)

@@ -22,6 +22,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_rows_tell_time_and_accuracy_with_and_without_colour(recording: Path) -> None:
     plan = segmenting.plan([recording], seconds=0.05)
     threads = cv2.getNumThreads()

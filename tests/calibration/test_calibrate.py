@@ -38,6 +38,8 @@ from depthtrack.tracking.trackers.ik import IkTracker
 from depthtrack.viewing.calibration_picture import shown_views
 from tests.support.observations import observe
 
+pytestmark = pytest.mark.slow
+
 
 def _rendered(pose: np.ndarray) -> Observation:
     """The true hand in a pose, as a perfect sensor and segmentation see it."""

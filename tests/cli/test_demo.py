@@ -18,6 +18,7 @@ from depthtrack.segmentation.observation import Observation
 from tests.support.runs import synthesise
 
 
+@pytest.mark.slow
 def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "demo"
     assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0

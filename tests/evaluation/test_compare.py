@@ -32,6 +32,9 @@ from tests.support.dask import dask_scheduler, dask_workers
 FRAMES = 8
 QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"
 
+# Two clusters at a time would share two cores.
+pytestmark = pytest.mark.xdist_group("dask")
+
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -177,6 +180,7 @@ def test_a_table_has_a_line_for_each_tracker(
     assert before == {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
 
 
+@pytest.mark.slow
 def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, tmp_path: Path) -> None:
     """Killed in the middle of a run, then given again: the poses are those of a comparison left in peace."""
     folder = tmp_path / "killed"
@@ -197,6 +201,7 @@ def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, t
         assert (folder / "runs" / run.name / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_makes_the_same_runs(recording: Path, compared: Path, tmp_path: Path) -> None:
     out, surface = tmp_path / "out", QUICK[QUICK.index("ik:") :]
     arguments = ["compare", str(recording), "-o", str(out), "--trackers", surface, "--repeats", "2"]

@@ -24,6 +24,9 @@ from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 from depthtrack.evaluation.sweep.run import InThisProcess, SweepError, Workers, run_sweep
 from tests.support.dask import dask_scheduler, dask_workers
 
+# Two clusters at a time would share two cores.
+pytestmark = pytest.mark.xdist_group("dask")
+
 
 def square(cell: Cell) -> Row:
     """A measurement that says which process made it."""
@@ -209,6 +212,7 @@ def test_a_sweep_whose_scheduler_dies_keeps_its_rows(tmp_path: Path) -> None:
     assert [row["square"] for row in rows] == [x * x for x in range(40)]
 
 
+@pytest.mark.slow
 def test_a_figure_made_on_a_cluster_is_the_one_made_here(
     tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
