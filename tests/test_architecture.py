@@ -45,7 +45,7 @@ FORBIDDEN = (
 
 KNOWN_VIOLATIONS = frozenset(
     {
-        ("calibration.calibrate", "rendering.raster"),
+        ("calibration.pose_search", "rendering.raster"),
         ("tracking.stages.coarse_to_fine", "rendering.raster"),
         ("tracking.stages.fit_recovery", "rendering.raster"),
         ("tracking.surfaces.capsules", "rendering.raster"),

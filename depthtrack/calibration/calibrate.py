@@ -5,7 +5,7 @@ there poses and all sizes are fitted together. The poses are then looked for aga
 some of the first ones were wrong, and fitted once more.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,48 +13,24 @@ import numpy as np
 
 from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
-from depthtrack.calibration.residuals import CalibrationView
-from depthtrack.errors import InputError
+from depthtrack.calibration.pose_search import (
+    FIRST,
+    GOOD_VIEWS,
+    SURE_MARGIN,
+    TRIED_SCALES,
+    Found,
+    PoseSearcher,
+    Progress,
+)
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.rendering.raster import RasterScorer
 from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
-from depthtrack.tracking.random import frame_generator
-from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, find_pose
-from depthtrack.types import Array, Index
+from depthtrack.types import Array
 
 VIEWS = 16
 """Frames that sizes are measured on."""
-_FIRST = 4
-"""Of these, the most open hands, on which side and scale are tried out."""
-_TRIED_SCALES = (0.76, 0.9, 1.06, 1.24)
-_WIDE = SearchOptions(rounds=SearchOptions().rounds[:2], attempts=1)
 _LIKELY, _CROSSED = 6, 6
 """Poses of each of those frames that get sizes of their own, and sizes that are tried on the other frames."""
-_RESOLUTION = 96
-"""Longest side, pixels, at which poses are searched."""
-_GOOD_VIEWS = 0.7
-"""Share of the views that are fitted: those with the highest energy may well be wrong poses."""
-_HAND_LIKE = 0.55
-"""Agreement of silhouettes (1 less the skin term of Eq. 2) below which no hand was found."""
-_SURE_MARGIN = 0.02
-"""The other side's extra energy, a share, below which the side may well be wrong."""
-
-Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Found:
-    """Poses (V, 27) in the views of a hand, their energies (V,) and the agreement of silhouettes (V,), 0 to 1."""
-
-    poses: Array
-    energies: Array
-    agreements: Array
-
-    def best(self, share: float) -> Index:
-        """The views with the lowest energies."""
-        return np.argsort(self.energies, kind="stable")[: max(2, round(share * len(self.energies)))]
 
 
 @dataclass(frozen=True)
@@ -88,7 +64,7 @@ class Calibration:
     @property
     def side_sure(self) -> bool:
         """Whether the side was given, or the other one fits clearly worse."""
-        return self.side_margin is None or self.side_margin >= _SURE_MARGIN
+        return self.side_margin is None or self.side_margin >= SURE_MARGIN
 
     def to_json(self) -> str:
         """Return the text of `hand.json` with size, standard deviation and confidence of each parameter added."""
@@ -113,7 +89,7 @@ def calibrate(
     same hand for any number of threads. Raises InputError where what is seen does not look like a hand.
     """
     tell = progress or (lambda what, share: None)
-    searcher = _Searcher(list(observations), seed, threads)
+    searcher = PoseSearcher(list(observations), seed, threads)
     sides: tuple[Side, ...] = ("right", "left") if side is None else (side,)
     begun = {}
     for n, tried in enumerate(sides):
@@ -121,18 +97,14 @@ def calibrate(
         begun[tried] = _initialise(searcher, tried)
     chosen = min(sides, key=lambda s: begun[s][1].energies.mean())
     values, found = begun[chosen]
-    if np.median(found.agreements) < _HAND_LIKE:
-        raise InputError(
-            f"what was found in {len(observations)} frames does not look like a hand (silhouettes agree to "
-            f"{np.median(found.agreements):.0%}): calibrate on a recording of one bare hand, best with open fingers"
-        )
+    found.check_hand()
     before = _refined(searcher, found.poses, np.zeros(COUNT), chosen)
     tell("fingers and palm", 0.5)
-    views, first = searcher.views, found.best(_GOOD_VIEWS)
+    views, first = searcher.views, found.best(GOOD_VIEWS)
     fit = fit_jointly([views[i] for i in first], found.poses[first], values, chosen, rounds=8)
     tell("the same with better poses", 0.7)
     found = searcher.improve(hand_of(fit.values, chosen), found.poses)
-    good = found.best(_GOOD_VIEWS)
+    good = found.best(GOOD_VIEWS)
     fit = fit_jointly([views[i] for i in good], found.poses[good], fit.values, chosen, rounds=6)
     tell("how sure is it?", 0.95)
     fit = fit_jointly([views[i] for i in good], fit.poses, fit.values, chosen, rounds=4, exact=True)
@@ -153,65 +125,15 @@ def calibrate(
     )
 
 
-class _Searcher:
-    """Finds poses in the views, from nothing."""
-
-    def __init__(self, observations: list[Observation], seed: int, threads: int) -> None:
-        self.observations, self._seed, self._threads = observations, seed, threads
-        self.views = [CalibrationView(o) for o in observations]
-
-    def find(self, shape: HandShape, count: int | None = None, attempts: int = 1) -> Found:
-        """In the first `count` views, or in all."""
-        return self._search(shape, self.observations[:count], attempts, None)
-
-    def improve(self, shape: HandShape, poses: Array, attempts: int = 2) -> Found:
-        """In all views; `poses` (V, 27) that were found before count where they are better."""
-        return self._search(shape, self.observations, attempts, poses)
-
-    def candidates(self, shape: HandShape, count: int) -> list[tuple[Array, Array]]:
-        """For each of the first `count` views: likely poses (K, 27) and their energies (K,)."""
-        out = []
-        with RasterScorer(shape, threads=self._threads) as scorer:
-            for o in self.observations[:count]:
-                scorer.set_target(o.reduced(_RESOLUTION))
-                generator = frame_generator(self._seed, o.frame_index)
-                angles = typical_angles(generator, _WIDE.hypotheses)
-                poses = hypotheses(o.centre, angles, generator, o.arm_direction)
-                out.append(find_candidates(scorer, poses, generator, _WIDE))
-        return out
-
-    def energy(self, shape: HandShape, view: int, pose: Array) -> float:
-        """Of a hand in a pose (27,), in one view."""
-        with RasterScorer(shape) as scorer:
-            scorer.set_target(self.observations[view].reduced(_RESOLUTION))
-            return float(scorer.score(pose[None])[0])
-
-    def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
-        options = SearchOptions(attempts=attempts, good_energy=0.0)
-        poses, energies, agreements = [], [], []
-        with RasterScorer(shape, threads=self._threads) as scorer:
-            for n, o in enumerate(observations):
-                scorer.set_target(o.reduced(_RESOLUTION))
-                generator = frame_generator(self._seed, o.frame_index)
-                pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
-                tried = np.stack([pose] if known is None else [pose, known[n]])
-                terms = scorer.terms(tried)
-                best = int(np.argmin(terms.energy))
-                poses.append(tried[best])
-                energies.append(float(terms.energy[best]))
-                agreements.append(float(terms.agreement[best]))
-        return Found(np.stack(poses), np.array(energies), np.array(agreements))
-
-
-def _initialise(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
+def _initialise(searcher: PoseSearcher, side: Side) -> tuple[Array, Found]:
     """Sizes (35,) that a few open hands tell, and the poses of such a hand in all views.
 
     A hand of wrong sizes explains a view best in a wrong pose, one finger taken for the next. So each likely pose gets
     the sizes that suit it, and sizes are judged by how well they explain the other views.
     """
-    first = searcher.views[:_FIRST]
+    first = searcher.views[:FIRST]
     likely: list[list[tuple[float, Array, float]]] = [[] for _ in first]
-    for scale in _TRIED_SCALES:
+    for scale in TRIED_SCALES:
         for n, (poses, energies) in enumerate(searcher.candidates(HandShape(side=side, scale=scale), len(first))):
             likely[n] += [(float(e), pose, scale) for pose, e in zip(poses, energies, strict=True)]
     hands: list[tuple[float, Array]] = []
@@ -228,7 +150,7 @@ def _initialise(searcher: _Searcher, side: Side) -> tuple[Array, Found]:
     return fit.values, searcher.find(hand_of(fit.values, side), attempts=2)
 
 
-def _refined(searcher: _Searcher, poses: Array, values: Array, side: Side) -> JointFit:
+def _refined(searcher: PoseSearcher, poses: Array, values: Array, side: Side) -> JointFit:
     """The poses that bring a hand of given sizes closest to each view."""
     return fit_jointly(searcher.views, poses, values, side, rounds=8, free=slice(0, 0))
 

@@ -1,4 +1,4 @@
-"""`depthtrack calibrate`: the sizes of a hand, from nothing but a recording of it."""
+"""`depthtrack calibrate`: measure the sizes of a hand on a recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from depthtrack.cli.measuring import calibrate_sequence
+from depthtrack.cli.measuring import calibrate_rig_on_sequence, calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
+    from depthtrack.calibration.rig_calibration import RigCalibration
 
 
 _MOST_SURE = 0.99
@@ -21,10 +22,12 @@ _MOST_SURE = 0.99
 
 @dataclass(frozen=True)
 class Command:
-    """Measure the hand of a recording: side, scale, each finger's length and width, and the palm.
+    """Measure the hand of a recording: side, scale, length and width of each finger, and the palm.
 
-    Best on a few seconds of one bare hand that turns, opens and closes before the camera. What the recording does not
-    show stays as among people at large; the file tells how sure each size is. Track with it by --hand.
+    Best on a few seconds of one bare hand that turns, opens and closes in front of the camera. Sizes that the recording
+    does not show stay average; the file gives a confidence for each. Use it with `track --hand`.
+
+    With --hand RIG.glb only the scale of that mesh is measured, and the file refers to it.
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
@@ -32,8 +35,10 @@ class Command:
     """Hand file to write."""
     side: Literal["auto", "right", "left"] = "auto"
     """Which hand it is; both are tried unless given."""
+    hand: Annotated[Path | None, tyro.conf.arg(metavar="RIG.glb")] = None
+    """A rigged mesh (.glb, .gltf) or a hand file of one: measure its scale, and check its side."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
-    """Picture of average and measured hand over some frames; beside the hand file unless given."""
+    """Picture of the hand before and after over some frames (default: beside the hand file)."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
     seed: int = 0
@@ -47,6 +52,7 @@ class Command:
         from json import dumps
 
         from depthtrack.calibration.calibrate import summary
+        from depthtrack.hand.hand_file import load_hand
         from depthtrack.segmentation.observation import Segmenter
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
@@ -57,15 +63,34 @@ class Command:
                 raise InputError(f"the folder {path.parent} does not exist: create it first")
             if path.is_dir():
                 raise InputError(f"{path} is a folder: name a file in it")
+        side = None if self.side == "auto" else self.side
+        rig = None if self.hand is None else load_hand(self.hand, side)
         sequence = self.recording.open()
         segmenter = Segmenter.for_sequence(sequence, self.skin_model)
-        side = None if self.side == "auto" else self.side
-        source = f"calibrated on {sequence.name}"
-        calibration = calibrate_sequence(sequence, segmenter, side, self.seed, self.threads, source)
-        write_atomic(self.out, calibration.to_json())
-        save_picture(calibration_picture(calibration), picture)
-        report = {**summary(calibration), "hand_file": str(self.out), "picture": str(picture)}
-        print(dumps(report, indent=2) if self.json else _text(calibration, self.out, picture))
+        if rig is not None:
+            scaled = calibrate_rig_on_sequence(sequence, segmenter, rig, self.seed, self.threads)
+            content, page = scaled.to_json(), calibration_picture(scaled, rig)
+            report, text = scaled.summary(), _rig_text(scaled, self.out, picture)
+        else:
+            source = f"calibrated on {sequence.name}"
+            measured = calibrate_sequence(sequence, segmenter, side, self.seed, self.threads, source)
+            content, page = measured.to_json(), calibration_picture(measured)
+            report, text = summary(measured), _text(measured, self.out, picture)
+        write_atomic(self.out, content)
+        save_picture(page, picture)
+        print(dumps({**report, "hand_file": str(self.out), "picture": str(picture)}, indent=2) if self.json else text)
+
+
+def _rig_text(calibration: "RigCalibration", out: Path, picture: Path) -> str:
+    hand = calibration.hand
+    return "\n".join(
+        [
+            f"a {hand.side} hand (the other side fits {100 * calibration.side_margin:.0f} % worse), {hand.scale:.3f} "
+            f"times the rig, from {len(calibration.observations)} frames",
+            f"depth disagreement {calibration.after:.3f}, {calibration.before:.3f} at the rig's own scale",
+            f"look at {picture}; use it:  depthtrack track RECORDING --hand {out}",
+        ]
+    )
 
 
 def _text(calibration: "Calibration", out: Path, picture: Path) -> str:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from depthtrack.calibration.calibrate import Calibration
+from depthtrack.calibration.rig_calibration import RigCalibration
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
@@ -26,10 +27,15 @@ _ROWS = 4
 _OPACITY = 0.75
 
 
-def calibration_picture(calibration: Calibration) -> Image:
-    """A page (h, w, 3): for a few views, the depth, the average hand over it and the measured one, the observed
-    silhouette's outline around each."""
-    average = HandShape(side=calibration.hand.side)
+def calibration_picture(calibration: Calibration | RigCalibration, before: HandShape | None = None) -> Image:
+    """Return a page (h, w, 3): for a few views, the depth, the hand before over it, and the measured hand.
+
+    The outline of the observed silhouette is drawn around each.
+
+    `before`: the rig at its own scale; None for the average hand.
+    """
+    first = HandShape(side=calibration.hand.side) if before is None else before
+    name_before = "average hand" if before is None else "rig as given"
     rows = []
     for i in shown_views(calibration.observations):
         o = calibration.observations[i]
@@ -37,7 +43,7 @@ def calibration_picture(calibration: Calibration) -> Image:
         ground, outline = _ground(o, camera)
         tiles = [captioned(ground, f"frame {o.frame_index}", "depth")]
         for name, hand, pose in (
-            ("average hand", average, calibration.poses_before[i]),
+            (name_before, first, calibration.poses_before[i]),
             ("measured hand", calibration.hand, calibration.poses[i]),
         ):
             drawn = draw_surface(dimmed(ground, 0.8), _seen(hand, pose, camera), _OPACITY)
