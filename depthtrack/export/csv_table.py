@@ -1,4 +1,4 @@
-"""A table that every spreadsheet reads: a line a frame, pose and keypoints; empty cells where there is no pose."""
+"""A CSV table: a row per frame with pose and keypoints, empty cells where there is no pose."""
 
 import csv
 from pathlib import Path
@@ -14,8 +14,11 @@ HEADER = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES, *
 """Columns: the 27 pose values, then x, y, z of each keypoint, named as in a recording's `joints.csv`."""
 
 
-def write_csv(path: Path, track: JointTrack) -> None:
-    """Write a track; every number comes back bit for bit. Raises InputError."""
+def write(track: JointTrack, path: Path) -> None:
+    """Write a track; numbers read back bit for bit.
+
+    Raises: InputError if the file cannot be written.
+    """
     with replace_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(HEADER)

@@ -1,4 +1,4 @@
-"""What a run says of the hand, frame by frame, for writing it out."""
+"""The poses and keypoints of a run, for export."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -20,6 +20,7 @@ class JointTrack:
     `energy`, `confidence` (T,): of the pose.
     `poses` (T, 27): metres, quaternion and radians, camera frame.
     `keypoints` (T, 21, 3): metres, camera frame, in MediaPipe's order.
+    `hand`: the hand of the poses.
     """
 
     index: Index
@@ -29,9 +30,10 @@ class JointTrack:
     confidence: Array
     poses: Array
     keypoints: Array
+    hand: HandShape
 
     @classmethod
     def of(cls, run: Run, hand: HandShape) -> Self:
-        """The track of a run of a hand of these sizes."""
+        """Return the track of a run of a hand."""
         keypoints = HandModel(hand).keypoints(run.poses)
-        return cls(run.index, run.timestamps, run.status, run.energy, run.confidence, run.poses, keypoints)
+        return cls(run.index, run.timestamps, run.status, run.energy, run.confidence, run.poses, keypoints, hand)

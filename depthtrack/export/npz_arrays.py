@@ -19,10 +19,10 @@ CONVENTIONS = {
 }
 
 
-def write_npz(path: Path, track: JointTrack) -> None:
+def write(track: JointTrack, path: Path) -> None:
     """Write the arrays of a track under their names, with `pose_names`, `keypoint_names` and `conventions` (JSON).
 
-    Raises InputError.
+    Raises: InputError if the file cannot be written.
     """
     with replace_atomically(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(

@@ -1,40 +1,94 @@
-"""Writes the joints of a run in the format that a file's name asks for."""
+"""Write the joints of a run in a format of other programs.
 
+A new format is a module with a function `write(track, path)` and an entry in EXPORTERS. This module imports no format,
+so that the command line lists them at once.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from depthtrack.errors import InputError
-from depthtrack.export.benchmark_joints import Benchmark
-from depthtrack.export.csv_table import write_csv
-from depthtrack.export.joint_track import JointTrack
-from depthtrack.export.npz_arrays import write_npz
-from depthtrack.export.uvd import write_uvd
 
-SUFFIXES = (".csv", ".npz", ".txt")
+if TYPE_CHECKING:
+    from depthtrack.export.joint_track import JointTrack
 
-
-def export_joints(path: Path, track: JointTrack, benchmark: Benchmark | None = None) -> None:
-    """Write a track as `path`'s ending says: .csv, .npz, or .txt in the order of a `benchmark`. Raises InputError."""
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(f"joints are written to {', '.join(SUFFIXES)}, found '{path.name}'")
-    if (suffix == ".txt") != (benchmark is not None):
-        raise InputError("a .txt file needs the benchmark whose joints it lists, and no other file has one")
-    if suffix == ".csv":
-        write_csv(path, track)
-    elif suffix == ".npz":
-        write_npz(path, track)
-    elif benchmark is not None:
-        write_uvd(path, benchmark, benchmark_joints(track, benchmark))
+Write = Callable[["JointTrack", Path], None]
+"""Write a track to a file; raises InputError if the file cannot be written."""
 
 
-def benchmark_joints(track: JointTrack, benchmark: Benchmark) -> np.ndarray:
-    """Joints (N, J, 3), metres, a row for each frame of the recording up to the last one tracked; NaN without a pose.
+@dataclass(frozen=True)
+class Exporter:
+    """A file format.
 
-    The text format counts lines: a frame that the run passed over must not shift all that follow.
+    `suffixes` are the endings of its files, in lower case. `load` imports the function that writes them, and raises
+    MissingExtraError without the library that it needs.
     """
-    frames = int(track.index.max()) + 1 if len(track.index) else 0
-    joints = np.full((frames, len(benchmark.joints), 3), np.nan)
-    joints[track.index] = benchmark.from_keypoints(track.keypoints)
-    return joints
+
+    suffixes: tuple[str, ...]
+    description: str
+    load: Callable[[], Write]
+
+
+def _csv() -> Write:
+    from depthtrack.export.csv_table import write
+
+    return write
+
+
+def _npz() -> Write:
+    from depthtrack.export.npz_arrays import write
+
+    return write
+
+
+def _benchmark(name: str) -> Write:
+    from depthtrack.export.benchmark_joints import find_benchmark
+    from depthtrack.export.uvd import write
+
+    return partial(write, find_benchmark(name))
+
+
+EXPORTERS = {
+    "csv": Exporter((".csv",), "a table", _csv),
+    "npz": Exporter((".npz",), "numpy arrays", _npz),
+    "nyu": Exporter((".txt",), "u v d of NYU's joints", partial(_benchmark, "nyu")),
+    "icvl": Exporter((".txt",), "u v d of ICVL's joints", partial(_benchmark, "icvl")),
+    "msra": Exporter((".txt",), "u v d of MSRA's joints", partial(_benchmark, "msra")),
+}
+"""The formats by name."""
+
+
+def suffixes() -> list[str]:
+    """Return the suffixes of all formats, each once."""
+    return list(dict.fromkeys(suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes))
+
+
+def find_exporter(path: Path, name: str | None = None) -> Exporter:
+    """Return the exporter of a format, by default the only one with the suffix of `path`.
+
+    Raises: InputError if there is no such format, its files end otherwise, or several formats share the suffix.
+    """
+    if name is not None and name not in EXPORTERS:
+        raise InputError(f"no format '{name}': choose one of {', '.join(EXPORTERS)}")
+    suffix = path.suffix.lower()
+    fitting = [each for each, exporter in EXPORTERS.items() if suffix in exporter.suffixes]
+    if not fitting:
+        raise InputError(f"joints are written to {', '.join(suffixes())}, found '{path.name}'")
+    if name is None and len(fitting) > 1:
+        raise InputError(f"several formats end in {suffix}: choose one by --format {', '.join(fitting)}")
+    chosen = fitting[0] if name is None else name
+    if chosen not in fitting:
+        endings = " or ".join(EXPORTERS[chosen].suffixes)
+        raise InputError(f"a file of the format {chosen} must end in {endings}, found '{path.name}'")
+    return EXPORTERS[chosen]
+
+
+def export_joints(path: Path, track: "JointTrack", name: str | None = None) -> None:
+    """Write a track to a file of a format, by default the only one with the suffix of `path`.
+
+    Raises: InputError if the format does not fit the path or the file cannot be written.
+    """
+    find_exporter(path, name).load()(track, path)

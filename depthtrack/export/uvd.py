@@ -12,6 +12,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.export.benchmark_joints import Benchmark
+from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import read_lines, replace_atomically
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
@@ -43,10 +44,23 @@ def read_uvd(path: Path, benchmark: Benchmark) -> Array:
     return _from_uvd(uvd, benchmark.camera)
 
 
-def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
-    """Write joints (T, J, 3) in metres, camera frame (y down), as the benchmark's camera sees them. Raises InputError.
+def write(benchmark: Benchmark, track: JointTrack, path: Path) -> None:
+    """Write a line for each frame of the recording up to the last one tracked; nan for frames without a pose.
 
-    Unknown joints, and what lies behind the camera, become nan.
+    The format counts lines, so a frame that the run skipped has a line too.
+    Raises: InputError if the file cannot be written.
+    """
+    frames = int(track.index.max()) + 1 if len(track.index) else 0
+    joints = np.full((frames, len(benchmark.joints), 3), np.nan)
+    joints[track.index] = benchmark.from_keypoints(track.keypoints)
+    write_uvd(path, benchmark, joints)
+
+
+def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
+    """Write joints (T, J, 3), metres, camera frame (y down), as seen by the camera of the benchmark.
+
+    Unknown joints and joints behind the camera become nan.
+    Raises: InputError if the file cannot be written.
     """
     with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         for frame in _to_uvd(joints, benchmark.camera):

@@ -60,7 +60,7 @@ def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(
     poses = true_poses(recording)[:3] + np.array([0.003, 0, 0.004, *np.zeros(24)])
     run, text = write_run(tmp_path / "run", recording, poses), tmp_path / "ours.txt"
     for benchmark in sorted(BENCHMARKS):
-        assert main(["export", str(run), "-o", str(text), "--benchmark", benchmark]) == 0
+        assert main(["export", str(run), "-o", str(text), "--format", benchmark]) == 0
         capsys.readouterr()
         arguments = ["evaluate", "--predictions", str(text), "--benchmark", benchmark, "--sequence", str(recording)]
         assert main([*arguments, "--json"]) == 0

@@ -90,7 +90,7 @@ def test_benchmark_text_comes_back_with_a_line_for_every_frame(run: Path, tmp_pa
     table = run / "poses.csv"
     lines = table.read_text().splitlines(keepends=True)
     table.write_text("".join(line for line in lines if not line.startswith("2,")))
-    assert main(["export", str(run), "-o", str(tmp_path / "out.txt"), "--benchmark", name]) == 0
+    assert main(["export", str(run), "-o", str(tmp_path / "out.txt"), "--format", name]) == 0
     benchmark = BENCHMARKS[name]
     joints = read_uvd(tmp_path / "out.txt", benchmark)
     assert joints.shape == (5, len(benchmark.joints), 3)
@@ -192,8 +192,9 @@ def test_benchmark_joints_lie_where_they_are_said_to() -> None:
     [
         (["{run}", "-o", "{out}/a.xlsx"], "found 'a.xlsx'"),
         (["{run}", "-o", "{out}/nowhere/a.csv"], "does not exist"),
-        (["{run}", "-o", "{out}/a.txt"], "needs the benchmark"),
-        (["{run}", "-o", "{out}/a.csv", "--benchmark", "nyu"], "no other file has one"),
+        (["{run}", "-o", "{out}/a.txt"], "several formats end in .txt: choose one by --format nyu, icvl, msra"),
+        (["{run}", "-o", "{out}/a.csv", "--format", "nyu"], "must end in .txt"),
+        (["{run}", "-o", "{out}/a.csv", "--format", "xls"], "no format 'xls'"),
         (["{out}", "-o", "{out}/a.csv"], "holds no run"),
     ],
 )
@@ -210,7 +211,7 @@ def test_what_cannot_be_exported_is_refused_in_a_sentence(
 def test_frames_numbered_absurdly_are_refused(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = run / "poses.csv"
     table.write_text(table.read_text().replace("\n4,", "\n4000000000000,"))
-    assert main(["export", str(run), "-o", str(tmp_path / "a.txt"), "--benchmark", "nyu"]) == 2
+    assert main(["export", str(run), "-o", str(tmp_path / "a.txt"), "--format", "nyu"]) == 2
     assert "frames are numbered from 0" in capsys.readouterr().err
 
 
