@@ -26,7 +26,6 @@ from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.evaluation.sweep.rows import Cell, Row
-from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.geometry.rotations import quaternion_exp
 from depthtrack.hand.pose import make_pose
 from depthtrack.rendering.oracle import OracleScorer
@@ -34,6 +33,7 @@ from depthtrack.segmentation.roi_tracking import ROI_MARGIN
 from depthtrack.synthesis import observations as films
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.synthesis.observations import film, observe
+from tests.support.workers import InThisProcess
 
 TINY = ExperimentOptions(quick=True, repetitions=1, resolution=32, frames=2)
 TIMES = ("seconds", "ms_per_frame", "ms")

@@ -23,11 +23,11 @@ from depthtrack.evaluation.compare.comparison import Comparison, Progress, compa
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
-from depthtrack.evaluation.sweep.run import InThisProcess
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.status import Status
 from depthtrack.tracking.tracker import Estimate
 from tests.support.dask import dask_scheduler, dask_workers
+from tests.support.workers import InThisProcess
 
 FRAMES = 8
 QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"

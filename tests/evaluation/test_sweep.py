@@ -21,8 +21,9 @@ from depthtrack.evaluation.sweep import cluster
 from depthtrack.evaluation.sweep.cluster import DaskWorkers
 from depthtrack.evaluation.sweep.local import PATIENCE, LocalWorkers
 from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
-from depthtrack.evaluation.sweep.run import InThisProcess, SweepError, Workers, run_sweep
+from depthtrack.evaluation.sweep.run import SweepError, Workers, run_sweep
 from tests.support.dask import dask_scheduler, dask_workers
+from tests.support.workers import InThisProcess
 
 # Two clusters at a time would share two cores.
 pytestmark = pytest.mark.xdist_group("dask")

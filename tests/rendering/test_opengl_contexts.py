@@ -19,7 +19,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.opengl import context, opening, programs
 from depthtrack.rendering.opengl.context import OpenGLError
 from depthtrack.rendering.opengl.opening import open_context
-from depthtrack.rendering.opengl.renderer import release_renderers, shared_renderer
+from depthtrack.rendering.opengl.renderer import shared_renderer
 from depthtrack.rendering.opengl.scorer import OpenGLScorer
 from tests.support.opengl_views import energies_and_depth, scene
 
@@ -149,12 +149,12 @@ def test_nothing_stays_current_outside_a_call() -> None:
     assert not EGL.eglGetCurrentContext()
 
 
-def test_released_contexts_are_refused_and_new_ones_work() -> None:
+def test_closed_contexts_are_refused_and_new_ones_work() -> None:
     target, poses = scene()
-    scorer = OpenGLScorer(HandShape())
+    scorer = OpenGLScorer(HandShape(), "egl")
     scorer.set_target(target)
     before = scorer.score(poses)
-    release_renderers()
+    shared_renderer("egl").context.close()
     with pytest.raises(OpenGLError, match="released"):
         scorer.score(poses)
     scorer.close()

@@ -55,11 +55,3 @@ def timed(measure: Measure, cell: Cell) -> Row:
     except DepthtrackError as error:
         raise SweepError(str(error)) from None
     return row | {"seconds": round(perf_counter() - begun, 3)}
-
-
-class InThisProcess:
-    """One cell after the other, here."""
-
-    def measure(self, function: Measure, cells: Sequence[Cell]) -> Iterator[tuple[int, Row]]:
-        for number, cell in enumerate(cells):
-            yield number, timed(function, cell)

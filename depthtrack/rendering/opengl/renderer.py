@@ -203,10 +203,3 @@ def shared_renderer(platform: Platform, device: Device = None) -> Renderer:
             renderer = _shared[platform, device] = Renderer(open_context(platform, device))
         renderer.context.require_own_process()
         return renderer
-
-
-def release_renderers() -> None:
-    """Release every shared context now rather than at the end of the process; scorers on them are done for."""
-    with _shared_lock:
-        while _shared:
-            _shared.popitem()[1].context.close()
