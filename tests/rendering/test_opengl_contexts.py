@@ -151,7 +151,7 @@ def test_nothing_stays_current_outside_a_call() -> None:
 
 def test_closed_contexts_are_refused_and_new_ones_work() -> None:
     target, poses = scene()
-    scorer = OpenGLScorer(HandShape(), "egl")
+    scorer = OpenGLScorer(HandShape())
     scorer.set_target(target)
     before = scorer.score(poses)
     shared_renderer("egl").context.close()
