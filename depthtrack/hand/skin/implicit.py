@@ -1,8 +1,16 @@
-"""The flesh of a hand as an implicit solid: tapered bones blended smoothly, with webs and the muscles of the palm.
+"""The flesh of a hand as an implicit solid: tapered capsules with smooth unions, webs, and muscles of the palm.
 
-Built for a right hand of scale 1 in its rest pose, fingers spread and half bent: there no two fingers touch, and no
-joint is ever far from the posture its skin was made in. Distances are negative inside and exact enough near the
-surface to blend by; metres in the palm frame throughout.
+All arrays are a right hand's of scale 1 in its rest pose, palm frame, metres. In that pose fingers are spread and half
+bent: no two fingers touch, and each joint is near the middle of its range, where linear blend skinning is accurate.
+Distances are negative inside, and exact enough near the surface for blending.
+
+The numbers in the functions below are proportions, not measurements: each is a share of a size of `HandShape` (palm
+length `unit`, palm thickness `thick`, a radius, a bone's length), so that the flesh scales with the hand. The sizes
+have published sources, stated in `hand/shape.py`; the proportions have none and were set by hand. They serve three
+ends, which tests/hand/skin/test_mesh.py checks. The surface passes through the measured sizes: radii at the joints,
+palm and wrist thickness, fingertips. It is one closed solid with five free fingers, for hands of other sizes also. It
+stays close to the spheres and cylinders of `hand/primitives.py`. Pads, mounts, thenar and hypothenar muscles and webs
+are shaped for appearance within these bounds. A changed number moves the surface, and so the poses of surface fits.
 """
 
 from dataclasses import dataclass
@@ -22,9 +30,9 @@ _SPREAD = np.radians(10.0)
 
 
 def rest_pose(shape: HandShape) -> Array:
-    """The pose (27,) in which the skin is made, the palm frame being the camera's.
+    """Return the pose (27,) in which the skin is built, in the palm frame.
 
-    Neighbouring fingers spread by 10 degrees, or by more where they are too thick to stay clear of each other.
+    Adjacent fingers spread by 10 degrees, or by more if they are too thick to stay apart.
     """
     angles = np.zeros((5, 4))
     angles[:, 1:] = _FLEXION
@@ -41,7 +49,7 @@ def rest_pose(shape: HandShape) -> Array:
 
 @dataclass(frozen=True)
 class Cone:
-    """A tapered capsule from `start` to `end` (3,), with its radius at either end."""
+    """A tapered capsule from `start` to `end` (3,), with the radius at each end."""
 
     start: Array
     end: Array
@@ -49,7 +57,7 @@ class Cone:
     radius_end: float
 
     def distance(self, points: Array) -> Array:
-        """(N,) of points (N, 3); measured across the axis, as the cones of the primitive model are."""
+        """Return the signed distance (N,) of points (N, 3), perpendicular to the axis as for primitives."""
         axis = self.end - self.start
         t = np.clip((points - self.start) @ (axis / (axis @ axis + 1e-18)), 0, 1)
         across = points - self.start - t[:, None] * axis
@@ -60,10 +68,10 @@ class Cone:
 
 @dataclass(frozen=True)
 class Web:
-    """A web: strands from one edge to another, side by side, thinning towards the far end.
+    """A web: parallel strands between two edges, thinner towards the far end.
 
-    `one` and `other` (2, 3) are the near and the far end of either edge; `radius_near` and `radius_far` half the
-    thickness there.
+    `one`, `other` (2, 3): near and far end of each edge.
+    `radius_near`, `radius_far`: half the thickness at these ends.
     """
 
     one: Array
@@ -72,7 +80,7 @@ class Web:
     radius_far: float
 
     def distance(self, points: Array) -> Array:
-        """(N,) of points (N, 3), measured to the strand they lie beside."""
+        """Return the signed distance (N,) of points (N, 3) to the nearest strand."""
         near, far = (self.one + self.other) / 2
         along = far - near
         t = np.clip((points - near) @ (along / (along @ along + 1e-18)), 0, 1)[:, None]
@@ -85,14 +93,14 @@ class Web:
 
 
 def smooth_min(a: Array, b: Array, k: float) -> Array:
-    """Union of two solids with a fillet about `k` metres wide; bulges by at most k / 4."""
+    """Return the union of two solids with a fillet of width `k` (m), which adds at most k / 4."""
     h = np.maximum(k - np.abs(a - b), 0) / k
     return np.minimum(a, b) - h * h * k / 4
 
 
 @dataclass(frozen=True)
 class ImplicitHand:
-    """The solid hand at rest. `bones` (16, 4, 4) are the rest transforms, T_palm_body."""
+    """The solid hand at rest; `bones` (16, 4, 4) are the rest transforms T_palm_body."""
 
     shape: HandShape
     bones: Array
@@ -103,7 +111,7 @@ class ImplicitHand:
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
-        """The flesh of a right hand of scale 1 with the sizes of `shape`."""
+        """Return the flesh of a right hand of scale 1 with the sizes of `shape`."""
         shape = shape.with_(side="right", scale=1.0)
         bones = reference_transforms(Chain.of(shape), rest_pose(shape))
         fingers = tuple(tuple(_finger(shape, bones, finger)) for finger in range(5))
@@ -112,7 +120,7 @@ class ImplicitHand:
         )
 
     def distance(self, points: Array) -> Array:
-        """Signed distance (N,) of points (N, 3) to the skin."""
+        """Return the signed distance (N,) of points (N, 3) to the skin."""
         unit = self.shape.palm_length
         body = self.palm_distance(points)
         for muscle in self.muscles:
@@ -120,7 +128,7 @@ class ImplicitHand:
         for web in self.webs:
             body = smooth_min(body, web.distance(points), 0.07 * unit)
         body = -smooth_min(-body, points[:, 1] - self.shape.wrist[1] + 0.02 * unit, 0.14 * unit)
-        # Each finger grows out of the hand by itself, so that neighbours never melt into each other.
+        # Each finger is blended with the hand alone, so that adjacent fingers stay apart.
         fingers = [
             smooth_min(body, self.finger_distance(points, finger), (0.12 if finger == 0 else 0.05) * unit)
             for finger in range(5)
@@ -128,14 +136,14 @@ class ImplicitHand:
         return np.minimum.reduce(fingers)
 
     def finger_distance(self, points: Array, finger: int) -> Array:
-        """Signed distance (N,) to one finger alone."""
+        """Return the signed distance (N,) of points (N, 3) to one finger alone."""
         first, *others = (cone.distance(points) for cone in self.fingers[finger])
         for other in others:
             first = smooth_min(first, other, 0.25 * self.shape.radii[finger, 3])
         return first
 
     def palm_distance(self, points: Array) -> Array:
-        """Signed distance (N,) to the palm without its muscles and webs."""
+        """Return the signed distance (N,) of points (N, 3) to the palm without muscles and webs."""
         # The cones of one ray meet without a fillet, which would swell where they join.
         first, *others = (np.minimum.reduce([cone.distance(points) for cone in ray]) for ray in self.palm)
         for other in others:
@@ -143,7 +151,7 @@ class ImplicitHand:
         return np.asarray(first)
 
     def bounds(self) -> tuple[Array, Array]:
-        """Corners of a box that holds the hand."""
+        """Return the two corners (3,) of a bounding box of the hand."""
         # The palm's cones run on below the wrist, where they are cut off.
         whole = [*self.muscles, *(cone for finger in self.fingers for cone in finger)]
         low, high = _box([*whole, *(cone for ray in self.palm for cone in ray)])

@@ -1,7 +1,7 @@
-"""How much each body moves each point of the skin at rest: smooth, convex, and never across to another finger.
+"""Compute the skinning weights of the bodies on the built skin: smooth, convex, and within one finger.
 
-Along a finger the share passes from one bone to the next around each joint, over about one radius to either side.
-Across the hand it goes by distance to the flesh of each finger, so that webs follow both their neighbours.
+Along a finger the weight passes from one bone to the next around each joint, over about one radius to each side.
+Across the hand it depends on the distance to each finger's flesh, so that a web follows both adjacent fingers.
 """
 
 import numpy as np
@@ -13,16 +13,16 @@ from depthtrack.hand.skin.implicit import ImplicitHand
 from depthtrack.types import Array, Faces
 
 _BLEND = (1.4, 1.0, 1.0)
-"""Half the width of the passage at each joint of a finger, in radii; the skin over a knuckle slides furthest."""
+"""Half the width of the transition at each joint of a finger, in radii; widest over a knuckle."""
 
 
 def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
-    """Convex weights (V, 16) of vertices (V, 3) on the flesh at rest."""
+    """Return convex weights (V, 16) of vertices (V, 3) on the flesh at rest."""
     to_finger = np.stack([flesh.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
     to_palm = flesh.palm_distance(vertices)
     weights = np.zeros((len(vertices), BODY_COUNT))
 
-    # The thumb shares its muscles with the palm: halfway where both are equally near.
+    # The thumb shares its muscles with the palm: half each at equal distance.
     unit = flesh.shape.palm_length
     elsewhere = np.minimum(to_palm, to_finger[:, 1:].min(axis=-1))
     thumb = _step((elsewhere - to_finger[:, 0]) / (0.2 * unit))
@@ -46,7 +46,7 @@ def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
 
 
 def _along(flesh: ImplicitHand, finger: int, points: Array, distance: Array) -> Array:
-    """Convex shares (N, 4) of the palm and the three phalanges, looking at one finger alone."""
+    """Return convex shares (N, 4) of the palm and the three phalanges at points (N, 3), for one finger alone."""
     passed = np.ones(len(points))
     shares = np.empty((len(points), 4))
     before = np.array([0.0, 1.0, 0.0])
@@ -66,6 +66,6 @@ def _along(flesh: ImplicitHand, finger: int, points: Array, distance: Array) -> 
 
 
 def _step(x: Array) -> Array:
-    """Smooth passage from 0 at x = -1 to 1 at x = 1."""
+    """Return a smooth step from 0 at x = -1 to 1 at x = 1."""
     t = np.clip((x + 1) / 2, 0, 1)
     return t * t * (3 - 2 * t)
