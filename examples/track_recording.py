@@ -1,20 +1,20 @@
-"""Track the hand through a recording, and print where the index finger's tip is: track_recording.py RECORDING."""
+"""Track a hand and print the tip of its index finger: track_recording.py RECORDING [pso|ik] [HAND.json|RIG.glb]."""
 
 import sys
 from contextlib import closing
 
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
-from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
+from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Segmenter
 from depthtrack.tracking.registry import create_tracker
 
 
-def main(path: str, tracker_name: str = "ik") -> int:
-    """Print a line a frame; gives the number of frames with a trusted pose."""
+def main(path: str, tracker_name: str = "ik", hand_name: str | None = None) -> int:
+    """Print a line a frame; return the number of frames with a trusted pose."""
     recording = open_sequence(path)
-    hand = recording.hand or HandShape()
+    hand = chosen_hand(recording, hand_name)
     model, segmenter, tip, trusted = HandModel(hand), Segmenter.for_sequence(recording), "index_tip", 0
     with closing(create_tracker(tracker_name, hand)) as tracker:
         for frame in recording:
