@@ -12,6 +12,7 @@ from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
+from tests.support.rigs import write_makehuman_rig
 
 FRAMES = 4
 
@@ -92,3 +93,21 @@ def test_synth_refuses_what_is_no_hand(
     arguments = [str(rig) if argument == "RIG" else argument for argument in arguments]
     assert main(["synth", "everyday", str(tmp_path / "out"), *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("letter", ["R", "L"])
+def test_a_hand_of_another_make_is_recorded_and_followed(
+    real_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], letter: str
+) -> None:
+    pytest.importorskip("pygltflib", reason="rigged hands need the extra: pip install 'depthtrack[gltf]'")
+    rig = write_makehuman_rig(tmp_path / "hand.glb", real_data, letter)
+    recording, run = tmp_path / "recording", tmp_path / "run"
+    options = ["--sensor", "kinect1", "--background", "room", "--frames", "8"]
+    assert main(["synth", "everyday", str(recording), "--model", str(rig), *options]) == 0
+    assert main(["track", str(recording), "-o", str(run), "--tracker", "ik", "--hand", str(rig)]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", str(run), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["endpoint_error_mm"]["mean"] < 2
+    stored = json.loads((run / "run.json").read_text())["hand"]
+    assert stored["side"] == {"R": "right", "L": "left"}[letter]

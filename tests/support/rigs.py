@@ -96,3 +96,12 @@ def write_rig(
         header + struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", len(blob)) + b"BIN\0" + blob
     )
     return path
+
+
+def write_makehuman_rig(path: Path, data: Path, letter: str) -> Path:
+    """Write the MakeHuman hand ("R" or "L") of the real data as a GLB in decimetres."""
+    with np.load(data / "meshes" / "makehuman-hand" / f"hand_{letter}.npz") as hand:
+        names = [str(name) for name in hand["bones"]]
+        return write_rig(
+            path, hand["vertices_dm"], hand["triangles"], hand["weights"], names, hand["parent"], hand["head"]
+        )

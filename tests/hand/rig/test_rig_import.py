@@ -17,7 +17,7 @@ from depthtrack.hand.rig.gltf_writer import export_glb
 from depthtrack.hand.rig.rig_import import mapping_path, read_rigged_hand
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
-from tests.support.rigs import distances, load_skin, parts, write_gltf, write_rig
+from tests.support.rigs import distances, load_skin, parts, write_gltf, write_makehuman_rig, write_rig
 
 pytest.importorskip("pygltflib", reason="rigged hands need the extra: pip install 'depthtrack[gltf]'")
 
@@ -128,18 +128,9 @@ def test_an_open_wrist_is_closed(own_glb: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("letter", ["R", "L"])
 def test_a_makehuman_hand(real_data: Path, tmp_path: Path, letter: str) -> None:
     """A CC0 mesh made by others: names, metacarpals, eight influences a vertex, decimetres, an open wrist."""
-    source = real_data / "meshes" / "makehuman-hand" / f"hand_{letter}.npz"
-    with np.load(source) as hand:
+    with np.load(real_data / "meshes" / "makehuman-hand" / f"hand_{letter}.npz") as hand:
         heads, tails, names = hand["head"] * 0.1, hand["tail"] * 0.1, [str(name) for name in hand["bones"]]
-        path = write_rig(
-            tmp_path / "hand.glb",
-            hand["vertices_dm"],
-            hand["triangles"],
-            hand["weights"],
-            names,
-            hand["parent"],
-            hand["head"],
-        )
+    path = write_makehuman_rig(tmp_path / "hand.glb", real_data, letter)
     skin = load_skin(path)
     assert skin.shape.side == {"R": "right", "L": "left"}[letter]
     phalanges = [[names.index(f"finger{f}-{k}.{letter}") for k in (1, 2, 3)] for f in range(1, 6)]
