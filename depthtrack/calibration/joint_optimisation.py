@@ -1,9 +1,9 @@
-"""Sizes and poses together: Gauss-Newton on several views of one hand, whose sizes they share.
+"""Joint optimisation of sizes and poses: Gauss-Newton on several views of one hand, which share its sizes.
 
-Every pose concerns one view only, so that the poses are eliminated first (Schur complement), and what is left for the
-sizes is what all views say of them whatever the poses are: their information. Shared sizes over several views after
-Taylor et al., "User-specific hand modeling from monocular depth sequences", CVPR 2014; sizes that one view does not
-tell are held by the others and by the prior as in Tan et al., "Fits like a glove", CVPR 2016.
+Every pose concerns one view only. The poses are eliminated first (Schur complement); what remains is the information
+of all views about the sizes. Shared sizes over several views follow Taylor et al., "User-specific hand modeling from
+monocular depth sequences", CVPR 2014. Sizes that one view does not determine are held by the other views and by the
+prior, as in Tan et al., "Fits like a glove", CVPR 2016.
 """
 
 from collections.abc import Sequence
@@ -11,28 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from depthtrack.calibration.options import JointFitOptions
 from depthtrack.calibration.parameters import COUNT, hand_of, prior_covariance
 from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
-from depthtrack.hand.limits import LOWER, UPPER, within_limits
-from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
+from depthtrack.hand.limits import within_limits
+from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import Side
-from depthtrack.types import Array, Mask
-
-_SOFTNESS = (0.020, 0.006)
-"""Metres, in the first and in the last round: distances from which on a residual counts less."""
-_NOISE, _MISFIT = 0.0015, 2.5
-"""Metres: standard deviation of one patch of skin about the model, at best; and in median distances to the skin: what
-no sizes of the model can fit is alike in all views, and does not average out."""
-_STEP = np.concatenate([np.full(3, 0.03), np.full(3, 0.2), np.full(20, 0.3)])
-"""Standard deviation of a pose's step (m, rad, rad) that keeps what the view does not tell where it is."""
-_LARGEST = 0.08
-"""Largest change of a size in one round, of the logarithm: the skin is linear about so far."""
+from depthtrack.solver.shared_parameters import EliminatedPose, eliminate_pose, solve_free
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """`values` (35,) of `sizes`, their `covariance` (35, 35) given views and prior, `poses` (V, 27), and `distances`
-    (V,), the median distance (m) of each view's points to the skin."""
+    """Sizes and poses that fit all views.
+
+    values: (35,) sizes, see `parameters`; covariance: (35, 35) of the sizes given views and prior; poses: (V, 27);
+    distances: (V,) metres, median distance of the points of each view to the skin.
+    """
 
     values: Array
     covariance: Array
@@ -45,64 +40,41 @@ def fit_jointly(
     poses: Array,
     values: Array,
     side: Side,
-    rounds: int,
+    iterations: int,
     free: slice = slice(0, COUNT),
     exact: bool = False,
+    options: JointFitOptions | None = None,
 ) -> JointFit:
-    """Sizes and poses that explain all views best, from `poses` (V, 27) and `values` (35,); only `free` sizes move.
+    """Return the sizes and poses that fit all views best.
 
-    `exact` makes the skin anew in every round (see `PosedSkin`), and begins where most is known already.
+    poses: (V, 27) to start from; values: (35,) sizes to start from; free: the sizes that may change; exact: build the
+    skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale throughout.
     """
-    kernel_scale = (_SOFTNESS[1], _SOFTNESS[1]) if exact else _SOFTNESS
+    options = options or JointFitOptions()
+    soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale
     poses, values = within_limits(poses), values.copy()
     prior = np.linalg.inv(prior_covariance())
     held = np.ones(COUNT, dtype=np.bool_)
     held[free] = False
-    for k in range(rounds):
+    for k in range(iterations):
         skin = PosedSkin(hand_of(values, side), exact)
-        s = kernel_scale[0] * (kernel_scale[1] / kernel_scale[0]) ** (k / max(rounds - 1, 1))
-        evidence = [linearise(view, skin, pose, s) for view, pose in zip(views, poses, strict=True)]
-        information, gradient, steps = _eliminate(views, evidence, poses)
-        change = _solve(information + prior, -(gradient + prior @ values), held)
-        change *= min(1.0, _LARGEST / max(np.abs(change).max(), 1e-12))
+        kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
+        evidence = [linearise(view, skin, pose, kernel_scale) for view, pose in zip(views, poses, strict=True)]
+        eliminated = [_eliminate(*each, options) for each in zip(views, evidence, poses, strict=True)]
+        information = np.sum([e.information for e in eliminated], axis=0)
+        gradient = np.sum([e.gradient for e in eliminated], axis=0)
+        change = solve_free(information + prior, -(gradient + prior @ values), held)
+        change *= min(1.0, options.largest_change / max(np.abs(change).max(), 1e-12))
         values = values + change
-        tangents = np.stack([own + by_sizes @ change for own, by_sizes in steps])
+        tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
         poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])
     return JointFit(values, np.linalg.inv(information + prior), poses, distances)
 
 
-def _eliminate(
-    views: Sequence[CalibrationView], evidence: Sequence[Evidence], poses: Array
-) -> tuple[Array, Array, list[tuple[Array, Array]]]:
-    """Information (35, 35) and gradient (35,) of the sizes, the poses following them; and for each view how its pose
-    moves: by itself (26,), and (26, 35) with the sizes."""
-    information: Array = np.zeros((COUNT, COUNT))
-    gradient: Array = np.zeros(COUNT)
-    steps: list[tuple[Array, Array]] = []
-    for view, e, pose in zip(views, evidence, poses, strict=True):
-        # As many measurements as there are patches, each as sure as sensor and model allow.
-        noise = max(_NOISE, _MISFIT * e.distance) ** 2
-        worth = min(view.patches / max(e.count, 1), 1.0) / noise
-        H, g = worth * e.H, worth * e.g
-        A, b = H[:TANGENT_SIZE, :TANGENT_SIZE] + np.diag(1 / _STEP**2), g[:TANGENT_SIZE].copy()
-        C = H[:TANGENT_SIZE, TANGENT_SIZE:].copy()
-        angles = pose[ANGLES]
-        stuck = np.zeros(TANGENT_SIZE, dtype=np.bool_)
-        stuck[6:] = ((angles <= LOWER) & (b[6:] > 0)) | ((angles >= UPPER) & (b[6:] < 0))
-        A[stuck], A[:, stuck], b[stuck], C[stuck] = 0, 0, 0, 0
-        A[stuck, stuck] = 1
-        solved: Array = np.linalg.solve(A, np.column_stack([b, C])).astype(np.float64, copy=False)
-        own, by_sizes = -solved[:, 0], -solved[:, 1:]
-        information += H[TANGENT_SIZE:, TANGENT_SIZE:] + C.T @ by_sizes
-        gradient += g[TANGENT_SIZE:] + C.T @ own
-        steps.append((own, by_sizes))
-    return information, gradient, steps
-
-
-def _solve(A: Array, b: Array, held: Mask) -> Array:
-    """x (35,) with A x = b where sizes are not held."""
-    x = np.zeros(COUNT)
-    free = ~held
-    x[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
-    return x
+def _eliminate(view: CalibrationView, evidence: Evidence, pose: Array, options: JointFitOptions) -> EliminatedPose:
+    """Return the normal equations of the sizes for one view, scaled to its independent measurements."""
+    noise = max(options.noise, options.misfit * evidence.distance) ** 2
+    scale = min(view.patches / max(evidence.count, 1), 1.0) / noise
+    damping = 1 / np.repeat(options.step_spread, [3, 3, 20]) ** 2
+    return eliminate_pose(scale * evidence.H, scale * evidence.g, pose[ANGLES], damping)

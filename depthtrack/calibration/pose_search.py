@@ -5,31 +5,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, find_pose
 from depthtrack.types import Array, Index
 
-FIRST = 4
-"""Number of views, the most open hands, in which side and scale are tried out."""
-TRIED_SCALES = (0.76, 0.9, 1.06, 1.24)
-"""Factors on the sizes of the hand that a search begins with."""
-GOOD_VIEWS = 0.7
-"""Share of the views that are fitted: the poses of highest energy may be wrong."""
-SURE_MARGIN = 0.02
-"""Relative extra energy of the other side below which the side may be wrong."""
-
-_WIDE = SearchOptions(rounds=SearchOptions().rounds[:2], attempts=1)
-_RESOLUTION = 96
-"""Longest side, pixels, at which poses are searched."""
-_HAND_LIKE = 0.55
-"""Least agreement of silhouettes (1 less the skin term of Eq. 2) of a hand."""
-
+ScorerFactory = Callable[[HandShape], Scorer]
+"""Makes the scorer of a hand; calibration closes it. The energies of its backend decide which poses are kept."""
 Progress = Callable[[str, float], None]
 
 
@@ -48,9 +36,9 @@ class Found:
         """Return the indices of the views with the lowest energies, at least two."""
         return np.argsort(self.energies, kind="stable")[: max(2, round(share * len(self.energies)))]
 
-    def check_hand(self) -> None:
-        """Raise InputError if the silhouettes of most views do not agree with a hand."""
-        if np.median(self.agreements) < _HAND_LIKE:
+    def check_hand(self, least: float) -> None:
+        """Raise InputError if the median agreement of the silhouettes is below `least`."""
+        if np.median(self.agreements) < least:
             raise InputError(
                 f"what was found in {len(self.poses)} frames does not look like a hand (silhouettes agree to "
                 f"{np.median(self.agreements):.0%}): calibrate on a recording of one bare hand, best with open fingers"
@@ -60,8 +48,11 @@ class Found:
 class PoseSearcher:
     """Searches the pose of a hand in each view, without a start."""
 
-    def __init__(self, observations: list[Observation], seed: int, threads: int) -> None:
-        self.observations, self._seed, self._threads = observations, seed, threads
+    def __init__(
+        self, observations: list[Observation], scorer: ScorerFactory, seed: int, options: CalibrationOptions
+    ) -> None:
+        self.observations, self.options = observations, options
+        self._scorer, self._seed = scorer, seed
         self.views = [CalibrationView(o) for o in observations]
 
     def find(self, shape: HandShape, count: int | None = None, attempts: int = 1) -> Found:
@@ -74,28 +65,29 @@ class PoseSearcher:
 
     def candidates(self, shape: HandShape, count: int) -> list[tuple[Array, Array]]:
         """Return likely poses (K, 27) and their energies (K,) in each of the first `count` views."""
+        wide = SearchOptions(rounds=SearchOptions().rounds[:2], attempts=1)
         out = []
-        with RasterScorer(shape, threads=self._threads) as scorer:
+        with self._scorer(shape) as scorer:
             for o in self.observations[:count]:
-                scorer.set_target(o.reduced(_RESOLUTION))
+                scorer.set_target(o.reduced(self.options.resolution))
                 generator = frame_generator(self._seed, o.frame_index)
-                angles = typical_angles(generator, _WIDE.hypotheses)
+                angles = typical_angles(generator, wide.hypotheses)
                 poses = hypotheses(o.centre, angles, generator, o.arm_direction)
-                out.append(find_candidates(scorer, poses, generator, _WIDE))
+                out.append(find_candidates(scorer, poses, generator, wide))
         return out
 
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
         """Return the energy of a hand in a pose (27,), in one view."""
-        with RasterScorer(shape) as scorer:
-            scorer.set_target(self.observations[view].reduced(_RESOLUTION))
+        with self._scorer(shape) as scorer:
+            scorer.set_target(self.observations[view].reduced(self.options.resolution))
             return float(scorer.score(pose[None])[0])
 
     def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
         options = SearchOptions(attempts=attempts, good_energy=0.0)
         poses, energies, agreements = [], [], []
-        with RasterScorer(shape, threads=self._threads) as scorer:
+        with self._scorer(shape) as scorer:
             for n, o in enumerate(observations):
-                scorer.set_target(o.reduced(_RESOLUTION))
+                scorer.set_target(o.reduced(self.options.resolution))
                 generator = frame_generator(self._seed, o.frame_index)
                 pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
                 tried = np.stack([pose] if known is None else [pose, known[n]])

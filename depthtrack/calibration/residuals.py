@@ -21,6 +21,7 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
+from depthtrack.solver.robust import geman_mcclure, symmetric_direction
 from depthtrack.types import Array, Index, Mask
 
 _POINTS = 1200
@@ -100,8 +101,10 @@ class _Residuals:
 
 
 def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale: float) -> Evidence:
-    """The evidence of a view for a pose (27,); residuals are weighted as Geman and McClure's estimator does, by 1/4 at
-    a distance of `kernel_scale` (m)."""
+    """Return the evidence of a view for a pose (27,).
+
+    kernel_scale: m, scale of the Geman-McClure kernel.
+    """
     surface = skin.seen(view, pose)
     row, column = np.nonzero(surface.depth)
     if len(row) == 0:
@@ -114,7 +117,7 @@ def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale:
     parts = [on_surface, _outline_residuals(view, skin, pose, bodies, x, places)]
     a = np.concatenate([_gradients(skin.model, pose, part) for part in parts])
     errors, distances = (np.concatenate([getattr(part, name) for part in parts]) for name in ("errors", "distances"))
-    weights = 1 / (1 + (distances / kernel_scale) ** 2) ** 2
+    weights = geman_mcclure(distances**2, kernel_scale)
     found = on_surface.distances
     return Evidence(
         (a * weights[:, None]).T @ a,
@@ -147,8 +150,7 @@ def _surface_residuals(
     found = found[skin.is_hand(pose, view.points[found])]
     found = found[np.sum(normals[nearest[found]] * view.normals[found], axis=1) > _AGREEMENT]
     k = nearest[found]
-    directions = normals[k] + view.normals[found]
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = np.stack(symmetric_direction(*normals[k].T, *view.normals[found].T), axis=1)
     errors = np.sum(directions * (x[k] - view.points[found]), axis=1)
     return _Residuals(bodies[k], x[k], directions, errors, distance[found])
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from depthtrack.calibration.pose_search import FIRST, GOOD_VIEWS, SURE_MARGIN, TRIED_SCALES, PoseSearcher, Progress
+from depthtrack.calibration.options import CalibrationOptions
+from depthtrack.calibration.pose_search import PoseSearcher, Progress, ScorerFactory
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.kinematics import HandModel
@@ -68,14 +69,15 @@ class RigCalibration:
 def calibrate_rig(
     observations: Sequence[Observation],
     rig: HandShape,
+    scorer: ScorerFactory,
     seed: int = 0,
-    threads: int = 1,
     source: str = "scaled",
     progress: Progress | None = None,
+    options: CalibrationOptions | None = None,
 ) -> RigCalibration:
     """Return a rigged hand scaled to the hand seen in `observations`, the most open hands first.
 
-    The same observations and seed give the same hand for any number of threads.
+    `scorer` makes the scorer of a hand. Equal observations, seed and energies give an equal hand.
 
     Raises:
         InputError: if `rig` refers to no rigged mesh, if the views show no hand, or if they show one of the other side.
@@ -83,25 +85,26 @@ def calibrate_rig(
     if rig.rig is None:
         raise InputError("the hand to scale must be a rigged mesh (.glb, .gltf) or a hand file of one")
     show = progress or (lambda what, share: None)
-    searcher = PoseSearcher(list(observations), seed, threads)
+    options = options or CalibrationOptions()
+    searcher = PoseSearcher(list(observations), scorer, seed, options)
     energies = {}
-    for n, factor in enumerate(TRIED_SCALES):
-        show("trying scales", 0.4 * n / len(TRIED_SCALES))
+    for n, factor in enumerate(options.tried_scales):
+        show("trying scales", 0.4 * n / len(options.tried_scales))
         for side in ("right", "left"):
             tried = rig.with_(scale=rig.scale * factor, side=side)
-            energies[side, factor] = float(searcher.find(tried, FIRST).energies.mean())
-    factor = min(TRIED_SCALES, key=lambda f: energies[rig.side, f])
+            energies[side, factor] = float(searcher.find(tried, options.first).energies.mean())
+    factor = min(options.tried_scales, key=lambda f: energies[rig.side, f])
     other = min(energy for (side, _), energy in energies.items() if side != rig.side)
     margin = other / energies[rig.side, factor] - 1
-    if margin < -SURE_MARGIN:
+    if margin < -options.sure_margin:
         raise InputError(
             f"the recording must show a {rig.side} hand like the rig, but the other side fits {-margin:.0%} better: "
             "give a rig of the other hand"
         )
     show("searching poses", 0.4)
     found = searcher.find(rig.with_(scale=rig.scale * factor), attempts=2)
-    found.check_hand()
-    good = found.best(GOOD_VIEWS)
+    found.check_hand(options.hand_like)
+    good = found.best(options.good_views)
     fit = _ScaleFit(rig, [searcher.observations[i] for i in good], found.poses[good])
     show("fitting the scale", 0.8)
     centre = np.log(factor)

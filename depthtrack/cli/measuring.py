@@ -6,6 +6,7 @@ from depthtrack.cli.progress import percent_bar
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
+    from depthtrack.calibration.pose_search import ScorerFactory
     from depthtrack.calibration.rig_calibration import RigCalibration
     from depthtrack.hand.shape import HandShape, Side
     from depthtrack.recording import Sequence
@@ -25,14 +26,13 @@ def calibrate_sequence(
     Raises:
         InputError: if the recording does not show the hand well enough.
     """
-    from depthtrack.calibration.calibrate import VIEWS, calibrate
+    from depthtrack.calibration.calibrate import calibrate
     from depthtrack.calibration.views import choose_views
-    from depthtrack.machine import usable_cores
 
     with percent_bar() as show:
         show("choosing frames", 0.0)
-        views = choose_views(sequence, segmenter, VIEWS)
-        return calibrate(views, side, seed, threads or usable_cores(), source, show)
+        views = choose_views(sequence, segmenter)
+        return calibrate(views, _scorers(threads), side, seed, source, show)
 
 
 def calibrate_rig_on_sequence(
@@ -47,12 +47,20 @@ def calibrate_rig_on_sequence(
     Raises:
         InputError: if the recording does not show such a hand.
     """
-    from depthtrack.calibration.calibrate import VIEWS
     from depthtrack.calibration.rig_calibration import calibrate_rig
     from depthtrack.calibration.views import choose_views
-    from depthtrack.machine import usable_cores
 
     with percent_bar() as show:
         show("choosing frames", 0.0)
-        views = choose_views(sequence, segmenter, VIEWS)
-        return calibrate_rig(views, rig, seed, threads or usable_cores(), f"scaled on {sequence.name}", show)
+        views = choose_views(sequence, segmenter)
+        return calibrate_rig(views, rig, _scorers(threads), seed, f"scaled on {sequence.name}", show)
+
+
+def _scorers(threads: int | None) -> "ScorerFactory":
+    """Return the factory of raster scorers, which use all cores by default."""
+    from functools import partial
+
+    from depthtrack.machine import usable_cores
+    from depthtrack.rendering.raster import RasterScorer
+
+    return partial(RasterScorer, threads=threads or usable_cores())

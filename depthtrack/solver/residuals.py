@@ -1,12 +1,12 @@
-"""What a match asks of the hand: that the distance vanishes, or only its part along a normal; and how firmly."""
+"""Residuals of correspondences, with robust weights: point to point, point to plane, or symmetric."""
 
-import math
 from typing import Literal
 
 from depthtrack.simd.functions import eight
 from depthtrack.simd.vectors import F64X8, kernel_part, loader, store
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.normal_equations import ROW, NormalEquations
+from depthtrack.solver.robust import compiled_geman_mcclure, compiled_symmetric_direction
 from depthtrack.types import Array
 
 _load = loader(F64X8)
@@ -24,10 +24,9 @@ def add_correspondences(
     residual: Residual,
     kernel_scale: float,
 ) -> None:
-    """Add the residuals of all matches.
+    """Add the residuals of all correspondences to the normal equations.
 
-    Each is weighted as Geman and McClure's estimator does: by 1 for near points, 1/4 at a distance of `kernel_scale`
-    (m). A `kernel_scale` of 0 weighs all alike.
+    kernel_scale: m, scale of the Geman-McClure kernel, see `geman_mcclure`; 0 for equal weights.
     """
     add = add_points if residual == "point" else add_symmetric if residual == "symmetric" else add_planes
     add(equations.sums.reshape(-1), equations.e, equations.centre, correspondences, cloud, kernel_scale)
@@ -37,7 +36,7 @@ def add_correspondences(
 def add_planes(
     sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
 ) -> None:
-    """Add the distances of matches along the hand's normals."""
+    """Add the distances of correspondences along the normals of the hand."""
     for i in range(correspondences.body.shape[0]):
         if correspondences.body[i] >= 0:
             n = correspondences.n[i]
@@ -48,20 +47,19 @@ def add_planes(
 def add_symmetric(
     sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
 ) -> None:
-    """Add the distances of matches along the mean of the hand's and the observed normals."""
+    """Add the distances of correspondences along the mean of both normals."""
     for i in range(correspondences.body.shape[0]):
         if correspondences.body[i] >= 0:
             n, m = correspondences.n[i], cloud.normals[i]
-            x, y, z = n[0] + m[0], n[1] + m[1], n[2] + m[2]
-            scale = 1.0 / math.sqrt(max(x * x + y * y + z * z, 1e-12))
-            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, x * scale, y * scale, z * scale)
+            x, y, z = compiled_symmetric_direction(n[0], n[1], n[2], m[0], m[1], m[2])
+            _add(sums, total, centre, correspondences, cloud, i, kernel_scale, x, y, z)
 
 
 @kernel_part
 def add_points(
     sums: Array, total: Array, centre: Array, correspondences: Correspondences, cloud: PointCloud, kernel_scale: float
 ) -> None:
-    """Add the distances of matches, all three coordinates."""
+    """Add the distances of correspondences in all three coordinates."""
     for i in range(correspondences.body.shape[0]):
         if correspondences.body[i] >= 0:
             _add(sums, total, centre, correspondences, cloud, i, kernel_scale, 1.0, 0.0, 0.0)
@@ -82,11 +80,11 @@ def _add(
     ny: float,
     nz: float,
 ) -> None:
-    """Add the residual of match i along a direction n."""
+    """Add the residual of correspondence i along a unit direction n."""
     b, x, y = correspondences.body[i], correspondences.x[i], cloud.points[i]
     ex, ey, ez = x[0] - y[0], x[1] - y[1], x[2] - y[2]
     px, py, pz = x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]
-    # v shifts a point as it is, the turn by its product with p.
+    # The gradient by v is n, by w it is p x n.
     tx, ty, tz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
     w, e = weight(ex, ey, ez, kernel_scale), nx * ex + ny * ey + nz * ez
     row, at = eight(nx, ny, nz, tx, ty, tz, e, 0.0), ROW * 6 * b
@@ -101,8 +99,7 @@ def _add(
 
 @kernel_part
 def weight(ex: float, ey: float, ez: float, kernel_scale: float) -> float:
-    """Geman and McClure's weight of a distance."""
+    """Return the Geman-McClure weight of a distance vector (m); 1 if `kernel_scale` is 0."""
     if kernel_scale <= 0.0:
         return 1.0
-    share = 1.0 / (1.0 + (ex * ex + ey * ey + ez * ez) / (kernel_scale * kernel_scale))
-    return share * share
+    return compiled_geman_mcclure(ex * ex + ey * ey + ez * ez, kernel_scale)

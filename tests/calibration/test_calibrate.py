@@ -30,6 +30,7 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
+from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.solver.keypoints import KEYPOINT_BODIES
@@ -78,7 +79,7 @@ def made() -> Synthesiser:
 
 @pytest.fixture(scope="module")
 def calibration(made: Synthesiser) -> Calibration:
-    return calibrate([observe(made, i) for i in range(5, 355, 80)])
+    return calibrate([observe(made, i) for i in range(5, 355, 80)], RasterScorer)
 
 
 def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
@@ -168,7 +169,7 @@ def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
     for name, angles in frames.items():
         pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], angles)
         view = CalibrationView(_rendered(pose))
-        fit = fit_jointly([view], pose[None], _sizes(), "right", rounds=1)
+        fit = fit_jointly([view], pose[None], _sizes(), "right", iterations=1)
         of_lengths = [g for measure, (_, g) in measures(_sizes()).items() if measure.endswith("_length")]
         sigma[name] = sum(float(g @ fit.covariance @ g) for g in of_lengths)
         sigma["nothing"] = sum(float(g @ prior_covariance() @ g) for g in of_lengths)
@@ -192,7 +193,7 @@ def test_open_hands_are_chosen_before_fists() -> None:
 def test_recordings_without_a_hand_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     empty = _empty_room(tmp_path / "empty")
     with pytest.raises(InputError, match="0 of 4 frames"):
-        choose_views(open_sequence(empty), Segmenter(), 4)
+        choose_views(open_sequence(empty), Segmenter())
     assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
     assert "calibrating needs at least 3 frames" in capsys.readouterr().err
     assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2

@@ -11,6 +11,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.hand_surface import HandSurface
+from depthtrack.rendering.raster import RasterScorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film
@@ -36,7 +37,7 @@ def views(film: Film) -> list[Observation]:
 
 @pytest.fixture(scope="module")
 def calibration(views: list[Observation], rig: HandShape) -> RigCalibration:
-    return calibrate_rig(views, rig)
+    return calibrate_rig(views, rig, RasterScorer)
 
 
 @pytest.mark.slow
@@ -53,12 +54,12 @@ def test_the_scale_of_a_rig_is_found(calibration: RigCalibration, rig: HandShape
 @pytest.mark.slow
 def test_a_hand_of_the_other_side_is_refused(views: list[Observation], rig: HandShape) -> None:
     with pytest.raises(InputError, match="must show a left hand like the rig"):
-        calibrate_rig(views, rig.with_(side="left"))
+        calibrate_rig(views, rig.with_(side="left"), RasterScorer)
 
 
 def test_sizes_without_a_rig_are_refused(views: list[Observation]) -> None:
     with pytest.raises(InputError, match="must be a rigged mesh"):
-        calibrate_rig(views, HandShape())
+        calibrate_rig(views, HandShape(), RasterScorer)
 
 
 def test_the_disagreement_is_least_for_the_true_hand(film: Film, rig: HandShape) -> None:
