@@ -14,6 +14,7 @@ from depthtrack.evaluation.evaluate import evaluate_run
 from depthtrack.evaluation.sweep.local import LocalWorkers
 from depthtrack.report.build import write_report
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking.configuration import IkConfig, PsoConfig
 
 
 def main(folder: str, frames: int = 90, distances: tuple[float, ...] = (0.5, 1.0), jobs: int = 2) -> Path:
@@ -24,7 +25,7 @@ def main(folder: str, frames: int = 90, distances: tuple[float, ...] = (0.5, 1.0
         made = Synthesiser(Synthesis("grasp", distance=distance, sensor="kinect1", model="skin", frames=frames))
         write_recording(made, path, overwrite=True)
         sources.append(Source(str(path)))
-    specs = (TrackerSpec("PSO", "pso"), TrackerSpec("IK", "ik"))
+    specs = (TrackerSpec("PSO", PsoConfig()), TrackerSpec("IK", IkConfig()))
     runs = compare(Comparison(tuple(sources), specs), Path(folder), LocalWorkers(jobs))
     evaluations = [evaluate_run(Path(run.folder)) for run in runs]
     print(as_table(lines_of(evaluations)))

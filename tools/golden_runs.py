@@ -31,12 +31,12 @@ RECORDINGS = {
 REAL_RECORDINGS = ("open-close", "kinect2-counting")
 TRACKERS = {
     "ik": ["--tracker", "ik"],
-    "ik-cylinders": ["--tracker", "ik", "--model", "cylinders"],
+    "ik-cylinders": ["--tracker", "ik", "--surface", "cylinders"],
     "ik-leap": ["--tracker", "ik", "--synergies", "leap"],
     "pso": ["--tracker", "pso"],
-    "pso-skin": ["--tracker", "pso", "--finish", "skin"],
-    "ik-paper": ["--tracker", "ik", "--variant", "paper"],
-    "pso-paper": ["--tracker", "pso", "--variant", "paper"],
+    "pso-skin": ["--tracker", "pso", "--refine"],
+    "ik-paper": ["--tracker", "schroeder2014"],
+    "pso-paper": ["--tracker", "oikonomidis2011"],
 }
 
 

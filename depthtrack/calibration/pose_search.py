@@ -1,7 +1,7 @@
 """Poses of a hand of given sizes in the views of a calibration."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,10 +11,15 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
+from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
+from depthtrack.tracking.configuration import GlobalSearchOptions, SwarmSearchOptions
+from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
 from depthtrack.tracking.random import frame_generator
-from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, find_pose
+from depthtrack.tracking.stages.searches import swarm_search
 from depthtrack.types import Array, Index
+
+_SEARCH = SwarmSearchOptions(refine=False)
+_PROPOSALS = GlobalSearchOptions()
 
 ScorerFactory = Callable[[HandShape], Scorer]
 """Makes the scorer of a hand; calibration closes it. The energies of its backend decide which poses are kept."""
@@ -65,15 +70,14 @@ class PoseSearcher:
 
     def candidates(self, shape: HandShape, count: int) -> list[tuple[Array, Array]]:
         """Return likely poses (K, 27) and their energies (K,) in each of the first `count` views."""
-        wide = SearchOptions(rounds=SearchOptions().rounds[:2], attempts=1)
+        wide = replace(_SEARCH, rounds=_SEARCH.rounds[:2])
         out = []
         with self._scorer(shape) as scorer:
             for o in self.observations[:count]:
                 scorer.set_target(o.reduced(self.options.resolution))
                 generator = frame_generator(self._seed, o.frame_index)
-                angles = typical_angles(generator, wide.hypotheses)
-                poses = hypotheses(o.centre, angles, generator, o.arm_direction)
-                out.append(find_candidates(scorer, poses, generator, wide))
+                found = _search_once(scorer, o, generator, wide)
+                out.append((poses_of(found), np.array([candidate.energy for candidate in found])))
         return out
 
     def energy(self, shape: HandShape, view: int, pose: Array) -> float:
@@ -83,17 +87,22 @@ class PoseSearcher:
             return float(scorer.score(pose[None])[0])
 
     def _search(self, shape: HandShape, observations: list[Observation], attempts: int, known: Array | None) -> Found:
-        options = SearchOptions(attempts=attempts, good_energy=0.0)
-        poses, energies, agreements = [], [], []
+        best: list[Candidate] = []
         with self._scorer(shape) as scorer:
             for n, o in enumerate(observations):
                 scorer.set_target(o.reduced(self.options.resolution))
                 generator = frame_generator(self._seed, o.frame_index)
-                pose, _ = find_pose(scorer, o.centre, generator, options, arm=o.arm_direction)
-                tried = np.stack([pose] if known is None else [pose, known[n]])
-                terms = scorer.terms(tried)
-                best = int(np.argmin(terms.energy))
-                poses.append(tried[best])
-                energies.append(float(terms.energy[best]))
-                agreements.append(float(terms.agreement[best]))
-        return Found(np.stack(poses), np.array(energies), np.array(agreements))
+                tried = [_search_once(scorer, o, generator, _SEARCH)[0] for _ in range(attempts)]
+                tried += [] if known is None else evaluate(scorer, known[n][None])
+                best.append(by_energy(tried)[0])
+        energies, agreements = ([getattr(one, name) for one in best] for name in ("energy", "confidence"))
+        return Found(poses_of(best), np.array(energies), np.array(agreements))
+
+
+def _search_once(
+    scorer: Scorer, o: Observation, generator: np.random.Generator, options: SwarmSearchOptions
+) -> list[Candidate]:
+    """Return candidates of one global search of an observation, best first."""
+    angles = typical_angles(generator, _PROPOSALS.proposals)
+    starts = evaluate(scorer, orientation_proposals(o.centre, angles, generator, o.arm_direction))
+    return swarm_search(scorer, starts, generator, options, _PROPOSALS.min_angle)

@@ -19,7 +19,8 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
-from depthtrack.solver.icp import IcpFitter, IcpOptions
+from depthtrack.solver.icp import IcpFitter
+from depthtrack.solver.options import IcpOptions
 from depthtrack.tracking.surfaces.skin import MeshSurface
 from depthtrack.types import Array
 

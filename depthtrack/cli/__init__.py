@@ -80,8 +80,13 @@ def _parse(name: str, arguments: list[str]) -> "RunnableCommand":
 
     import tyro
 
-    command = import_module(COMMANDS[name].module).Command
-    parsed: RunnableCommand = tyro.cli(command, args=arguments, prog=f"depthtrack {name}")
+    module, prog = import_module(COMMANDS[name].module), f"depthtrack {name}"
+    if hasattr(module, "command"):
+        # The options depend on the tracker that the arguments name.
+        command, default = module.command(arguments)
+        parsed: RunnableCommand = tyro.cli(command, args=arguments, prog=prog, default=default)
+    else:
+        parsed = tyro.cli(module.Command, args=arguments, prog=prog)
     return parsed
 
 

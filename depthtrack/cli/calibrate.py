@@ -54,6 +54,7 @@ class Command:
         from depthtrack.calibration.calibrate import summary
         from depthtrack.hand.hand_file import load_hand
         from depthtrack.segmentation.observation import Segmenter
+        from depthtrack.segmentation.options import SegmentationOptions
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
 
@@ -66,7 +67,8 @@ class Command:
         side = None if self.side == "auto" else self.side
         rig = None if self.hand is None else load_hand(self.hand, side)
         sequence = self.recording.open()
-        segmenter = Segmenter.for_sequence(sequence, self.skin_model)
+        skin_model = None if self.skin_model is None else str(self.skin_model)
+        segmenter = Segmenter.for_sequence(sequence, SegmentationOptions(skin_model=skin_model))
         if rig is not None:
             scaled = calibrate_rig_on_sequence(sequence, segmenter, rig, self.seed, self.threads)
             content, page = scaled.to_json(), calibration_picture(scaled, rig)

@@ -40,11 +40,11 @@ class RecordingOptions:
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At a frame that cannot be read: stop with an error, or skip and count it."""
 
-    def open(self) -> "Sequence":
-        """The recording. Raises InputError."""
+    def open(self, camera: "Camera | None" = None) -> "Sequence":
+        """Return the recording, seen through `camera` unless the options name another one. Raises InputError."""
         from depthtrack.recording import open_sequence
 
-        return open_sequence(self.path, self._chosen_camera(), self.on_damage)
+        return open_sequence(self.path, self._chosen_camera() or camera, self.on_damage)
 
     def _chosen_camera(self) -> "Camera | None":
         """The camera these options describe, or None for the recording's own."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -11,6 +11,7 @@ from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
+from depthtrack.tracking.configuration import TrackerName
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,7 +39,7 @@ class Command:
     """Leave colour aside."""
     wrist_margin: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
     """Keep so much of the forearm beyond the wrist, to compare with silhouettes that do."""
-    tracker: Literal["pso", "ik"] | None = None
+    tracker: TrackerName | None = None
     """Let a tracker tell where hand and wrist are, as it does in `depthtrack track`: slower, and surer of the wrist."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     json: bool = False
@@ -50,15 +51,16 @@ class Command:
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
         from depthtrack.segmentation.observation import Segmenter
+        from depthtrack.segmentation.options import SegmentationOptions
 
         if self.hands != HandOptions() and self.tracker is None:
             raise InputError("--hand and --side are for a tracker: give one with --tracker ik or --tracker pso")
         if not -50 <= self.wrist_margin <= 200:
             raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
         sequence = self.recording.open()
-        segmenter = Segmenter.for_sequence(
-            sequence, self.skin_model, use_colour=not self.depth_only, wrist_margin=self.wrist_margin / 1000
-        )
+        skin_model = None if self.skin_model is None else str(self.skin_model)
+        options = SegmentationOptions(not self.depth_only, skin_model, self.wrist_margin / 1000)
+        segmenter = Segmenter.for_sequence(sequence, options)
         folder = self.out or Path(f"{sequence.name}-segmented")
         check_output_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -71,11 +73,11 @@ class Command:
     def _tracker(self, sequence: "Sequence") -> "AbstractContextManager[Tracker | None]":
         from contextlib import closing, nullcontext
 
-        from depthtrack.tracking.registry import create_tracker
+        from depthtrack.tracking.registry import create_tracker, tracker_config
 
         if self.tracker is None:
             return nullcontext()
-        return closing(create_tracker(self.tracker, self.hands.chosen(sequence)))
+        return closing(create_tracker(tracker_config(self.tracker), self.hands.chosen(sequence)))
 
     def _written(
         self, sequence: "Sequence", results: "Iterator[SegmentedFrame]", folder: Path

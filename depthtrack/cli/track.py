@@ -1,116 +1,142 @@
-"""`depthtrack track`: a recording's hand, frame by frame, into a run folder."""
+"""`depthtrack track`: the hand of a recording, frame by frame, into a run folder."""
 
-from dataclasses import dataclass, field
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from depthtrack.cli.hand_options import HandOptions
-from depthtrack.cli.progress import counter
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.tracker_options import IkChoice, PsoChoice, chosen_options
+from depthtrack.cli.tracker_options import chosen_config, options_type, requested_run, requested_tracker
 from depthtrack.errors import InputError
+from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from depthtrack.recording import Sequence
+    from depthtrack.recording.sequence import Sequence as Recording
+    from depthtrack.tracking.run_configuration import RunConfiguration
 
 
 @dataclass(frozen=True)
-class Command:
+class TrackCommand:
     """Track the hand through a recording and write its pose in every frame to a run folder.
 
-    A run that was interrupted goes on with --resume, and ends with the same poses as one that was not.
+    An interrupted run continues with --resume and ends with the same poses. --config repeats a run: options given
+    beside it replace those of the run. The options of the tracker follow those of the command; `--tracker NAME --help`
+    lists those of another one, and docs/parameters.md all of them.
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
     """Run folder to write."""
-    tracker: Literal["pso", "ik"] = "pso"
-    """How to track: pso renders hypotheses (Oikonomidis et al. 2011), ik fits a surface to the point cloud (Schroeder
-    et al. 2014)."""
-    hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
+    tracker: TrackerName
+    """Tracker: pso renders hypotheses, ik fits a surface to the point cloud, the others are those of the papers."""
+    config: Annotated[Path | None, tyro.conf.arg(metavar="RUN.json")] = None
+    """Configuration to repeat: the run.json of a run, or its folder."""
+    hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)
     start: Literal["auto", "truth"] = "auto"
-    """Begin by searching, or from the recording's true pose of its first frame."""
+    """Start with a search, or from the recording's true pose of its first frame."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Only the first so many frames."""
+    """Track only the first N frames."""
     resume: bool = False
-    """Go on with the run that the folder holds."""
-    seed: int = 0
-    """Chooses the random numbers: the same seed gives the same poses."""
+    """Continue the run that the folder holds."""
+    threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Threads of the renderer (default: one per core). Poses do not depend on it."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+    """Skin colours from `depthtrack train-skin` (default: published statistics)."""
 
-    variant: Literal["default", "paper"] = "default"
-    """The tracker as we measured it best, or as its paper has it."""
-
-    pso: tyro.conf.OmitArgPrefixes[PsoChoice] = field(default_factory=PsoChoice)
-    ik: tyro.conf.OmitArgPrefixes[IkChoice] = field(default_factory=IkChoice)
+    @property
+    def tracker_config(self) -> TrackerConfig:
+        """Configuration of the tracker."""
+        raise NotImplementedError
 
     def run(self) -> None:
-        from contextlib import closing
-
         from depthtrack.cli.output_folder import check_output_folder
-        from depthtrack.hand.kinematics import HandModel
-        from depthtrack.recording.run_folder import RunWriter
-        from depthtrack.segmentation.observation import Segmenter
-        from depthtrack.tracking.configuration import run_configuration
-        from depthtrack.tracking.pipeline import track_sequence
-        from depthtrack.tracking.registry import create_tracker
+        from depthtrack.cli.progress import counter
+        from depthtrack.machine import usable_cores
+        from depthtrack.tracking.run import TrackingRun
 
         check_output_folder(self.out)
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
-        sequence = self.recording.open()
-        hand = self.hands.chosen(sequence)
-        options = self._options()
-        configuration = run_configuration(
+        sequence = self._open()
+        configuration = self._configuration(sequence)
+        with (
+            TrackingRun(configuration, sequence, self.threads or usable_cores()) as run,
+            counter(len(run), leave=True) as shown,
+        ):
+            shown.set_postfix_str("the first use compiles kernels")
+            for each in run.write(self.out, resume=self.resume):
+                shown.update(each.frame.index + 1 - shown.n)
+                shown.set_postfix_str(each.estimate.status)
+        self._report(sequence)
+
+    def _open(self) -> "Recording":
+        """Return the recording, seen through the camera of `--config` unless another one is given."""
+        repeated = None if self.config is None else _load(self.config).camera_model()
+        return self.recording.open(repeated)
+
+    def _configuration(self, sequence: "Recording") -> "RunConfiguration":
+        from depthtrack.segmentation.options import SegmentationOptions
+        from depthtrack.tracking.run import configure
+
+        repeated = None if self.config is None else _load(self.config)
+        segmentation = SegmentationOptions() if repeated is None else repeated.segmentation
+        if self.skin_model is not None:
+            segmentation = dataclasses.replace(segmentation, skin_model=str(self.skin_model.resolve()))
+        if repeated is not None and self.hands == HandOptions():
+            hand = repeated.hand_shape(str(self.config))
+        else:
+            hand = self.hands.chosen(sequence)
+        return configure(
             self.recording.path,
             sequence,
+            self.tracker_config,
             hand,
-            self.tracker,
-            options,
+            segmentation,
             start=self.start,
             frames=self.frames,
-            skin_model=self.skin_model,
             on_damage=self.recording.on_damage,
-            threads=options.get("threads"),
         )
-        start_pose = self._start_pose(sequence)
-        segmenter = Segmenter.for_sequence(sequence, self.skin_model)
-        count = len(sequence) if self.frames is None else min(self.frames, len(sequence))
-        with (
-            closing(create_tracker(self.tracker, hand, **options)) as tracker,
-            RunWriter(self.out, configuration, ("segment", *tracker.stages), self.resume) as run,
-            counter(count, initial=len(run.rows), leave=True) as bar,
-        ):
-            bar.set_postfix_str("the first use compiles kernels")
-            for row in track_sequence(sequence, segmenter, tracker, HandModel(hand), run, start_pose, count):
-                bar.update()
-                bar.set_postfix_str(row.status)
-        lost = sum(not row.status.is_trusted for row in run.rows)
-        print(f"{self.out}: {len(run.rows)} frames, {lost} without a trusted pose")
-        print(f"see how good they are:  depthtrack evaluate {self.out}")
-        if (note := self.hands.note(sequence, self.recording.path)) is not None:
+
+    def _report(self, sequence: "Recording") -> None:
+        from depthtrack.recording.run_folder import read_rows
+
+        rows = read_rows(self.out)
+        print(
+            f"{self.out}: {len(rows)} frames, {sum(not row.status.is_trusted for row in rows)} without a trusted pose"
+        )
+        print(f"errors and timing:  depthtrack evaluate {self.out}")
+        if self.config is None and (note := self.hands.note(sequence, self.recording.path)) is not None:
             print(note)
 
-    def _options(self) -> dict[str, Any]:
-        """What the chosen tracker is made with: what was given, and what it would do anyway."""
-        from depthtrack.machine import usable_cores
-        from depthtrack.tracking.registry import complete_options
 
-        given = {"variant": self.variant, "seed": self.seed} | chosen_options(self.tracker, self.pso, self.ik)
-        if self.tracker == "pso":
-            given.setdefault("threads", usable_cores())
-        return complete_options(self.tracker, given)
+def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]:
+    """Return the command with the options of the tracker that the arguments name, and its defaults after `--config`.
 
-    def _start_pose(self, sequence: "Sequence") -> "np.ndarray | None":
-        if self.start == "auto":
-            return None
-        truth = sequence.ground_truth
-        row = None if truth is None else truth.at(float(sequence.timestamps[0]))
-        if truth is None or truth.poses is None or row is None:
-            raise InputError(f"{self.recording.path} knows no true pose of its first frame: use --start auto")
-        return truth.poses[row]
+    Raises:
+        InputError: no tracker has this name, or `--config` names no run.
+    """
+    run = requested_run(arguments)
+    config = requested_tracker(arguments, run)
+    options = options_type(config)
+    field = ("options", Annotated[options, tyro.conf.OmitArgPrefixes], dataclasses.field(default_factory=options))
+    namespace = {
+        "__doc__": TrackCommand.__doc__,
+        "tracker_config": property(lambda self: chosen_config(config, self.options)),
+    }
+    Command = dataclasses.make_dataclass("Command", [field], bases=(TrackCommand,), frozen=True, namespace=namespace)
+    defaults: dict[str, Any] = {"tracker": config.name}
+    recording = RecordingOptions(tyro.MISSING)
+    if run is not None:
+        defaults |= {"start": run.start, "frames": run.frames}
+        recording = dataclasses.replace(recording, on_damage=run.on_damage)
+    return Command, Command(recording=recording, out=tyro.MISSING, **defaults)
+
+
+def _load(path: Path) -> "RunConfiguration":
+    from depthtrack.tracking.run_configuration import RunConfiguration
+
+    return RunConfiguration.load(path)

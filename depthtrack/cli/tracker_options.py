@@ -1,71 +1,124 @@
-"""What each tracker alone can be told; given for the other one, it is refused."""
+"""Command-line options of a tracker, derived from its configuration: names, defaults and help."""
 
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 import tyro
 
 from depthtrack.errors import InputError
+from depthtrack.options import Parameter, parameters, to_data, with_options
+from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER, TrackerConfig
+
+if TYPE_CHECKING:
+    from depthtrack.tracking.run_configuration import RunConfiguration
+
+_PLAIN = (bool, int, float, str, NoneType)
 
 
-def _unless(metavar: str, default: str) -> Any:
-    """An option whose value the tracker knows where it is not given."""
-    return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"(default: {default})")
+def requested_run(arguments: Sequence[str]) -> "RunConfiguration | None":
+    """Return the configuration that `--config` names among the arguments, if any.
+
+    Raises:
+        InputError: the file holds no configuration of a run.
+    """
+    path = _value(arguments, "--config")
+    if path is None:
+        return None
+    from depthtrack.tracking.run_configuration import RunConfiguration
+
+    return RunConfiguration.load(Path(path))
 
 
-@dataclass(frozen=True)
-class PsoChoice:
-    """With --tracker pso: a swarm of hypotheses, rendered and compared with what is seen."""
+def requested_tracker(arguments: Sequence[str], run: "RunConfiguration | None") -> TrackerConfig:
+    """Return the configuration of the tracker that the arguments name, else of the run, else the default's.
 
-    particles: Annotated[int | None, _unless("INT", "64")] = None
-    """Particles of the swarm."""
-    generations: Annotated[int | None, _unless("INT", "25")] = None
-    """Generations of the swarm, every frame."""
-    resolution: Annotated[int | None, _unless("PIXELS", "the sensor's own")] = None
-    """Longest side of the region that hypotheses are rendered at."""
-    renderer: Annotated[
-        Literal["raster", "egl", "osmesa", "oracle"] | None, _unless("raster|egl|osmesa|oracle", "raster")
-    ] = None
-    """What renders and scores the hypotheses."""
-    finish: Annotated[Literal["none", "skin"] | None, _unless("none|skin", "none")] = None
-    """Draw the swarm's pose to the observed points by the hand's skin, for hands that no cylinders look like."""
-    threads: Annotated[int | None, _unless("N", "one for each core")] = None
-    """Threads of the renderer. Poses do not depend on it."""
+    Raises:
+        InputError: no tracker has this name.
+    """
+    name = _value(arguments, "--tracker")
+    if run is not None and name in (None, run.tracker.name):
+        return run.tracker
+    if name is not None and name not in CONFIGURATIONS:
+        raise InputError(f"no tracker '{name:.60}': choose one of {', '.join(CONFIGURATIONS)}")
+    return CONFIGURATIONS[name or DEFAULT_TRACKER]()
 
 
-@dataclass(frozen=True)
-class IkChoice:
-    """With --tracker ik: the hand's surface, drawn to the observed points."""
-
-    model: Annotated[Literal["skin", "cylinders"] | None, _unless("skin|cylinders", "skin")] = None
-    """The surface: a skin mesh, or tapered cylinders with round ends."""
-    residual: Annotated[
-        Literal["point", "plane", "symmetric"] | None, _unless("point|plane|symmetric", "symmetric, point with paper")
-    ] = None
-    """What is to vanish: the distance of points, or its part along the surface's normals, or along both surfaces'."""
-    rounds: Annotated[int | None, _unless("INT", "5")] = None
-    """Rounds of correspondences, every frame."""
-    inner: Annotated[int | None, _unless("INT", "5")] = None
-    """Gauss-Newton steps in each round, at most."""
-    subsample: Annotated[int | None, _unless("INT", "3")] = None
-    """Every so many-th point is used."""
-    synergies: Annotated[str | None, _unless("NAME|FILE.json", "all angles are free")] = None
-    """Solve for hand synergies instead of angles: leap, leap-grasps, or a file of `depthtrack synergies fit`."""
-    components: Annotated[int | None, _unless("INT", "all there are")] = None
-    """Only the first so many of the synergies."""
-    soft: tyro.conf.FlagCreatePairsOff[bool] = False
-    """With --synergies: solve for all angles, drawn to postures that are likely by the synergies."""
+def options_type(config: TrackerConfig) -> type[Any]:
+    """Return a frozen dataclass with one field per option of a tracker; its defaults are those of `config`."""
+    fields = [(_field_name(each), _annotation(each), _default(each)) for each in parameters(config)]
+    return dataclasses.make_dataclass("TrackerOptions", fields, frozen=True)
 
 
-def chosen_options(tracker: str, pso: PsoChoice, ik: IkChoice) -> dict[str, Any]:
-    """The options given for `tracker`. Raises InputError where one was given that only the other has."""
-    own, other = ("pso", "ik") if tracker == "pso" else ("ik", "pso")
-    given = {name: _given(choice) for name, choice in (("pso", pso), ("ik", ik))}
-    if given[other]:
-        names = ", ".join(f"--{name}" for name in given[other])
-        raise InputError(f"the tracker {own} has no {names}: leave that out, or choose --tracker {other}")
-    return given[own]
+def chosen_config(config: TrackerConfig, chosen: Any) -> TrackerConfig:
+    """Return `config` with the options that the command line changed.
+
+    Raises:
+        InputError: a value is out of range, or no JSON where that is expected.
+    """
+    changed = {}
+    for each in parameters(config):
+        value = getattr(chosen, _field_name(each))
+        if value != _default(each):
+            changed[each.path] = value if _is_plain(each.kind) else _parsed(each, value)
+    return with_options(config, changed)
 
 
-def _given(choice: PsoChoice | IkChoice) -> dict[str, Any]:
-    return {name: value for name, value in vars(choice).items() if value is not None and value is not False}
+def _field_name(parameter: Parameter) -> str:
+    return parameter.path.replace(".", "__")
+
+
+def _annotation(parameter: Parameter) -> Any:
+    """Return the type of the field with its names and help; advanced options are parsed but not listed."""
+    flag = parameter.name.replace("_", "-")
+    unit, source = (
+        f" [{parameter.unit}]" if parameter.unit else "",
+        f" ({parameter.source})" if parameter.source else "",
+    )
+    aliases = (f"--{parameter.path.replace('_', '-')}",) if "." in parameter.path and flag != parameter.path else ()
+    argument = tyro.conf.arg(name=flag, aliases=aliases, help=f"{parameter.meaning}{unit}.{source}")
+    kind = parameter.kind if _is_plain(parameter.kind) else str
+    if parameter.advanced:
+        return Annotated[kind, tyro.conf.Suppress, argument]
+    return Annotated[kind, argument]
+
+
+def _default(parameter: Parameter) -> Any:
+    return parameter.default if _is_plain(parameter.kind) else json.dumps(_data(parameter.default))
+
+
+def _data(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return to_data(value)
+    return [_data(part) for part in value] if isinstance(value, tuple | list) else value
+
+
+def _parsed(parameter: Parameter, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InputError(f"--{parameter.name}: expected JSON, found {text!r:.60}") from error
+
+
+def _is_plain(kind: Any) -> bool:
+    """Return whether the command line can parse this type without JSON."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return all(map(_is_plain, parts))
+    if origin is tuple:
+        return all(part in _PLAIN or part is Ellipsis for part in parts)
+    return origin is Literal or kind in _PLAIN
+
+
+def _value(arguments: Sequence[str], option: str) -> str | None:
+    """Return the value of an option among the arguments before they are parsed."""
+    found = None
+    for number, argument in enumerate(arguments):
+        if argument == option and number + 1 < len(arguments):
+            found = arguments[number + 1]
+        elif argument.startswith(f"{option}="):
+            found = argument.partition("=")[2]
+    return found

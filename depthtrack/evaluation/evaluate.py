@@ -26,6 +26,7 @@ from depthtrack.evaluation.residuals import run_residuals
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
+from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.types import Array
 
 Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
@@ -42,6 +43,7 @@ class Evaluation:
     """
 
     run: Run
+    configuration: RunConfiguration
     recording: str
     metrics: tuple[Metric, ...]
     points: PointErrors | None
@@ -74,7 +76,7 @@ class Evaluation:
         return {
             "run": str(self.run.folder),
             "recording": self.recording,
-            "tracker": self.run.configuration.get("tracker"),
+            "tracker": self.configuration.tracker.name,
             "frames": self.frames,
             **self.losses.to_json(),
             **{metric.name: metric.statistics() for metric in self.metrics},
@@ -107,6 +109,7 @@ def evaluate(replay: Replay, residuals: bool = True, progress: Progress | None =
     metrics.append(jitter(model.endpoints(run.poses), run.timestamps))
     return Evaluation(
         run,
+        replay.configuration,
         replay.sequence.name,
         tuple(metrics),
         points,

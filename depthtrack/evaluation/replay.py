@@ -1,34 +1,38 @@
-"""A run beside its recording: every frame as the tracker saw it, with what the tracker said of it."""
+"""A run beside its recording: every frame as the tracker saw it, with the estimate of the run."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation, Segmenter
-from depthtrack.tracking.pipeline import roi_prior
-from depthtrack.tracking.state import TrackingThresholds, TrackState
+from depthtrack.tracking.pipeline import replay_frames
+from depthtrack.tracking.run_configuration import RunConfiguration
+from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.tracker import Estimate
 
 _SAME_TIME = 1e-6
+"""Seconds by which the time of a frame may differ between run and recording."""
 _LONGEST_PATH = 1024
 """Characters."""
 
 
 @dataclass(frozen=True)
 class ReplayedFrame:
-    """One frame of a run: `row` in the run, the recording's `frame`, the hand observed in it (None without one), and
-    the tracker's `estimate`."""
+    """One frame of a run.
+
+    row: number of the frame in the run.
+    frame: the frame of the recording.
+    observation: the segmented hand, None if there is none.
+    estimate: the estimate of the run.
+    """
 
     row: int
     frame: Frame
@@ -38,54 +42,57 @@ class ReplayedFrame:
 
 @dataclass(frozen=True)
 class Replay:
-    """A run and its recording, opened with the run's own camera."""
+    """A run and its recording, opened with the camera of the run."""
 
     run: Run
+    configuration: RunConfiguration
     sequence: Sequence
     hand: HandShape
 
     @classmethod
     def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
-        """The run beside the recording it tracked, or beside `sequence` where that has moved. Raises InputError."""
+        """Return the run beside the recording that it tracked, or beside `sequence` if that has moved.
+
+        Raises:
+            InputError: the recording is missing or is another one, or `run.json` is malformed.
+        """
+        configuration, where = RunConfiguration.of(run), str(run.folder / "run.json")
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
-            raise InputError(
-                f"the recording {path} of the run {run.folder} is not there any more: give --sequence PATH"
-            )
-        recording = open_sequence(path, _camera(run), on_damage="skip")
+            raise InputError(f"the recording {path} of the run {run.folder} is missing: give --sequence PATH")
+        recording = open_sequence(path, configuration.camera_model(where), on_damage="skip")
         _check_same_recording(run, recording, path)
-        return cls(run, recording, run_hand(run))
+        return cls(run, configuration, recording, configuration.hand_shape(where))
 
     def surface(self) -> HandSurface:
         """Return the surface that the run fitted; a user's rig if the hand has one.
 
-        Raises: InputError if the sizes give no skin, or if the rig's file is missing or changed.
+        Raises:
+            InputError: the sizes give no skin, or the rig's file is missing or changed.
         """
-        fitted = {self.run.configuration.get(name) for name in ("model", "finish")}
-        return HandSurface.of(self.hand, skin="skin" in fitted or self.hand.rig is not None)
+        return HandSurface.of(self.hand, skin=self.configuration.surface == "skin" or self.hand.rig is not None)
 
     def __len__(self) -> int:
         return len(self.run.index)
 
     def at(self, row: int) -> ReplayedFrame:
-        """One frame, without looking for the hand in it, which takes all frames before. Raises DamagedFrameError."""
+        """Return one frame without its observation, which depends on all frames before. Raises DamagedFrameError."""
         return ReplayedFrame(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
 
     def __iter__(self) -> Iterator[ReplayedFrame]:
-        """Every frame that is still readable, observed with the run's own settings and guided by its own poses."""
-        run, model, memory = self.run, HandModel(self.hand), TrackState(TrackingThresholds())
-        segmenter = Segmenter.for_sequence(self.sequence, _path(run, "skin_model"))
-        row_of = {int(index): row for row, index in enumerate(run.index)}
-        for frame in self.sequence.frames(map(int, run.index)):
-            row = row_of[frame.index]
-            observation = segmenter.segment(frame, roi_prior(model, memory.predicted_pose))
-            estimate = estimate_of(run, row)
-            memory.update(estimate)
-            yield ReplayedFrame(row, frame, observation, estimate)
+        """Yield every readable frame, segmented with the options of the run and guided by its poses."""
+        options = self.configuration.tracker
+        guide = TrackState(options.thresholds, options.scoring.objective.clamp)
+        segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)
+        row_of = {int(index): row for row, index in enumerate(self.run.index)}
+        frames = self.sequence.frames(map(int, self.run.index))
+        known = ((frame, estimate_of(self.run, row_of[frame.index])) for frame in frames)
+        for each in replay_frames(known, guide, segmenter, self.hand):
+            yield ReplayedFrame(row_of[each.frame.index], each.frame, each.observation, each.estimate)
 
 
 def estimate_of(run: Run, row: int) -> Estimate:
-    """What the tracker said of one frame."""
+    """Return the estimate of one frame of a run."""
     pose = run.poses[row]
     return Estimate(
         pose if np.isfinite(pose).all() else None,
@@ -97,38 +104,16 @@ def estimate_of(run: Run, row: int) -> Estimate:
 
 
 def run_hand(run: Run) -> HandShape:
-    """The hand that a run was tracked with. Raises InputError."""
-    try:
-        return HandShape.from_fields(run.configuration["hand"])
-    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
-        raise InputError(f"{run.folder / 'run.json'} names no usable hand: {error}") from error
+    """Return the hand that a run was tracked with. Raises InputError if `run.json` is malformed."""
+    return RunConfiguration.of(run).hand_shape(str(run.folder / "run.json"))
 
 
 def recorded_path(run: Run) -> Path:
-    """Where the run's recording was. Raises InputError when run.json does not say."""
-    path = _path(run, "sequence")
-    if path is None:
-        raise InputError(f"{run.folder / 'run.json'} does not say which recording it tracked: give --sequence PATH")
-    return path
-
-
-def _path(run: Run, name: str) -> Path | None:
-    """A path that run.json names, or None. Raises InputError for one that no system takes."""
-    path = run.configuration.get(name)
-    if not isinstance(path, str):
-        return None
+    """Return where the recording of the run was. Raises InputError if `run.json` names no path."""
+    path = RunConfiguration.of(run).sequence
     if len(path) > _LONGEST_PATH or "\0" in path:
-        raise InputError(f"{run.folder / 'run.json'}: {name} is no path: {path[:80]!r}")
+        raise InputError(f"{run.folder / 'run.json'}: sequence is no path: {path[:80]!r}")
     return Path(path)
-
-
-def _camera(run: Run) -> Camera | None:
-    """The camera that the run was tracked with; None leaves the recording its own."""
-    fields: Any = run.configuration.get("camera")
-    try:
-        return None if fields is None else Camera.from_fields(fields)
-    except InputError as error:
-        raise InputError(f"{run.folder / 'run.json'}: {error}") from error
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

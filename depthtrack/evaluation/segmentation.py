@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from depthtrack.evaluation.metrics import silhouette_iou
-from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.observation import Observation, Segmenter
-from depthtrack.tracking.pipeline import follow, roi_prior
+from depthtrack.tracking.pipeline import NoTracker, Pipeline, track_frames
 from depthtrack.tracking.tracker import Tracker
 from depthtrack.types import Mask
 
@@ -47,25 +46,23 @@ class SegmentedFrame:
 def segment_sequence(
     sequence: Sequence, segmenter: Segmenter, tracker: Tracker | None = None, hand: HandShape | None = None
 ) -> Iterator[SegmentedFrame]:
-    """Observe every frame of a recording, in order.
+    """Yield every frame of a recording with its segmentation.
 
-    With a `tracker` of a `hand` (the average adult's unless given), it tells the observer where to look while its track
-    is sure, as it does when a recording is tracked; its own time does not count.
+    tracker: tracker of `hand` whose prediction guides the segmentation, as when a recording is tracked; its own time
+        is left out.
     """
-    model = HandModel(hand or HandShape())
-    for frame in sequence:
-        place = None if tracker is None else roi_prior(model, tracker.predicted_pose)
+    pipeline = Pipeline(tracker or NoTracker(), segmenter, hand or HandShape())
+    for each in track_frames(sequence, pipeline):
         begun = time.perf_counter()
-        observation = segmenter.segment(frame, place)
-        if observation is not None:
-            observation.points  # noqa: B018 (the cloud belongs to the observation's cost)
-        ms = 1e3 * (time.perf_counter() - begun)
-        if tracker is not None:
-            follow(tracker, observation)
-        mask = None if observation is None else observation.whole_mask(frame.depth.shape)
-        truth = sequence.hand_mask(frame.index)
-        found = np.zeros(frame.depth.shape, dtype=np.bool_) if mask is None else mask
-        yield SegmentedFrame(frame, observation, mask, None if truth is None else silhouette_iou(found, truth), ms)
+        if each.observation is not None:
+            each.observation.points  # noqa: B018 (the point cloud belongs to the cost of the observation)
+        ms = each.segment_ms + 1e3 * (time.perf_counter() - begun)
+        shape = each.frame.depth.shape
+        mask = None if each.observation is None else each.observation.whole_mask(shape)
+        truth = sequence.hand_mask(each.frame.index)
+        found = np.zeros(shape, dtype=np.bool_) if mask is None else mask
+        iou = None if truth is None else silhouette_iou(found, truth)
+        yield SegmentedFrame(each.frame, each.observation, mask, iou, ms)
 
 
 def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ the same whether a run was interrupted or not; timings, of course, are not.
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -229,12 +229,22 @@ def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
     write_atomic(path, text.getvalue())
 
 
-def check_same(found: dict[str, Any], wanted: dict[str, Any], folder: Path) -> None:
-    """A run goes on only as it began; threads, versions and machine may differ. Raises InputError."""
-    # The tracker first, for its options follow from it.
+def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
+    """Raise InputError unless a run continues as it began; threads, versions and machine may differ."""
+    # The tracker first, since its options follow from it.
     for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
+            name, before, now = _first_difference(key, found.get(key), wanted.get(key))
             raise InputError(
-                f"{folder} was begun with {key} = {found.get(key)!r:.80}, not {wanted.get(key)!r:.80}: "
-                "go on with the same options, or choose another folder"
+                f"{folder} was begun with {name} = {before!r:.80}, not {now!r:.80}: "
+                "continue with the same options, or choose another folder"
             )
+
+
+def _first_difference(name: str, found: Any, wanted: Any) -> tuple[str, Any, Any]:
+    """Return the dotted name of the first nested entry that differs, with both values."""
+    if isinstance(found, Mapping) and isinstance(wanted, Mapping):
+        for key in sorted(set(found) | set(wanted)):
+            if found.get(key) != wanted.get(key):
+                return _first_difference(f"{name}.{key}", found.get(key), wanted.get(key))
+    return name, found, wanted

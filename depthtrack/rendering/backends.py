@@ -7,7 +7,7 @@ from typing import Any
 
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import Scorer
 
 

@@ -5,35 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLES
+from depthtrack.rendering.options import Objective
 from depthtrack.types import Array, Mask
-
-
-@dataclass(frozen=True)
-class Objective:
-    """Constants of Eq. (1) and (2), as in Sec. 2.3; metres.
-
-    `match_depth` d_m: closer depths count as matched. `clamp_depth` d_M: larger differences cost no more.
-    `skin_weight` lambda, `kinematic_weight` lambda_k. The depth term is summed in `depth_unit` (metres a unit):
-    in millimetres, its clamp of 40 is of the size of lambda = 20.
-    """
-
-    match_depth: float = 0.01
-    clamp_depth: float = 0.04
-    skin_weight: float = 20.0
-    kinematic_weight: float = 10.0
-    depth_unit: float = 0.001
-    epsilon: float = 1e-6
-
-    def __post_init__(self) -> None:
-        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
-            if not 0 < getattr(self, name) <= 10:
-                raise InputError(f"objective {name} must lie between 0 and 10, found {getattr(self, name)!r}")
-
-    def combine(self, depth: Array, skin: Array, kinematic: Array) -> Array:
-        """Energies of Eq. (1) from the separate terms."""
-        return depth + self.skin_weight * skin + self.kinematic_weight * kinematic
 
 
 @dataclass(frozen=True)
@@ -60,12 +34,15 @@ class Terms:
     ) -> "Terms":
         """From the sums of Eq. (2): of min(|o_d - r_d|, d_M) in metres, of o_s and r_m, and of o_s or r_m."""
         depth = clamped / objective.depth_unit / (union + objective.epsilon)
-        # Where neither hand is seen, nothing disagrees: 0 / 0 counts as full agreement.
-        total = matched_skin + union
-        # Where neither hand is seen, nothing speaks for the hypothesis.
-        skin = 1 - np.divide(2 * matched_skin, total, out=np.zeros_like(total), where=total > 0)
+        skin = silhouette_disagreement(matched_skin, union)
         kinematic = finger_crossing(poses)
         return cls(objective.combine(depth, skin, kinematic), depth, skin, kinematic)
+
+
+def silhouette_disagreement(matched: Array, union: Array) -> Array:
+    """Return the silhouette term of Eq. (2), 0 to 1, from its sums; 1 if neither hand is visible."""
+    total = matched + union
+    return 1 - np.divide(2 * matched, total, out=np.zeros_like(total), where=total > 0)
 
 
 def finger_crossing(poses: ArrayLike) -> Array:

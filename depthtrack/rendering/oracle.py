@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective, Terms, evaluate
+from depthtrack.rendering.objective import Terms, evaluate
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target

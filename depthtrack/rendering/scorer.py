@@ -1,7 +1,7 @@
 """The scorer: one protocol for every backend that renders hypotheses and compares them with an observation."""
 
 from types import TracebackType
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +10,17 @@ from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Depth
+
+
+class Scores(NamedTuple):
+    """What a tracker needs of scored poses.
+
+    energy: (B,) energies of Eq. (1).
+    agreement: (B,) agreement of rendered and observed silhouette, 0 to 1: 1 minus the silhouette term of Eq. (2).
+    """
+
+    energy: Array
+    agreement: Array
 
 
 class Scorer(Protocol):
@@ -33,6 +44,10 @@ class Scorer(Protocol):
 
     def score(self, poses: ArrayLike) -> Array:
         """Energies (B,) of Eq. (1)."""
+        ...
+
+    def evaluate(self, poses: ArrayLike) -> Scores:
+        """Return the energies of `score` with the agreement of the silhouettes."""
         ...
 
     def terms(self, poses: ArrayLike) -> Terms:
@@ -69,6 +84,14 @@ class ScorerBase:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def terms(self, poses: ArrayLike) -> Terms:
+        raise NotImplementedError
+
+    def evaluate(self, poses: ArrayLike) -> Scores:
+        """Return the energies with the agreement of the silhouettes."""
+        terms = self.terms(poses)
+        return Scores(terms.energy, 1 - terms.skin)
 
     @property
     def target(self) -> Target:

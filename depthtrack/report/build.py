@@ -156,7 +156,7 @@ def _plots(shown: list[TrackerSeries], metric: str) -> list[Plot]:
         svg, _ = timeline(shown, "silhouette_iou", "IoU", small=True)
         found.append(Plot("Agreement of silhouettes", "rendered and seen, over time", Markup(svg)))
     if (svg := stage_bars(shown)) is not None:
-        clock = shown[0].line.evaluations[0].run.configuration.get("clock", "wall")
+        clock = shown[0].line.evaluations[0].configuration.context.get("clock", "wall")
         about = "CPU time" if clock == "cpu" else "by the clock on the wall"
         found.append(Plot("Time per stage", about, Markup(svg)))
     return found
@@ -185,7 +185,8 @@ def _worst(shown: list[TrackerSeries], metric: str, painter: SideBySide) -> list
 
 def _verdict(lines: Sequence[Line], sections: Sequence[Section]) -> Verdict:
     """`sections` of all recordings, if they are known."""
-    budgets = {(e.run.configuration.get("budget") or {}).get("equal_ms") for line in lines for e in line.evaluations}
+    contexts = [evaluation.configuration.context for line in lines for evaluation in line.evaluations]
+    budgets = {(context.get("budget") or {}).get("equal_ms") for context in contexts}
     homes = {section.matched_model for section in sections}
     return verdict(
         lines, next(iter(budgets)) if len(budgets) == 1 else None, next(iter(homes)) if len(homes) == 1 else ()

@@ -4,22 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from depthtrack.evaluation.compare.results import Line
+from depthtrack.evaluation.compare.specs import label_of as tracker_label
 from depthtrack.recording.sequence import Sequence as Recording
 from depthtrack.report.narrative import listed
 
 Fact = tuple[str, str]
 
-_NOT_OPTIONS = (
-    *("sequence", "tracker", "start", "frames", "skin_model", "on_damage", "threads", "camera", "hand", "versions"),
-    *("label", "clock", "budget", "seed", "machine"),
-)
 _MOST_CHARACTERS = 160
 
 
 def facts_of_recording(recording: Recording, line: Line) -> list[Fact]:
     """Length, camera, hand, and how the recording was made, as far as it says."""
-    configuration = line.evaluations[0].run.configuration
-    camera, hand = recording.camera, configuration.get("hand", {})
+    camera, hand = recording.camera, line.evaluations[0].configuration.hand
     times = recording.timestamps
     seconds = float(times[-1] - times[0]) if len(times) > 1 else 0.0
     truth = recording.ground_truth
@@ -37,17 +33,16 @@ def facts_of_recording(recording: Recording, line: Line) -> list[Fact]:
 
 def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
     """Tracker, options, seeds, versions and machine; values that differ between runs are told side by side."""
-    runs = [evaluation.run.configuration for line in lines if line.label == label for evaluation in line.evaluations]
-    told = (name for run in runs for name, value in run.items() if name not in _NOT_OPTIONS and value is not None)
-    options = list(dict.fromkeys(told))
-    budgets = [run["budget"] for run in runs if isinstance(run.get("budget"), dict)]
+    runs = [evaluation.configuration for line in lines if line.label == label for evaluation in line.evaluations]
+    contexts = [run.context for run in runs]
+    budgets = [context["budget"] for context in contexts if isinstance(context.get("budget"), dict)]
     facts = [
-        ("tracker", _together([run.get("tracker") for run in runs])),
-        ("options", ", ".join(f"{name} {_together([run.get(name) for run in runs])}" for name in options)),
-        ("seeds", _together([run.get("seed") for run in runs])),
-        ("threads", _together([run.get("threads") for run in runs])),
-        ("versions", _together([_pairs(run.get("versions")) for run in runs])),
-        ("machine", _together([_pairs(run.get("machine")) for run in runs if run.get("machine")])),
+        ("tracker", _together([run.tracker.name for run in runs])),
+        ("options", _together([tracker_label(run.tracker) for run in runs])),
+        ("seeds", _together([run.tracker.seed for run in runs])),
+        ("threads", _together([context.get("threads") for context in contexts])),
+        ("versions", _together([_pairs(context.get("versions")) for context in contexts])),
+        ("machine", _together([_pairs(context.get("machine")) for context in contexts if context.get("machine")])),
     ]
     if budgets:
         times = [budget.get("calibrated_ms") for budget in budgets]
@@ -91,13 +86,11 @@ def _drawn_surface(description: Mapping[str, Any]) -> str:
 
 def _surface(line: Line) -> str:
     """Return the surface that the line's tracker fits: see `_drawn_surface`."""
-    configuration = line.evaluations[0].run.configuration
-    finished = configuration.get("finish") == "skin"
-    of_pso = ("skin" if finished else "primitives") if configuration.get("tracker") == "pso" else ""
-    model = str(configuration.get("model", of_pso))
-    hand = configuration.get("hand")
-    rig = hand.get("rig") if isinstance(hand, dict) else None
-    return str(rig.get("sha256")) if isinstance(rig, dict) and model == "skin" else model
+    configuration = line.evaluations[0].configuration
+    rig = configuration.hand.get("rig")
+    if configuration.surface == "cylinders":
+        return "primitives"
+    return str(rig.get("sha256")) if isinstance(rig, dict) else "skin"
 
 
 def _together(values: Sequence[Any]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.target import Target
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.point_cloud import point_cloud
 from depthtrack.segmentation.roi_tracking import PALM_HALF_THICKNESS, RoiPrior
 from depthtrack.segmentation.segmenter import HandLocator, Segmentation
@@ -82,17 +83,18 @@ class Segmenter:
         self._segmenter = HandLocator(skin_model, wrist_margin)
 
     @classmethod
-    def for_sequence(
-        cls, sequence: Sequence, skin_model: Path | None = None, use_colour: bool = True, wrist_margin: float = 0.0
-    ) -> Self:
+    def for_sequence(cls, sequence: Sequence, options: SegmentationOptions | None = None) -> Self:
         """Return a segmenter that uses skin colour if the recording has colour.
 
-        `skin_model` is the file of a trained model; the default is the published statistics.
-        Raises: InputError if the file cannot be read.
+        Raises:
+            InputError: the file of skin colours cannot be read.
         """
-        if not use_colour or not sequence.has_colour:
-            return cls(None, wrist_margin)
-        return cls(SkinColourModel.default() if skin_model is None else SkinColourModel.load(skin_model), wrist_margin)
+        options = options or SegmentationOptions()
+        if not options.use_colour or not sequence.has_colour:
+            return cls(None, options.wrist_margin)
+        file = options.skin_model
+        colours = SkinColourModel.default() if file is None else SkinColourModel.load(Path(file))
+        return cls(colours, options.wrist_margin)
 
     def segment(self, frame: Frame, place: RoiPrior | None = None) -> Observation | None:
         """What is seen of the hand, or None without one. `place` is where a tracker is sure to find it."""

@@ -1,7 +1,5 @@
 """ICP fit of the hand to an observation: correspondences and Gauss-Newton by turns (Schroeder et al. 2014, IV-C)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
@@ -14,63 +12,12 @@ from depthtrack.solver.correspondences import Correspondences, PointCloud, Surfa
 from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import solve
 from depthtrack.solver.normal_equations import NormalEquations, clear
+from depthtrack.solver.options import IcpOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradient
-from depthtrack.solver.residuals import Residual, add_correspondences
+from depthtrack.solver.residuals import add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.types import Array
-
-
-@dataclass(frozen=True)
-class IcpOptions:
-    """Iterations, correspondences and damping of an ICP fit.
-
-    icp_iterations: searches for correspondences. gn_iterations: largest number of Gauss-Newton steps for each.
-    rigid_iterations: searches before, each followed by a motion of the whole hand (Sec. IV-C). residual: see
-    `Residual`. kernel_scale: m, scale of the Geman-McClure kernel in the first and in the last iteration, 0 for none.
-    max_distance: m, largest distance of a correspondence. min_normal_cosine: smallest cosine between its normals, in
-    the first and in the last iteration. damping: lambda of Eq. (4), m^2/rad^2. temporal_weight: precision of the prior
-    towards the angles of the frame before, m^2/rad^2. synergy_weight: m^2, see `Prior.synergy_weight`. avoid_limits:
-    increase the damping towards the joint limits (Sec. IV-B). coarse_every: the rigid motion uses every n-th point.
-    reference_count: number of points that damping and priors are stated for; they scale with the number of points.
-    pose_damping, align_damping: damping of the global pose, and of the fixed posture during a rigid motion.
-    Values without a section of the paper were tuned on synthetic recordings.
-    """
-
-    icp_iterations: int = 5
-    gn_iterations: int = 5
-    rigid_iterations: int = 2
-    residual: Residual = "symmetric"
-    kernel_scale: tuple[float, float] = (0.03, 0.007)
-    max_distance: float = 0.04
-    min_normal_cosine: tuple[float, float] = (0.25, 0.6)
-    damping: float = 1e-4
-    temporal_weight: float = 5e-5
-    synergy_weight: float = 3e-7
-    avoid_limits: bool = False
-    coarse_every: int = 4
-    reference_count: float = 3000.0
-    pose_damping: float = 1e-9
-    align_damping: float = 1.0
-
-    def annealed(self, progress: float) -> tuple[float, float]:
-        """Return kernel scale (m) and smallest normal cosine at `progress` (0 to 1); outliers lose weight."""
-        (soft, firm), (low, high) = self.kernel_scale, self.min_normal_cosine
-        kernel_scale = soft * (firm / soft) ** progress if soft > 0 and firm > 0 else 0.0
-        return float(kernel_scale), low + progress * (high - low)
-
-
-PAPER_ICP = IcpOptions(
-    rigid_iterations=1,
-    residual="point",
-    kernel_scale=(0.0, 0.0),
-    min_normal_cosine=(0.0, 0.0),
-    damping=1e-6,
-    temporal_weight=0.0,
-    synergy_weight=0.0,
-    avoid_limits=True,
-)
-"""Schroeder et al. 2014: point to point, equal weights, damping of the step alone, joint limit avoidance."""
 
 
 class IcpFitter:

@@ -31,7 +31,7 @@ class Prior(NamedTuple):
         return Prior(strength * np.eye(20), angles.copy())
 
     @staticmethod
-    def synergy_weight(synergies: Synergies, strength: float, residual_spread: float = np.radians(2.0)) -> "Prior":
+    def from_synergies(synergies: Synergies, strength: float, residual_spread: float = np.radians(2.0)) -> "Prior":
         """Return the prior towards postures that are common among those of the synergies.
 
         The synergies are probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along

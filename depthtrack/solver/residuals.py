@@ -1,20 +1,14 @@
 """Residuals of correspondences, with robust weights: point to point, point to plane, or symmetric."""
 
-from typing import Literal
-
 from depthtrack.simd.functions import eight
 from depthtrack.simd.vectors import F64X8, kernel_part, loader, store
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.normal_equations import ROW, NormalEquations
+from depthtrack.solver.options import Residual
 from depthtrack.solver.robust import compiled_geman_mcclure, compiled_symmetric_direction
 from depthtrack.types import Array
 
 _load = loader(F64X8)
-
-Residual = Literal["point", "plane", "symmetric"]
-"""`point`: x - y, as in Schroeder et al. 2014, Eq. (3). `plane`: along the hand's normal n (Chen and Medioni, "Object
-modelling by registration of multiple range images", 1992). `symmetric`: along the mean of the hand's and the observed
-normal, which vanishes on curved surfaces too (Rusinkiewicz, "A symmetric objective function for ICP", 2019)."""
 
 
 def add_correspondences(

@@ -5,51 +5,13 @@ randomisation after Yasuda et al. 2010 that keeps the fingers from collapsing in
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
-from depthtrack.errors import InputError
+from depthtrack.solver.options import SwarmOptions
 from depthtrack.types import Array
-
-
-def constriction(cognitive: float, social: float) -> float:
-    """Clerc and Kennedy's factor w of Eq. (3): w = 2 / |2 - psi - sqrt(psi^2 - 4 psi)|, psi = c1 + c2 > 4."""
-    psi = cognitive + social
-    if psi <= 4:
-        raise InputError(f"the swarm's c1 + c2 must exceed 4 (Oikonomidis et al. 2011, Eq. 3), found {psi:g}")
-    return float(2 / abs(2 - psi - np.sqrt(psi * psi - 4 * psi)))
-
-
-@dataclass(frozen=True)
-class SwarmOptions:
-    """How a swarm searches.
-
-    `particles` x `generations` evaluations; `cognitive` c1, `social` c2 and `inertia` w of Eq. (3). Every
-    `randomise_every` generations (0: never), a share `randomise` of the particles each get one finger angle set
-    anew: uniformly over its range, or with probability `near_best` about the best known value, by a normal deviation
-    of `near_spread` radians.
-    """
-
-    particles: int = 64
-    generations: int = 25
-    cognitive: float = 2.8
-    social: float = 1.3
-    inertia: float = constriction(2.8, 1.3)
-    randomise_every: int = 3
-    randomise: float = 0.5
-    near_best: float = 0.0
-    near_spread: float = 0.15
-
-    def __post_init__(self) -> None:
-        if not (1 <= self.particles <= 100_000 and 1 <= self.generations <= 100_000):
-            raise InputError(
-                f"a swarm needs 1 to 100000 particles and generations, found {self.particles} x {self.generations}"
-            )
-        if not (self.randomise_every >= 0 and 0 <= self.randomise <= 1 and 0 <= self.near_best <= 1):
-            raise InputError(f"the swarm's shares must lie between 0 and 1, found {self}")
 
 
 class Optimum(NamedTuple):

@@ -1,54 +1,270 @@
-"""What a run folder tells of how it was made: enough to make it again."""
+"""Options of the stages, and the configuration of each tracker; needs no numpy, so that `--help` stays fast.
 
-import json
-import platform
-from dataclasses import asdict
-from hashlib import sha256
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+Energies are multiples of `Objective.clamp`, the energy of a pixel that disagrees completely.
+"""
 
-from depthtrack.hand.shape import HandShape
-from depthtrack.hand.synergies import load_synergies
-from depthtrack.recording.sequence import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from depthtrack.errors import InputError
+from depthtrack.options import option
+from depthtrack.rendering.options import ScoringOptions
+from depthtrack.solver.options import PAPER_ICP, IcpOptions, SurfaceFitOptions, SwarmOptions
 
 
-def run_configuration(
-    path: Path,
-    sequence: Sequence,
-    hand: HandShape,
-    tracker: str,
-    options: dict[str, Any],
-    *,
-    start: str = "auto",
-    frames: int | None = None,
-    skin_model: Path | None = None,
-    on_damage: str = "refuse",
-    threads: int | None = None,
-    **more: Any,
-) -> dict[str, Any]:
-    """The contents of run.json: recording at `path`, tracker and options, camera, hand, versions; and `more`.
+def _swarm(particles: int, generations: int) -> SwarmOptions:
+    """Return a swarm with more damping than Eq. (3) and half of the randomised angles near the best.
 
-    Threads change no pose, so they are told apart from the options; a file of synergies may change, so its contents
-    are told by their digest.
+    Both were measured to help.
     """
-    synergies = options.get("synergies")
-    if synergies is not None:
-        more["synergies_sha256"] = sha256(load_synergies(synergies).to_json().encode()).hexdigest()
-    return {
-        "sequence": str(path.resolve()),
-        "tracker": tracker,
-        "start": start,
-        "frames": frames,
-        **{name: value for name, value in options.items() if name != "threads"},
-        **more,
-        "skin_model": None if skin_model is None else str(skin_model.resolve()),
-        "on_damage": on_damage,
-        "threads": threads,
-        "camera": asdict(sequence.camera),
-        "hand": json.loads(hand.to_json()),
-        "versions": {
-            "python": platform.python_version(),
-            **{name: version(name) for name in ("depthtrack", "numpy", "numba")},
-        },
-    }
+    return SwarmOptions(particles, generations, inertia=0.6, near_best=0.5)
+
+
+@dataclass(frozen=True)
+class TrackingThresholds:
+    """When a pose is trusted, and when it may guide the segmentation.
+
+    The median term adapts to hands whose shape differs from the model: their energy is high in every frame.
+    """
+
+    confidence: float = option(0.5, "A track with a lower confidence is lost")
+    energy: float = option(
+        0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
+    )
+    lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
+    guide_confidence: float = option(0.6, "Least confidence of a pose that guides the segmentation")
+    guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
+    median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
+    memory_frames: int = option(15, "Frames after a loss in which the hand is searched near its last pose")
+
+
+@dataclass(frozen=True)
+class SwarmRound:
+    """One round of a search by swarms: the best `starts` poses continue, each as a swarm."""
+
+    starts: int = option(48, "Poses that continue")
+    swarm: SwarmOptions = option(_swarm(32, 12), "Swarm around each pose")
+    spread: tuple[float, float, float] = option(
+        (0.015, 0.3, 0.3), "Standard deviation of the first generation: position, rotation, angles", unit="m, rad, rad"
+    )
+
+
+@dataclass(frozen=True)
+class SwarmSearchOptions:
+    """A search by ever fewer and finer swarms (Oikonomidis et al. 2011, Sec. 3)."""
+
+    rounds: tuple[SwarmRound, ...] = option(
+        (
+            SwarmRound(),
+            SwarmRound(6, _swarm(64, 20), (0.010, 0.15, 0.2)),
+            SwarmRound(1, _swarm(64, 40), (0.005, 0.08, 0.1)),
+        ),
+        "Rounds of the search",
+    )
+    refined: int = option(16, "Poses that the surface fit refines after each round")
+    refine: bool = option(True, "Fit surfaces between the rounds")
+    fit: SurfaceFitOptions = option(
+        SurfaceFitOptions(subsample=6, icp=IcpOptions(icp_iterations=8)), "Surface fit between the rounds"
+    )
+
+
+@dataclass(frozen=True)
+class FitRound:
+    """One round of a coarse-to-fine fit: the best `keep` poses are fitted in `synergies` dimensions."""
+
+    keep: int = option(48, "Poses that continue")
+    synergies: int | None = option(8, "Synergies that are solved for; all angles if absent")
+    icp_iterations: int = option(3, "Rounds of correspondences")
+    coarse: bool = option(False, "Use a quarter of the points")
+
+
+@dataclass(frozen=True)
+class FitSearchOptions:
+    """A search by surface fits of ever fewer poses (after Schroeder et al. 2014, Sec. V-B)."""
+
+    rounds: tuple[FitRound, ...] = option(
+        (FitRound(48, 8, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12)), "Rounds"
+    )
+
+
+@dataclass(frozen=True)
+class GlobalSearchOptions:
+    """Where a search starts if no pose is known: any orientation that the forearm allows."""
+
+    proposals: int = option(4000, "Poses scored first")
+    min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
+    synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies")
+    follow_arm: bool = option(True, "Prefer orientations that the observed forearm allows")
+    good_energy: float = option(0.2, "An energy that ends the search", unit="clamp")
+    attempts: int = option(3, "Repetitions, at most")
+    min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
+
+
+@dataclass(frozen=True)
+class RecoveryOptions:
+    """When other poses are tried for a frame that fits poorly, and which of them are accepted.
+
+    Ratios compare the energy of the new pose with that of the old one.
+    """
+
+    good_energy: float = option(0.2, "Frames with a lower energy are left alone", unit="clamp")
+    every: int = option(5, "Search locally in every n-th frame; 0 only in doubtful frames", unit="frames")
+    proposals: int = option(4000, "Poses near the last one that a local search scores")
+    min_angle: float = option(0.1, "Least angle between the orientations that continue; 0 for any", unit="rad")
+    accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
+    accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
+    accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
+    doubt_confidence: float = option(0.6, "A lower confidence triggers a local search")
+    doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
+
+
+@dataclass(frozen=True)
+class FingerOptions:
+    """How the posture of a single finger is searched."""
+
+    proposals: int = option(96, "Postures of one finger that are scored together")
+    kept: int = option(8, "Postures that lead to the next ones")
+    spreads: tuple[float, ...] = option((0.2, 0.1), "Standard deviations of the following postures", unit="rad")
+    resolution: int | None = option(None, "Longest side at which they are rendered; that of the scorer if absent")
+    stop_early: bool = option(True, "Stop as soon as the energy is good")
+
+
+@dataclass(frozen=True)
+class SynergyOptions:
+    """Hand synergies that a fit uses (Schroeder et al. 2014, Sec. V)."""
+
+    synergies: str | None = option(None, "Set of synergies: leap, leap-grasps, or a file of `depthtrack synergies fit`")
+    components: int | None = option(None, "Use only the first n synergies")
+    synergy_prior: bool = option(False, "Solve for all angles with the synergies as a prior instead of a subspace")
+
+    def __post_init__(self) -> None:
+        for name in ("components", "synergy_prior"):
+            if getattr(self, name) and self.synergies is None:
+                raise InputError(f"{name} needs synergies: choose a set with --synergies")
+
+
+Spread = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PsoConfig:
+    """PSO tracker: a swarm of rendered hypotheses per frame (after Oikonomidis et al. 2011)."""
+
+    name: ClassVar[str] = "pso"
+
+    swarm: SwarmOptions = option(_swarm(64, 25), "Swarm of each frame")
+    spread: Spread = option(
+        (0.004, 0.04, 0.04),
+        "Standard deviation of the first generation: position, rotation, angles",
+        unit="m, rad, rad",
+    )
+    widen: float = option(0.5, "Share of the last motion that widens the first generation", advanced=True)
+    refine: bool = option(False, "Fit the swarm's best pose to the surface")
+    final_fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the swarm's best pose", advanced=True)
+    search: GlobalSearchOptions = option(GlobalSearchOptions(), "Global search", advanced=True)
+    swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(), "Swarms of a search", advanced=True)
+    recovery: RecoveryOptions = option(RecoveryOptions(), "Local re-initialisation", advanced=True)
+    fingers: FingerOptions = option(FingerOptions(), "Search of single fingers", advanced=True)
+    thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers")
+
+
+@dataclass(frozen=True)
+class IkConfig:
+    """IK tracker: the hand's surface fitted to the point cloud (after Schroeder et al. 2014)."""
+
+    name: ClassVar[str] = "ik"
+
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
+    retry_ratio: float = option(
+        1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
+    )
+    retry_energy: float = option(0.05, "Added to that multiple", unit="clamp", advanced=True)
+    synergies: SynergyOptions = option(SynergyOptions(), "Hand synergies")
+    search: GlobalSearchOptions = option(
+        GlobalSearchOptions(proposals=3000, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1),
+        "Global search",
+        advanced=True,
+    )
+    fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    recovery: RecoveryOptions = option(
+        RecoveryOptions(
+            good_energy=0.3,
+            proposals=3000,
+            min_angle=0.0,
+            accept_local=0.9,
+            doubt_confidence=0.5,
+            doubt_energy=0.4,
+        ),
+        "Local re-initialisation",
+        advanced=True,
+    )
+    local_search: FitSearchOptions = option(
+        FitSearchOptions((FitRound(48, None, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12))),
+        "Surface fits of a local search",
+        advanced=True,
+    )
+    fingers: FingerOptions = option(
+        FingerOptions(resolution=96, stop_early=False), "Search of single fingers", advanced=True
+    )
+    thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers")
+
+
+@dataclass(frozen=True)
+class Oikonomidis2011Config:
+    """PSO tracker as published: 27 raw parameters, one swarm around the last solution."""
+
+    name: ClassVar[str] = "oikonomidis2011"
+
+    swarm: SwarmOptions = option(SwarmOptions(), "Swarm of each frame")
+    spread: Spread = option(
+        (0.004, 0.04, 0.04),
+        "Standard deviation of the first generation: position, rotation, angles",
+        unit="m, rad, rad",
+    )
+    search: GlobalSearchOptions = option(GlobalSearchOptions(follow_arm=False), "Global search", advanced=True)
+    swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(refine=False), "Swarms of a search", advanced=True)
+    thresholds: TrackingThresholds = option(
+        TrackingThresholds(), "Trust in a pose; not part of the paper", advanced=True
+    )
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers")
+
+
+@dataclass(frozen=True)
+class Schroeder2014Config:
+    """IK tracker as published: point to point, linear prediction, joint limit avoidance."""
+
+    name: ClassVar[str] = "schroeder2014"
+
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=PAPER_ICP), "Surface fit of each frame")
+    synergies: SynergyOptions = option(SynergyOptions(), "Hand synergies")
+    search: GlobalSearchOptions = option(
+        GlobalSearchOptions(
+            proposals=3000, synergy_share=0.5, follow_arm=False, good_energy=0.3, attempts=4, min_gain=0.1
+        ),
+        "Global search; not part of the paper",
+        advanced=True,
+    )
+    fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    thresholds: TrackingThresholds = option(
+        TrackingThresholds(), "Trust in a pose; not part of the paper", advanced=True
+    )
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers")
+
+
+DEFAULT_TRACKER = "pso"
+
+TrackerConfig = PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config
+TrackerName = Literal["pso", "ik", "oikonomidis2011", "schroeder2014"]
+CONFIGURATIONS: dict[str, type[TrackerConfig]] = {
+    "pso": PsoConfig,
+    "ik": IkConfig,
+    "oikonomidis2011": Oikonomidis2011Config,
+    "schroeder2014": Schroeder2014Config,
+}

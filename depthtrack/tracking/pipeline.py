@@ -1,78 +1,157 @@
-"""The loop over a recording: observe, start or follow, write down; takes up an interrupted run where it stood."""
+"""The pipeline: segment each frame, track the hand in it, and feed the prediction back as the ROI prior.
+
+Runs, replay, segmentation figures, comparison, examples and live use all consume `track_frames` or `Pipeline.step`.
+"""
 
 import time
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunRow, RunWriter
-from depthtrack.recording.sequence import Sequence
+from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.wrist import WristPlane
-from depthtrack.tracking.tracker import ABSENT, Estimate, Tracker
+from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
 
-_REACH_MARGIN = 0.03
-"""Metres that a hand may have moved since it was last seen, beyond its prediction."""
+REACH_MARGIN = 0.03
+"""Distance that a hand may have moved beyond its prediction, metres."""
 
 
-def track_sequence(
-    sequence: Sequence,
-    segmenter: Segmenter,
-    tracker: Tracker,
-    model: HandModel,
-    run: RunWriter,
-    start_pose: np.ndarray | None = None,
-    count: int | None = None,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Iterator[RunRow]:
-    """Track every frame, or the first `count` of them, and append it to the run; yields each row as it is done.
+@dataclass(frozen=True)
+class TrackedFrame:
+    """One frame after the pipeline.
 
-    While the track is sure, the tracker tells the observer where to look. Frames that the run already
-    holds are observed again, which costs little and brings the observer to where it was, but not tracked again.
-    `start_pose` (27,) is refined on the first frame with a hand; without it the tracker
-    starts by itself. `clock` (seconds) times the observer.
+    observation: the segmented hand, None if there is none.
+    estimate: what the tracker returned.
+    segment_ms: time of the segmentation, milliseconds.
     """
-    done = list(run.rows)
-    awaiting_start = start_pose is not None and all(row.pose is None for row in done)
-    for number, frame in enumerate(islice(sequence, count)):
-        begun = clock()
-        observation = segmenter.segment(frame, roi_prior(model, tracker.predicted_pose))
-        observe_ms = 1e3 * (clock() - begun)
-        if number < len(done):
-            tracker.restore([_estimate(done[number])])
-            continue
-        if observation is not None and awaiting_start:
-            estimate, awaiting_start = tracker.start(observation, start_pose), False
+
+    frame: Frame
+    observation: Observation | None
+    estimate: Estimate
+    segment_ms: float
+
+
+class Pipeline:
+    """Segmentation and tracking of one frame after the other.
+
+    start_pose: (27,) pose that is refined on the first frame with a hand; None starts by a search.
+    clock: seconds, for the time of the segmentation.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        segmenter: Segmenter,
+        hand: HandShape,
+        start_pose: Array | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._tracker, self._segmenter, self._model = tracker, segmenter, HandModel(hand)
+        self._start_pose, self._clock = start_pose, clock
+
+    def step(self, frame: Frame, known: Estimate | None = None) -> TrackedFrame:
+        """Segment and track one frame.
+
+        known: estimate that the tracker made of this frame before; the state is restored from it instead.
+        """
+        observation, milliseconds = segment(frame, self._segmenter, self._model, self._tracker, self._clock)
+        if known is not None:
+            self._tracker.restore([known])
+            estimate = known
+        elif observation is None:
+            self._tracker.restore([ABSENT])
+            estimate = ABSENT
+        elif self._start_pose is not None:
+            estimate = self._tracker.start(observation, self._start_pose)
         else:
-            estimate = follow(tracker, observation)
-        row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
-        run.append(row, {"segment": observe_ms, **estimate.stage_ms})
-        yield row
+            estimate = self._tracker.track(observation)
+        if estimate.pose is not None:
+            self._start_pose = None
+        return TrackedFrame(frame, observation, estimate, milliseconds)
 
 
-def follow(tracker: Tracker, observation: Observation | None) -> Estimate:
-    """One frame on; a tracker that is shown no hand remembers that there was none."""
-    if observation is not None:
-        return tracker.track(observation)
-    tracker.restore([ABSENT])
-    return ABSENT
+class NoTracker:
+    """Stands for a tracker where the segmentation alone is wanted: it never predicts and finds nothing."""
+
+    name = "none"
+    stages: tuple[str, ...] = ()
+    predicted_pose: Array | None = None
+
+    def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
+        return ABSENT
+
+    def track(self, observation: Observation) -> Estimate:
+        return ABSENT
+
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        return None
+
+    def close(self) -> None:
+        return None
+
+
+def track_frames(frames: Iterable[Frame], pipeline: Pipeline, known: Sequence[Estimate] = ()) -> Iterator[TrackedFrame]:
+    """Track frames in order.
+
+    known: estimates of the first frames, made before. Those frames are segmented again, which brings the segmentation
+        to where it was, and the tracker is restored from the estimates.
+    """
+    for number, frame in enumerate(frames):
+        yield pipeline.step(frame, known[number] if number < len(known) else None)
+
+
+def replay_frames(
+    frames: Iterable[tuple[Frame, Estimate]], guide: Guide, segmenter: Segmenter, hand: HandShape
+) -> Iterator[TrackedFrame]:
+    """Segment frames again as they were when they were tracked: `guide` restores the ROI prior from the estimates."""
+    model = HandModel(hand)
+    for frame, estimate in frames:
+        observation, milliseconds = segment(frame, segmenter, model, guide, time.perf_counter)
+        guide.restore([estimate])
+        yield TrackedFrame(frame, observation, estimate, milliseconds)
+
+
+def segment(
+    frame: Frame, segmenter: Segmenter, model: HandModel, guide: Guide, clock: Callable[[], float]
+) -> tuple[Observation | None, float]:
+    """Return the observation of a frame, segmented near the guide's prediction, and the time in milliseconds."""
+    begun = clock()
+    observation = segmenter.segment(frame, roi_prior(model, guide.predicted_pose))
+    return observation, 1e3 * (clock() - begun)
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
-    """Where a hand in this pose is: around its palm, as far as its fingers reach, up to its wrist."""
+    """Return where a hand in `pose` (27,) is: around its palm, as far as its fingers reach, up to its wrist."""
     if pose is None:
         return None
     shape = model.shape
-    max_distance = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + _REACH_MARGIN
+    reach = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + REACH_MARGIN
     wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return RoiPrior(pose[POSITION].copy(), float(max_distance), wrist)
+    return RoiPrior(pose[POSITION].copy(), float(reach), wrist)
 
 
-def _estimate(row: RunRow) -> Estimate:
-    return Estimate(row.pose, row.energy, row.confidence, row.status)
+def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:
+    """Append tracked frames to a run folder; yield those that it did not hold before."""
+    held = len(run.rows)
+    for number, each in enumerate(tracked):
+        if number < held:
+            continue
+        frame, estimate = each.frame, each.estimate
+        row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
+        run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
+        yield each
+
+
+def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
+    """Return the estimates that a run folder holds."""
+    return [Estimate(row.pose, row.energy, row.confidence, row.status) for row in rows]

@@ -1,46 +1,53 @@
-"""The trackers by name; none is imported before it is asked for."""
+"""The trackers by name; none is imported before it is made."""
 
-from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.tracking.tracker import Tracker
+from depthtrack.hand.synergies import Synergies, load_synergies
+from depthtrack.options import with_options
+from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.stage_tracker import StageTracker
 
-TRACKERS: dict[str, tuple[str, str, str]] = {
-    "pso": ("depthtrack.tracking.trackers.pso", "PsoTracker", "PsoOptions"),
-    "ik": ("depthtrack.tracking.trackers.ik", "IkTracker", "IkOptions"),
+_TRACKERS = "depthtrack.tracking.trackers"
+BUILDERS = {
+    "pso": f"{_TRACKERS}.pso",
+    "ik": f"{_TRACKERS}.ik",
+    "oikonomidis2011": f"{_TRACKERS}.papers",
+    "schroeder2014": f"{_TRACKERS}.papers",
 }
-"""Module, tracker and options of each."""
+"""Module with a function of the tracker's name that returns its `Stages`."""
 
 
-def complete_options(name: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Options given by name, and the defaults of the others as far as they are plain values: what a run must tell to
-    be made again. Raises InputError as `create_tracker` does."""
-    made = _options(name, given)
-    plain = {field.name: getattr(made, field.name) for field in fields(made)}
-    return {
-        name: value for name, value in plain.items() if value is None or isinstance(value, bool | int | float | str)
-    }
+def tracker_config(name: str, **options: Any) -> TrackerConfig:
+    """Return the configuration of a tracker; `options` by name or dotted path, as `options.parameters` lists them.
 
-
-def create_tracker(name: str, hand: HandShape, **options: Any) -> Tracker:
-    """A tracker of a hand; `options` as its options class documents them.
-
-    Raises InputError for a name or an option that does not exist.
+    Raises:
+        InputError: no tracker has this name, or an option does not exist or has the wrong type.
     """
-    chosen = _options(name, options)
-    module_name, tracker, _ = TRACKERS[name]
-    made: Tracker = getattr(import_module(module_name), tracker)(hand, chosen)
-    return made
+    if name not in CONFIGURATIONS:
+        raise InputError(f"no tracker '{name:.60}': choose one of {', '.join(CONFIGURATIONS)}")
+    return with_options(CONFIGURATIONS[name](), options)
 
 
-def _options(name: str, given: dict[str, Any]) -> Any:
-    if name not in TRACKERS:
-        raise InputError(f"no tracker '{name}': choose one of {', '.join(TRACKERS)}")
-    module_name, _, options_class = TRACKERS[name]
-    try:
-        return getattr(import_module(module_name), options_class)(**given)
-    except TypeError as error:
-        raise InputError(f"tracker '{name}' cannot be made like that: {error}") from error
+def create_tracker(
+    config: TrackerConfig, hand: HandShape, threads: int = 1, synergies: Synergies | None = None
+) -> StageTracker:
+    """Return a tracker of a hand.
+
+    threads: threads of the renderer; poses do not depend on it.
+    synergies: synergies in place of those that the configuration names.
+
+    Raises:
+        InputError: a file of synergies cannot be read, or no skin fits the sizes of the hand.
+    """
+    chosen = getattr(config, "synergies", None)
+    if synergies is None and chosen is not None and chosen.synergies is not None:
+        synergies = load_synergies(chosen.synergies)
+    if synergies is not None and chosen is not None and chosen.components is not None:
+        synergies = synergies.truncated(chosen.components)
+    tools = Toolkit(hand, config.scoring, threads, synergies)
+    stages = getattr(import_module(BUILDERS[config.name]), config.name)(config, tools)
+    return StageTracker(config.name, stages, tools, config.thresholds, config.seed)

@@ -1,76 +1,75 @@
-"""What a tracker remembers from frame to frame: taken from its estimates alone, so that a run can be resumed."""
+"""The state of a track between frames. It depends on the estimates alone, so that a run can be resumed."""
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.recording.status import Status
+from depthtrack.tracking.configuration import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
-_MEDIAN_FRAMES, _RECENT_FRAMES = 30, 15
-"""Frames over which the energy's median is what is usual, and for which a lost hand's last pose is remembered."""
-_GUIDE_RATIO, _LOST_RATIO = 1.3, 2.0
-"""Times the usual energy from which a pose is not to guide, and not to be trusted."""
-
-
-@dataclass(frozen=True)
-class TrackingThresholds:
-    """When a pose no longer explains the hand.
-
-    Below `confidence`, or where its energy exceeds both `energy` and twice what was usual over the last second: a hand
-    of other sizes than the model's has a high energy all the time. A hand seen edge on by a noisy sensor reaches 15 in
-    its true pose; a fist of a hand that is not quite the model's agrees by little more than half.
-
-    A pose may guide segmentation from the confidence `guide_confidence` on, unless its energy exceeds both `energy`
-    and 1.3 times the usual: else a wrong pose would cut out what agrees with it.
-    """
-
-    confidence: float = 0.5
-    energy: float = 16.0
-    guide_confidence: float = 0.6
-
 
 class TrackState:
-    """The last pose (27,), or None where there is nothing to follow; `velocity` (26,), its last step; its `energy`.
+    """Last pose, velocity and energy of a track.
 
-    `last_trusted` (27,) is the last pose that was trusted, None after _RECENT_FRAMES without one: half a second at 30
-    Hz, in which a hand has hardly turned over.
+    pose: (27,) last pose, None if there is nothing to follow.
+    velocity: (26,) last step in the tangent space.
+    energy: energy of the last pose.
+    last_trusted: (27,) last trusted pose; None after `memory_frames` without one, half a second in which a hand
+        hardly turns over.
     """
 
-    def __init__(self, limits: TrackingThresholds) -> None:
-        self._limits = limits
+    def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
+        self._thresholds, self._clamp = thresholds, clamp
         self._confidence = 0.0
-        self._usual: deque[float] = deque(maxlen=_MEDIAN_FRAMES)
+        self._energies: deque[float] = deque(maxlen=thresholds.median_frames)
         self.pose: Array | None = None
         self.velocity = np.zeros(26)
         self.energy = np.inf
         self.last_trusted: Array | None = None
         self._frames_lost = 0
 
-    def is_lost(self, energy: float, confidence: float, limits: TrackingThresholds | None = None) -> bool:
-        """Whether a pose with this energy and confidence is not to be trusted, by these or the usual limits."""
-        limits = limits or self._limits
-        usual = float(np.median(self._usual)) if self._usual else np.inf
-        return confidence < limits.confidence or energy > max(limits.energy, _LOST_RATIO * usual)
+    def is_lost(self, energy: float, confidence: float) -> bool:
+        """Return whether a pose with this energy and confidence is not trusted."""
+        return self.is_beyond(energy, confidence, self._thresholds.energy, self._thresholds.confidence)
+
+    def is_beyond(self, energy: float, confidence: float, most_energy: float, least_confidence: float) -> bool:
+        """Return whether the confidence is too low, or the energy too high, also beside the median energy.
+
+        most_energy: multiple of `Objective.clamp`.
+        """
+        median = float(np.median(self._energies)) if self._energies else np.inf
+        return confidence < least_confidence or energy > max(
+            most_energy * self._clamp, self._thresholds.lost_ratio * median
+        )
 
     def commit(
         self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
     ) -> Estimate:
-        """The estimate of the next frame, remembered: with this `status` unless the pose is not to be trusted."""
+        """Update the state with the pose of the next frame; return its estimate, lost if it is not trusted."""
         trusted = not self.is_lost(energy, confidence)
         estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms)
         self.update(estimate)
         return estimate
 
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        """Update the state with the estimates of earlier frames."""
+        for estimate in estimates:
+            self.update(estimate)
+
+    def forget_last(self) -> None:
+        """Forget where the hand was: a new track starts anywhere."""
+        self.pose, self.last_trusted = None, None
+
     def update(self, estimate: Estimate) -> None:
-        """Take in the estimate of the next frame."""
+        """Update the state with the estimate of the next frame."""
         if estimate.pose is None or estimate.status is Status.LOST:
             self.pose, self.velocity = None, np.zeros(26)
             self._frames_lost += 1
-            if self._frames_lost > _RECENT_FRAMES:
+            if self._frames_lost > self._thresholds.memory_frames:
                 self.last_trusted = None
             return
         if self.pose is not None and estimate.status is Status.TRACKED:
@@ -79,13 +78,17 @@ class TrackState:
             self.velocity = np.zeros(26)
         self.pose, self.energy, self._confidence = estimate.pose, estimate.energy, estimate.confidence
         self.last_trusted, self._frames_lost = estimate.pose, 0
-        self._usual.append(estimate.energy)
+        self._energies.append(estimate.energy)
 
     @property
     def predicted_pose(self) -> Array | None:
-        """The linear prediction (27,), while the track is sure."""
-        if self.pose is None or self._confidence < self._limits.guide_confidence:
+        """Linear prediction (27,) if the last pose may guide the segmentation, else None.
+
+        A wrong pose must not guide: it would cut out what agrees with it.
+        """
+        limits = self._thresholds
+        if self.pose is None or self._confidence < limits.guide_confidence:
             return None
-        if self.energy > max(self._limits.energy, _GUIDE_RATIO * float(np.median(self._usual))):
+        if self.energy > max(limits.energy * self._clamp, limits.guide_ratio * float(np.median(self._energies))):
             return None
         return retract(self.pose, self.velocity)

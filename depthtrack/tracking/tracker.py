@@ -1,4 +1,4 @@
-"""The tracker protocol: start on a frame, then one call a frame. PSO and IK differ behind it, nowhere else."""
+"""The tracker protocol: start on a frame, then one call per frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,11 +13,13 @@ from depthtrack.types import Array
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a tracker says of one frame.
+    """What a tracker returns for one frame.
 
-    `pose` (27,), None when no hand was observed; `energy` of Eq. (1) of Oikonomidis et al. 2011 (NaN without a pose);
-    `confidence` 0 to 1: the agreement of the rendered hand with the observed one (1 less the skin term of Eq. 2);
-    `stage_ms` milliseconds spent in each stage of the tracker.
+    pose: (27,) pose vector, None if no hand was observed.
+    energy: E of Oikonomidis et al. 2011, Eq. (1); NaN without a pose.
+    confidence: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
+    status: tracked, started, lost or absent.
+    stage_ms: milliseconds spent in each stage of the tracker.
     """
 
     pose: Array | None
@@ -28,33 +30,38 @@ class Estimate:
 
 
 ABSENT = Estimate(None, float("nan"), 0.0, Status.ABSENT)
+"""Estimate of a frame without a hand."""
 
 
-class Tracker(Protocol):
-    """Follows one hand. What it knows of the past is what its estimates say, so that a run can be resumed."""
+class Guide(Protocol):
+    """Predicts where the hand is, from the estimates so far."""
+
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        """Update the state with estimates of frames that were tracked before, or had no hand.
+
+        A new tracker that restores the estimates of all frames so far continues exactly as the one that made them.
+        """
+        ...
+
+    @property
+    def predicted_pose(self) -> Array | None:
+        """Pose (27,) expected in the next frame; None if the track is not certain enough to guide the segmentation."""
+        ...
+
+
+class Tracker(Guide, Protocol):
+    """Follows one hand. Its state depends on its estimates alone, so that a run can be resumed."""
 
     name: str
     stages: tuple[str, ...]
     """Keys of `Estimate.stage_ms`."""
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
-        """Begin on this frame: refine a given pose (27,), or find one from the observation alone."""
+        """Start on this frame: refine a given pose (27,), or search for one."""
         ...
 
     def track(self, observation: Observation) -> Estimate:
-        """Follow the hand into the next frame; starts by itself where there is nothing to follow."""
-        ...
-
-    def restore(self, estimates: Sequence[Estimate]) -> None:
-        """Hear of frames that were estimated before, or had no hand, as if they had been tracked just now.
-
-        A new tracker that recalls the estimates of all frames so far goes on exactly as the one that made them.
-        """
-        ...
-
-    @property
-    def predicted_pose(self) -> Array | None:
-        """Where the hand should be in the next frame, as a pose (27,); None where that is not known well."""
+        """Follow the hand into the next frame; search if there is nothing to follow."""
         ...
 
     def close(self) -> None:

@@ -31,7 +31,7 @@ def test_the_headline_is_3000_points_and_five_by_five(film: Film) -> None:
     # One call of each of the four frames, however short the time.
     assert row.calls == 4
     assert 0 < row.frame_ms <= row.frame_ms_median
-    assert set(row.stage_ms) == {"observe", "predict", "fit", "retry"}
+    assert {"target", "predict", "fit", "retry"} <= set(row.stage_ms)
     assert 0 < row.iteration_us <= row.iteration_us_median
     assert row.frames_per_s == pytest.approx(1000 / row.frame_ms)
 

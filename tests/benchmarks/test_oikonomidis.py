@@ -155,8 +155,8 @@ def test_following_is_repeatable_and_finds_the_hand() -> None:
 
 
 def test_following_is_worse_with_heavy_noise_and_with_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
-    # The swarm follows alone, however bad things look.
-    monkeypatch.setattr("depthtrack.tracking.trackers.pso.find_pose", None)
+    # The swarm follows alone, however high the energy: a search would fail here.
+    monkeypatch.setattr("depthtrack.tracking.stages.searches.orientation_proposals", None)
     good = follow()["error_mm"]
     assert follow(depth_noise_mm=80.0, skin_flips_percent=40.0)["error_mm"] > 1.5 * good
     assert follow(particles=4, generations=1)["error_mm"] > 1.5 * good
@@ -192,7 +192,7 @@ def test_a_worker_of_another_version_refuses() -> None:
 
 def row(error: float, **values: Any) -> Row:
     measured = {"error_mm": error, "median_frame_mm": error / 2, "p95_frame_mm": 2 * error, "angle_error_deg": 3.0}
-    return following.USUAL | {"repetition": 0} | measured | {"ms_per_frame": 20.0} | values
+    return following.DEFAULTS | {"repetition": 0} | measured | {"ms_per_frame": 20.0} | values
 
 
 def said(name: str, rows: list[Row]) -> dict[str, float | None]:

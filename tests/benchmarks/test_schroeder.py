@@ -155,7 +155,7 @@ def test_a_sign_is_found_from_its_frame_alone(variant: Literal["default", "paper
 def test_signs_are_where_nothing_moves() -> None:
     poses = np.zeros((30, 27))
     poses[:, 9] = np.concatenate([np.zeros(6), np.linspace(0.1, 1, 10), np.ones(9), [2, 3, 3, 3, 4]])
-    assert schroeder_11.held(poses) == [(0, 5), (15, 24)]
+    assert schroeder_11.static_intervals(poses) == [(0, 5), (15, 24)]
 
 
 def test_postures_are_approximated_the_better_the_more_components() -> None:
@@ -184,7 +184,7 @@ def test_an_approximation_is_the_projection_onto_the_components(tmp_path: Path) 
 
 def row(error: float, **values: Any) -> Row:
     measured = dict.fromkeys(schroeder.MEASURED, 0.0) | {"error_deg": error, "error_mm": 2 * error}
-    return schroeder.USUAL | measured | {"ms_per_frame": 5.0, "frame_errors_deg": [error]} | values
+    return schroeder.DEFAULTS | measured | {"ms_per_frame": 5.0, "frame_errors_deg": [error]} | values
 
 
 def test_iterations_and_subsampling() -> None:

@@ -35,7 +35,8 @@ from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation, Segmenter
 from depthtrack.solver.keypoints import KEYPOINT_BODIES
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.tracking.trackers.ik import IkTracker
+from depthtrack.tracking.configuration import IkConfig
+from depthtrack.tracking.registry import create_tracker
 from depthtrack.viewing.calibration_picture import shown_views
 from tests.support.observations import observe
 
@@ -104,7 +105,7 @@ def test_a_calibrated_hand_is_tracked_better(made: Synthesiser, calibration: Cal
     frames, errors = range(100, 125), {}
     observations = [observe(made, i) for i in frames]
     for name, hand in (("average", HandShape()), ("calibrated", calibration.hand)):
-        tracker = IkTracker(hand)
+        tracker = create_tracker(IkConfig(), hand)
         first = tracker.start(observations[0], made.poses[frames.start])
         poses = [first.pose, *(tracker.track(o).pose for o in observations[1:])]
         truth = HandModel(TRUE_HAND), made.poses[frames.start : frames.stop]

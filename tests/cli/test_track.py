@@ -129,7 +129,7 @@ def test_mistakes_are_told_in_one_sentence(
 ) -> None:
     for arguments, expected in (
         (["track", str(recording), "-o", str(run)], "--resume"),
-        (["track", str(recording), "-o", str(run), *_QUICK, "--resume", "--seed", "9"], "seed"),
+        (["track", str(recording), "-o", str(run), *_QUICK, "--resume", "--seed", "9"], "options.seed"),
         (["track", str(tmp_path / "nothing"), "-o", str(tmp_path / "r")], "nothing"),
         (["track", str(recording), "-o", str(tmp_path / "r"), "--frames", "-1"], "--frames must be at least 1"),
         (["evaluate", str(tmp_path)], "holds no run"),

@@ -25,19 +25,20 @@ def track(recording: str, run: Path, *more: str) -> int:
 
 def test_a_run_in_synergies_stays_among_them_and_tells_which(recording: str, tmp_path: Path) -> None:
     run = tmp_path / "run"
-    assert (
-        track(recording, run, "--synergies", "leap-grasps", "--components", "4", "--rounds", "3", "--inner", "2") == 0
-    )
-    told = read_configuration(run)
-    assert (told["synergies"], told["components"], told["soft"]) == ("leap-grasps", 4, False)
-    assert (told["rounds"], told["inner"], told["residual"]) == (3, 2, None)
+    options = ("--synergies", "leap-grasps", "--components", "4", "--icp-iterations", "3", "--gn-iterations", "2")
+    assert track(recording, run, *options) == 0
+    stored = read_configuration(run)["options"]
+    assert stored["synergies"] == {"synergies": "leap-grasps", "components": 4, "synergy_prior": False}
+    assert (stored["fit"]["icp"]["icp_iterations"], stored["fit"]["icp"]["gn_iterations"]) == (3, 2)
     angles, synergies = Run.load(run).poses[:, ANGLES], load_synergies("leap-grasps").truncated(4)
     np.testing.assert_allclose(synergies.angles(synergies.project(angles)), angles, atol=1e-6)
 
 
-def test_soft_synergies_leave_all_angles_free(recording: str, tmp_path: Path) -> None:
+def test_a_synergy_prior_leaves_all_angles_free(recording: str, tmp_path: Path) -> None:
     run = tmp_path / "run"
-    assert track(recording, run, "--synergies", "leap", "--components", "4", "--soft", "--residual", "plane") == 0
+    assert (
+        track(recording, run, "--synergies", "leap", "--components", "4", "--synergy-prior", "--residual", "plane") == 0
+    )
     angles, synergies = Run.load(run).poses[:, ANGLES], load_synergies().truncated(4)
     assert np.abs(synergies.angles(synergies.project(angles)) - angles).max() > 0.05
 
@@ -58,19 +59,17 @@ def test_a_run_goes_on_only_with_the_synergies_that_it_began_with(
     postures = load_synergies().angles(np.random.default_rng(0).normal(size=(30, 20)))
     save_synergies(Synergies.fit(postures), file)
     assert track(recording, run, "--synergies", str(file), "--resume") == 2
-    assert "synergies_sha256" in capsys.readouterr().err
+    assert "digests.synergies" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("--particles", "8"), "--particles"),
-        (("--tracker", "pso", "--soft", "--rounds", "3"), "--rounds, --soft"),
-        (("--components", "3"), "say which synergies"),
-        (("--soft",), "say which synergies"),
+        (("--components", "3"), "choose a set with --synergies"),
+        (("--synergy-prior",), "choose a set with --synergies"),
         (("--synergies", "magic"), "leap-grasps"),
         (("--synergies", "leap", "--components", "21"), "1 to 20 components"),
-        (("--rounds", "0"), "rounds"),
+        (("--icp-iterations", "0"), "icp_iterations"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(
@@ -86,5 +85,16 @@ def test_options_that_make_no_sense_are_refused(
 def test_the_configuration_can_be_read_by_people(recording: str, tmp_path: Path) -> None:
     assert track(recording, tmp_path / "run") == 0
     told = json.loads((tmp_path / "run" / "run.json").read_text())
-    assert (told["tracker"], told["model"], told["rounds"], told["subsample"]) == ("ik", "skin", 5, 3)
-    assert "particles" not in told
+    assert (told["tracker"], told["options"]["fit"]["surface"], told["options"]["fit"]["subsample"]) == (
+        "ik",
+        "skin",
+        3,
+    )
+    assert "swarm" not in told["options"]
+
+
+def test_options_of_another_tracker_are_refused(recording: str, tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as ended:
+        track(recording, tmp_path / "run", "--particles", "8")
+    assert ended.value.code == 2
+    assert not (tmp_path / "run").exists()

@@ -25,12 +25,14 @@ from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.status import Status
+from depthtrack.tracking.configuration import IkConfig, PsoConfig, TrackerConfig
+from depthtrack.tracking.registry import tracker_config
 from depthtrack.tracking.tracker import Estimate
 from tests.support.dask import dask_scheduler, dask_workers
 from tests.support.workers import InThisProcess
 
 FRAMES = 8
-QUICK = "pso:particles=12,generations=6,resolution=48,ik:rounds=1,subsample=6"
+QUICK = "pso:particles=12,generations=6,resolution=48,ik:icp_iterations=1,subsample=6"
 
 # Two clusters at a time would share two cores.
 pytestmark = pytest.mark.xdist_group("dask")
@@ -51,22 +53,23 @@ def compared(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_contenders_are_read_as_people_write_them() -> None:
-    assert read_specs(["pso,ik:variant=paper,rounds=3", "pso:particles=16,resolution=64"]) == [
-        TrackerSpec("PSO", "pso"),
-        TrackerSpec("IK variant=paper rounds=3", "ik", {"variant": "paper", "rounds": 3}),
-        TrackerSpec("PSO particles=16 resolution=64", "pso", {"particles": 16, "resolution": 64}),
+def test_trackers_are_read_as_people_write_them() -> None:
+    assert read_specs(["pso,ik:surface=cylinders,icp_iterations=3", "pso:particles=16,resolution=64"]) == [
+        TrackerSpec("PSO", PsoConfig()),
+        TrackerSpec(
+            "IK surface=cylinders icp_iterations=3", tracker_config("ik", surface="cylinders", icp_iterations=3)
+        ),
+        TrackerSpec("PSO particles=16 resolution=64", tracker_config("pso", particles=16, resolution=64)),
     ]
 
 
-def test_contenders_are_read_from_a_file(tmp_path: Path) -> None:
+def test_trackers_are_read_from_a_file(tmp_path: Path) -> None:
     file = tmp_path / "trackers.toml"
-    file.write_text('["As in 2011"]\ntracker = "pso"\nvariant = "paper"\n\n[surface]\ntracker = "ik"\n')
-    first, second = read_specs([str(file)])
-    assert (first.label, first.tracker, first.options) == ("As in 2011", "pso", {"variant": "paper"})
-    assert (second.label, second.options) == ("surface", {})
-    # The budget is among the options that a run tells, though nobody gave it.
-    assert first.complete_options.items() >= {"variant": "paper", "particles": 64, "generations": 25}.items()
+    file.write_text('["As in 2011"]\ntracker = "oikonomidis2011"\n\n[surface]\ntracker = "ik"\nsubsample = 2\n')
+    assert read_specs([str(file)]) == [
+        TrackerSpec("As in 2011", tracker_config("oikonomidis2011")),
+        TrackerSpec("surface", tracker_config("ik", subsample=2)),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -76,9 +79,9 @@ def test_contenders_are_read_from_a_file(tmp_path: Path) -> None:
         ("pso,kalman", "kalman"),
         ("ik:colour=red", "colour"),
         ("pso:particles=many", "particles"),
-        ("pso:variant=fast", "variant"),
+        ("pso:renderer=fast", "renderer"),
         ("pso:seed=3", "seed"),
-        ("rounds=3", "rounds=3"),
+        ("subsample=3", "subsample=3"),
         ("pso:particles", "particles"),
         ("pso,pso", "two trackers"),
         ("nowhere.toml", "nowhere.toml"),
@@ -99,28 +102,26 @@ def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> Non
 @given(st.floats(0.5, 500), st.floats(0, 20), st.floats(0.1, 40))
 def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float) -> None:
     """Whatever a tracker's costs, linear in its work: within a step of the work, or at the least work there is."""
-    defaults: dict[str, Any] = {"particles": 64, "generations": 25}
 
-    def cost(options: dict[str, Any]) -> float:
-        return always + each * options["particles"] * options["generations"] / 1600
+    def cost(config: TrackerConfig) -> float:
+        assert isinstance(config, PsoConfig)
+        return always + each * config.swarm.particles * config.swarm.generations / 1600
 
-    budget = search(lambda size: scale_work("pso", defaults, size), cost, ms)
-    assert budget.ms == cost(budget.options)
-    least, most = cost(scale_work("pso", defaults, 1 / 32)), cost(scale_work("pso", defaults, 64))
+    budget = search(lambda size: scale_work(PsoConfig(), size), cost, ms)
+    assert budget.ms == cost(budget.config)
+    least, most = cost(scale_work(PsoConfig(), 1 / 32)), cost(scale_work(PsoConfig(), 64))
     reachable = min(max(ms, least), most)
     assert budget.ms == pytest.approx(reachable, rel=0.15)
 
 
 def test_more_work_is_more_of_everything() -> None:
-    swarm: dict[str, Any] = {"particles": 64, "generations": 25}
-    assert scale_work("pso", swarm, 1) == swarm
-    assert scale_work("pso", swarm, 4) == {"particles": 128, "generations": 50}
-    surface: dict[str, Any] = {"rounds": 5, "subsample": 3}
-    assert scale_work("ik", surface, 1) == surface
-    work = [scale_work("ik", surface, size) for size in (0.1, 0.5, 1, 2, 4, 9, 30)]
-    points_times_rounds = [options["rounds"] / options["subsample"] for options in work]
+    assert scale_work(PsoConfig(), 1) == PsoConfig()
+    assert scale_work(PsoConfig(), 4) == tracker_config("pso", particles=128, generations=50)
+    assert scale_work(IkConfig(), 1) == IkConfig()
+    fits = [scale_work(IkConfig(), size).fit for size in (0.1, 0.5, 1, 2, 4, 9, 30)]  # type: ignore[union-attr]
+    points_times_rounds = [fit.icp.icp_iterations / fit.subsample for fit in fits]
     assert points_times_rounds == sorted(points_times_rounds)
-    assert work[-1]["subsample"] == 1
+    assert fits[-1].subsample == 1
 
 
 class Idle:
@@ -155,15 +156,15 @@ def test_runs_and_results(compared: Path) -> None:
     for row, columns in zip(rows, flat, strict=True):
         run = Run.load(Path(row["run"]))
         assert len(run.index) == row["frames"] == FRAMES
-        assert run.configuration["seed"] == row["seed"]
+        assert run.configuration["options"]["seed"] == row["seed"]
         assert run.configuration["clock"] == row["clock"] == "cpu"
         assert float(columns["endpoint_error_mm_mean"]) == pytest.approx(row["endpoint_error_mm"]["mean"])
         spent = sum(values for stage, values in run.stage_ms.items() if stage != "segment")
         followed = np.array([status == "tracked" for status in run.status])
         assert row["tracker_ms"]["mean"] == pytest.approx(np.mean(np.asarray(spent)[followed]), rel=1e-3)
     # Options that were given, and those that were not, stand in the run: it can be made again.
-    assert Run.load(Path(rows[0]["run"])).configuration["particles"] == 12
-    assert Run.load(Path(rows[0]["run"])).configuration["renderer"] == "raster"
+    assert Run.load(Path(rows[0]["run"])).configuration["options"]["swarm"]["particles"] == 12
+    assert Run.load(Path(rows[0]["run"])).configuration["options"]["scoring"]["renderer"] == "raster"
 
 
 def test_a_table_has_a_line_for_each_tracker(
@@ -175,7 +176,7 @@ def test_a_table_has_a_line_for_each_tracker(
     head, pso, ik = capsys.readouterr().out.splitlines()[:3]
     assert "error mean mm" in head
     assert "PSO particles=12" in pso
-    assert "IK rounds=1" in ik
+    assert "IK icp_iterations=1" in ik
     # Nothing was tracked again.
     assert before == {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
 
@@ -231,8 +232,8 @@ def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -
         told = Run.load(Path(plan.folder)).configuration
         assert told["budget"]["equal_ms"] == 6.0
         assert told["budget"]["calibrated_ms"] > 0
-    assert Run.load(Path(plans[0].folder)).configuration["resolution"] == 48
-    assert Run.load(Path(plans[1].folder)).configuration["rounds"] == plans[1].options["rounds"]
+    assert Run.load(Path(plans[0].folder)).configuration["options"]["scoring"]["resolution"] == 48
+    assert Run.load(Path(plans[1].folder)).configuration["options"] == plans[1].options
     # A second measurement would choose a little differently; the first one stands.
     again = compare(comparison, tmp_path, InThisProcess())
     assert again == plans
@@ -241,7 +242,7 @@ def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -
 def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "everyday"
     assert main(["synth", "everyday", str(other), "--frames", "3", "--seed", "4"]) == 0
-    specs = tuple(read_specs(["ik:rounds=1,subsample=6"]))
+    specs = tuple(read_specs(["ik:icp_iterations=1,subsample=6"]))
     comparison = Comparison((Source(str(recording), frames=3), Source(str(other))), specs)
     first, second = compare(comparison, tmp_path / "out", InThisProcess())
     assert first.folder != second.folder

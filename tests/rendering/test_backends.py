@@ -6,7 +6,7 @@ import pytest
 from depthtrack.errors import DepthtrackError, InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import BACKENDS, create_scorer
-from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.selfcheck import scene
 
 

@@ -11,7 +11,7 @@ from depthtrack.cli import main
 from depthtrack.machine import usable_cores
 from depthtrack.rendering import doctor, selfcheck
 from depthtrack.rendering.doctor import Machine, Outcome, Trial, attempt
-from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.selfcheck import SelfCheck, self_check
 

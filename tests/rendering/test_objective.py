@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ANGLE_NAMES
-from depthtrack.rendering.objective import Objective, Terms, evaluate, finger_crossing
+from depthtrack.rendering.objective import Terms, evaluate, finger_crossing
+from depthtrack.rendering.options import Objective
 
 
 def test_sums_of_a_hand_counted_image() -> None:

@@ -16,12 +16,13 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective, evaluate
+from depthtrack.rendering.objective import evaluate
 from depthtrack.rendering.opengl.context import OpenGLError
 from depthtrack.rendering.opengl.impostors import HandTable, place_impostors
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.opengl.sums import sum_tiles
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.target import Target
 from tests.support import opengl_views as views

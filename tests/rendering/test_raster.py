@@ -9,7 +9,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target

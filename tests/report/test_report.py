@@ -323,7 +323,7 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
     lines = lines_of([evaluate_run(run, residuals=False) for run in runs])
     assert [(line.label, len(line.evaluations)) for line in lines] == [
         ("PSO", 1),
-        ("PSO variant=paper", 2),
+        ("OIKONOMIDIS2011", 2),
         ("IK, ik_a", 1),
         ("IK, ik_b", 1),
     ]

@@ -21,9 +21,10 @@ from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import minimise
 from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.solver.normal_equations import NormalEquations
+from depthtrack.solver.options import Residual
 from depthtrack.solver.prior import Prior, add_prior, reduced_precision
 from depthtrack.solver.problem import Solution, SolverOptions, SolverStatus, limit_gradient
-from depthtrack.solver.residuals import Residual, add_correspondences, weight
+from depthtrack.solver.residuals import add_correspondences, weight
 from depthtrack.solver.subspace import FULL, PostureSubspace, reduce_to_subspace
 from tests.support.hands import random_pose
 
@@ -288,7 +289,7 @@ def test_limit_avoidance_slows_what_moves_towards_a_limit_and_nothing_that_leave
 @given(seed=SEEDS, count=st.integers(1, 20))
 def test_likely_postures_are_those_of_probabilistic_components(seed: int, count: int) -> None:
     synergies = load_synergies().truncated(count)
-    prior = Prior.synergy_weight(synergies, 1e-6)
+    prior = Prior.from_synergies(synergies, 1e-6)
     covariance = synergies.components * synergies.variances @ synergies.components.T + np.radians(2) ** 2 * np.eye(20)
     np.testing.assert_allclose(prior.precision @ covariance, 1e-6 * np.eye(20), atol=1e-12)
     pose = random_pose(np.random.default_rng(seed))

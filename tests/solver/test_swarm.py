@@ -10,7 +10,8 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, retract, tangent_between
-from depthtrack.solver.swarm import SwarmOptions, advance, constriction, minimise, randomise
+from depthtrack.solver.options import SwarmOptions, constriction
+from depthtrack.solver.swarm import advance, minimise, randomise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid
 

@@ -8,9 +8,9 @@ import numpy as np
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective
 from depthtrack.rendering.opengl.context import Platform
 from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
 from tests.support.rendering import KINECT, random_poses, random_shape, target_of, window_on

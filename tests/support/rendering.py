@@ -8,7 +8,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target

@@ -12,13 +12,15 @@ from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.recording.status import Status
+from depthtrack.rendering.options import ScoringOptions
+from depthtrack.solver.options import SurfaceFitOptions, SurfaceName
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.stages.coarse_to_fine import DIRECT, CoarseToFine, SingleFrameFitter
-from depthtrack.tracking.state import TrackingThresholds
-from depthtrack.tracking.surfaces.registry import Model
+from depthtrack.tracking.configuration import IkConfig
+from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stage_tracker import StageTracker
+from depthtrack.tracking.stages.coarse_to_fine import DIRECT, CoarseToFine, estimate_single_frame
 from depthtrack.tracking.tracker import Estimate
-from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 from tests.support.observations import observe
 
 MODEL = HandModel(HandShape())
@@ -29,18 +31,18 @@ def made(everyday_skin: Synthesiser) -> Synthesiser:
     return everyday_skin
 
 
-def follow(made: Synthesiser, tracker: IkTracker, frames: range) -> list[Estimate]:
+def follow(made: Synthesiser, tracker: StageTracker, frames: range) -> list[Estimate]:
     first, *rest = frames
     return [tracker.start(observe(made, first), made.poses[first])] + [tracker.track(observe(made, i)) for i in rest]
 
 
 @pytest.mark.parametrize(("model", "highest_mm", "highest_deg"), [("skin", 2.0, 2.0), ("cylinders", 5.0, 6.0)])
 def test_follows_everyday_motion_rendered_from_the_skin(
-    made: Synthesiser, model: Model, highest_mm: float, highest_deg: float
+    made: Synthesiser, model: SurfaceName, highest_mm: float, highest_deg: float
 ) -> None:
     """Five ICP iterations on a third of the points, as Schroeder et al. 2014 measure."""
     frames = range(100, 140)
-    estimates = follow(made, IkTracker(made.options.hand, IkOptions(model=model)), frames)
+    estimates = follow(made, create_tracker(tracker_config("ik", surface=model), made.options.hand), frames)
     poses, truth = np.array([estimate.pose for estimate in estimates]), made.poses[frames.start : frames.stop]
     assert endpoint_error(MODEL, poses, MODEL, truth).values.mean() < highest_mm
     assert angle_error(poses, truth).values.mean() < highest_deg
@@ -49,7 +51,7 @@ def test_follows_everyday_motion_rendered_from_the_skin(
 
 @pytest.mark.parametrize("frame", [10, 150, 270])
 def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
-    estimate = IkTracker(made.options.hand).track(observe(made, frame))
+    estimate = create_tracker(IkConfig(), made.options.hand).track(observe(made, frame))
     assert estimate.status is Status.STARTED
     assert estimate.pose is not None
     assert endpoint_error(MODEL, estimate.pose[None], MODEL, made.poses[[frame]]).values[0] < 10
@@ -57,7 +59,7 @@ def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
 
 def test_finds_the_hand_again_after_a_cut(made: Synthesiser) -> None:
     """From its palm to its back."""
-    tracker = IkTracker(made.options.hand)
+    tracker = create_tracker(IkConfig(), made.options.hand)
     tracker.start(observe(made, 30), made.poses[30])
     after = [tracker.track(observe(made, frame)) for frame in (92, 93, 94)]
     assert after[-1].pose is not None
@@ -67,7 +69,7 @@ def test_finds_the_hand_again_after_a_cut(made: Synthesiser) -> None:
 
 def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
     made = Synthesiser(Synthesis(model="skin", sensor="kinect1"))
-    tracker = IkTracker(made.options.hand)
+    tracker = create_tracker(IkConfig(), made.options.hand)
     tracker.start(observe(made, 74), made.poses[74])
     assert {tracker.track(observe(made, frame)).status for frame in range(75, 86)} == {Status.TRACKED}
 
@@ -75,9 +77,9 @@ def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
 @pytest.mark.parametrize("model", ["skin", "cylinders"])
 @pytest.mark.parametrize("readings", [0, 1, 5])
 def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(
-    made: Synthesiser, model: Model, readings: int
+    made: Synthesiser, model: SurfaceName, readings: int
 ) -> None:
-    seen, tracker = observe(made, 0), IkTracker(made.options.hand, IkOptions(model=model))
+    seen, tracker = observe(made, 0), create_tracker(tracker_config("ik", surface=model), made.options.hand)
     depth = np.zeros_like(seen.depth)
     some = np.flatnonzero(seen.depth)[:readings]
     depth.flat[some] = seen.depth.flat[some]
@@ -93,15 +95,17 @@ def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
     synergies = synergies.truncated(synergies.components_for(0.99))
     frames = range(160, 280, 2)
 
-    def mean_error(options: IkOptions) -> float:
-        tracker = IkTracker(made.options.hand, replace(options, lost=TrackingThresholds(0.0, np.inf)))
+    def mean_error(used: Synergies | None = None, **options: bool) -> float:
+        never_lost = {"thresholds.confidence": 0.0, "thresholds.energy": np.inf}
+        config = tracker_config("ik", **never_lost, **({} if used is None else {"synergies": "leap"}), **options)
+        tracker = create_tracker(config, made.options.hand, synergies=used)
         poses = [tracker.start(observe(made, frames[0]), made.poses[frames[0]]).pose]
         poses += [tracker.track(observe(made, frame)).pose for frame in frames[1:]]
         return float(angle_error(np.array(poses), made.poses[frames]).values.mean())
 
-    free = mean_error(IkOptions())
-    assert mean_error(IkOptions(synergies=synergies)) < 0.7 * free
-    assert mean_error(IkOptions(synergies=synergies, soft=True)) < 0.6 * free
+    free = mean_error()
+    assert mean_error(synergies) < 0.7 * free
+    assert mean_error(synergies, synergy_prior=True) < 0.6 * free
 
 
 def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
@@ -109,8 +113,11 @@ def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
     synergies, frames = _synergies_of("signs"), [16, 108, 330]
 
     def errors(coarse_to_fine: CoarseToFine) -> np.ndarray:
-        fitter = SingleFrameFitter(made.options.hand, synergies, coarse_to_fine)
-        poses = [fitter.estimate(observe(made, frame), made.poses[frame]) for frame in frames]
+        tools, fit = Toolkit(made.options.hand, ScoringOptions(), synergies=synergies), SurfaceFitOptions(subsample=1)
+        poses = [
+            estimate_single_frame(tools, observe(made, frame), made.poses[frame], coarse_to_fine, fit).pose
+            for frame in frames
+        ]
         return angle_error(np.array(poses), made.poses[frames]).values
 
     assert errors(CoarseToFine()).max() < 1
@@ -122,19 +129,19 @@ def _synergies_of(motion: str) -> Synergies:
 
 
 def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) -> None:
-    whole = follow(made, IkTracker(made.options.hand), range(0, 8))
-    resumed = IkTracker(made.options.hand)
+    whole = follow(made, create_tracker(IkConfig(), made.options.hand), range(0, 8))
+    resumed = create_tracker(IkConfig(), made.options.hand)
     resumed.restore(whole[:5])
     for index in range(5, 8):
         np.testing.assert_array_equal(resumed.track(observe(made, index)).pose, whole[index].pose)
 
 
 def test_trackers_are_made_by_name(made: Synthesiser) -> None:
-    assert create_tracker("ik", made.options.hand, subsample=5).name == "ik"
-    assert create_tracker("pso", made.options.hand, particles=8).name == "pso"
+    assert create_tracker(tracker_config("ik", subsample=5), made.options.hand).name == "ik"
+    assert create_tracker(tracker_config("pso", particles=8), made.options.hand).name == "pso"
     with pytest.raises(InputError, match="choose one of pso, ik"):
-        create_tracker("magic", made.options.hand)
-    with pytest.raises(InputError, match="point, plane, symmetric"):
-        create_tracker("ik", made.options.hand, residual="magic")
+        tracker_config("magic")
+    with pytest.raises(InputError, match="'point', 'plane' or 'symmetric'"):
+        tracker_config("ik", residual="magic")
     with pytest.raises(InputError, match="particles"):
-        create_tracker("ik", made.options.hand, particles=8)
+        tracker_config("ik", particles=8)

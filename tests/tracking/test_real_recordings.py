@@ -9,10 +9,10 @@ from depthtrack.evaluation.segmentation import segment_sequence, summary
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run_folder import RunWriter
 from depthtrack.segmentation.observation import Segmenter
-from depthtrack.tracking.pipeline import track_sequence
-from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.pipeline import Pipeline, track_frames
+from depthtrack.tracking.registry import create_tracker, tracker_config
 
 
 @pytest.mark.parametrize(("margin", "least"), [(0.0, 0.74), (0.02, 0.81)])
@@ -22,7 +22,10 @@ def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: fl
     With its own wrist taken for the cut, the best union of colour and depth reaches 0.844.
     """
     sequence = open_sequence(real_data / "rgbd" / "open-close")
-    rows = [r.row() for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, wrist_margin=margin))]
+    rows = [
+        r.row()
+        for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, SegmentationOptions(wrist_margin=margin)))
+    ]
     report = summary(rows)
     assert report["frames_with_hand"] == len(sequence)
     assert report["mean_iou"] > least
@@ -31,7 +34,10 @@ def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: fl
 def test_the_annotated_hand_is_cut_out_by_depth_alone(real_data: Path) -> None:
     """It begins with a hand half closed, and a shoulder in view."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
-    report = summary(r.row() for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, use_colour=False)))
+    report = summary(
+        r.row()
+        for r in segment_sequence(sequence, Segmenter.for_sequence(sequence, SegmentationOptions(use_colour=False)))
+    )
     assert report["frames_with_hand"] == len(sequence)
     assert report["mean_iou"] > 0.74
 
@@ -50,19 +56,18 @@ def test_single_frames_with_a_body_in_view_show_a_hand(real_data: Path) -> None:
     assert all(o.centre[2] < 0.85 for o in found if o is not None)
 
 
-def test_the_swarm_follows_a_real_hand(real_data: Path, tmp_path: Path) -> None:
+def test_the_swarm_follows_a_real_hand(real_data: Path) -> None:
     """From nothing but the recording: joints within 15 mm of an annotation that is itself good to 5 to 10 mm."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
     truth, model = sequence.ground_truth, HandModel(HandShape())
     assert truth is not None
     assert truth.joints is not None
-    tracker = PsoTracker(model.shape, PsoOptions(resolution=96))
-    with RunWriter(tmp_path / "run", {}, ("segment", *tracker.stages)) as run:
-        rows = list(track_sequence(sequence, Segmenter.for_sequence(sequence), tracker, model, run))
+    tracker = create_tracker(tracker_config("pso", resolution=96), model.shape)
+    tracked = track_frames(sequence, Pipeline(tracker, Segmenter.for_sequence(sequence), model.shape))
     errors = [
-        np.linalg.norm(model.keypoints(row.pose) - truth.joints[index], axis=-1).mean()
-        for row in rows
-        if row.pose is not None and (index := truth.at(row.timestamp)) is not None
+        np.linalg.norm(model.keypoints(each.estimate.pose) - truth.joints[index], axis=-1).mean()
+        for each in tracked
+        if each.estimate.pose is not None and (index := truth.at(each.frame.timestamp)) is not None
     ]
     assert len(errors) >= len(sequence) - 2
     assert np.mean(errors) < 0.015

@@ -1,10 +1,7 @@
-"""Second thoughts: a pose that took one finger for the next is left, and searches respect what a wrist can do."""
+"""Recovery: poses with fingers matched to their neighbours are left, and proposals respect what a wrist allows."""
 
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,14 +15,18 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.status import Status
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.solver.swarm import SwarmOptions
+from depthtrack.rendering.scorer import Scores
+from depthtrack.solver.options import SwarmOptions
 from depthtrack.synthesis.generate import Synthesiser
-from depthtrack.tracking.proposals.global_ import hypotheses, typical_angles
-from depthtrack.tracking.proposals.local import finger_shift_proposals, local_proposals, search_one_finger
-from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.stages.swarm_search import SearchOptions, find_candidates, refine
-from depthtrack.tracking.state import TrackingThresholds, TrackState
-from depthtrack.tracking.trackers.pso import PsoOptions
+from depthtrack.tracking.candidate import evaluate
+from depthtrack.tracking.configuration import FingerOptions, PsoConfig, SwarmSearchOptions, TrackingThresholds
+from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
+from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
+from depthtrack.tracking.proposals.local import local_proposals
+from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stages.searches import swarm_search
+from depthtrack.tracking.stages.swarm import swarm_around
+from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
 
 MODEL = HandModel(HandShape())
@@ -53,11 +54,11 @@ def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
     with RasterScorer(made.options.hand) as scorer:
         scorer.set_target(o.reduced(96))
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
-        stayed, _ = refine(scorer, wrong, PsoOptions().spread, swarm, np.random.default_rng(5))
-        options = SearchOptions(apart=0.1)
+        stayed = swarm_around(scorer, wrong, PsoConfig().spread, swarm, np.random.default_rng(5)).pose
         generator = np.random.default_rng(5)
-        found, _ = find_candidates(scorer, local_proposals(wrong, generator, options.hypotheses), generator, options)
-    errors = endpoint_error(MODEL, np.stack([stayed, found[0]]), MODEL, made.poses[[frame, frame]]).values
+        starts = evaluate(scorer, local_proposals(wrong, generator, 4000))
+        found = swarm_search(scorer, starts, generator, SwarmSearchOptions(), 0.1)[0].pose
+    errors = endpoint_error(MODEL, np.stack([stayed, found]), MODEL, made.poses[[frame, frame]]).values
     assert errors[1] < 0.7 * errors[0]
 
 
@@ -74,10 +75,10 @@ def test_poses_close_by_are_possible_and_close(made: Synthesiser) -> None:
 
 def test_orientations_that_no_wrist_allows_are_left_out() -> None:
     arm, angles = np.array([0.0, 0.6, 0.8]), typical_angles(np.random.default_rng(3), 400)
-    poses = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2), arm)
+    poses = orientation_proposals(np.array([0, 0, 0.5]), angles, np.random.default_rng(2), arm)
     towards_wrist = -rotation_matrix(poses[:, 3:7])[:, :, 1]
     assert (towards_wrist @ arm > 0.15).all()
-    free = hypotheses(np.array([0, 0, 0.5]), angles, np.random.default_rng(2))
+    free = orientation_proposals(np.array([0, 0, 0.5]), angles, np.random.default_rng(2))
     assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
 
 
@@ -91,8 +92,9 @@ def test_a_finger_that_is_elsewhere_is_found(made: Synthesiser) -> None:
             wrong, angles = truth.copy(), slice(7 + 4 * finger, 11 + 4 * finger)
             straight = truth[angles][1:].sum() < np.radians(90)
             wrong[angles] = POSTURES["fist" if straight else "open"][4 * finger : 4 * finger + 4]
-            found, energy = search_one_finger(scorer, wrong, finger, np.random.default_rng(finger))
-            assert energy == scorer.score(found[None])[0]
+            best = search_one_finger(scorer, wrong, finger, np.random.default_rng(finger), FingerOptions())
+            found = best.pose
+            assert best.energy == scorer.score(found[None])[0]
             before, after = endpoint_error(MODEL, np.stack([wrong, found]), MODEL, np.stack([truth, truth])).values
             assert after < 0.4 * before
             assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))
@@ -114,7 +116,7 @@ def test_one_finger_further_undoes_a_shift(made: Synthesiser) -> None:
 
 @pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
 def test_where_a_hand_was_is_remembered_for_half_a_second(made: Synthesiser, frames: int, remembered: bool) -> None:
-    memory, pose = TrackState(TrackingThresholds()), made.poses[0]
+    memory, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
     memory.commit(pose, 5.0, 0.9, Status.TRACKED, {})
     for _ in range(frames):
         lost = memory.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {})
@@ -124,7 +126,7 @@ def test_where_a_hand_was_is_remembered_for_half_a_second(made: Synthesiser, fra
 
 
 def test_a_pose_of_unusual_energy_does_not_guide(made: Synthesiser) -> None:
-    memory, pose = TrackState(TrackingThresholds()), made.poses[0]
+    memory, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
     for _ in range(5):
         memory.commit(pose, 16.0, 0.8, Status.TRACKED, {})
         assert memory.predicted_pose is not None
@@ -137,33 +139,33 @@ def test_a_pose_of_unusual_energy_does_not_guide(made: Synthesiser) -> None:
 
 
 class _Levels:
-    """Stands for a scorer: a lower energy the nearer an angle is to what it is told."""
+    """A scorer whose energy is the difference of one angle from a given one."""
 
     def __init__(self, angle: float) -> None:
         self.angle, self.seen = angle, list[np.ndarray]()
 
-    def score(self, poses: np.ndarray) -> np.ndarray:
+    def evaluate(self, poses: np.ndarray) -> Scores:
         self.seen.append(poses.copy())
-        return np.abs(poses[:, 13] - self.angle)
+        energy = np.abs(poses[:, 13] - self.angle)
+        return Scores(energy, np.ones_like(energy))
 
 
-def test_each_of_the_best_postures_of_a_finger_leads_on(made: Synthesiser) -> None:
-    scorer = _Levels(0.7)
-    search_one_finger(scorer, made.poses[0], 1, np.random.default_rng(0))  # type: ignore[arg-type]
+def test_each_of_the_best_postures_of_a_finger_leads_to_the_next(made: Synthesiser) -> None:
+    scorer, options = _Levels(0.7), FingerOptions()
+    search_one_finger(scorer, made.poses[0], 1, np.random.default_rng(0), options)  # type: ignore[arg-type]
     first, second = scorer.seen[0], scorer.seen[1]
-    kept = first[np.argsort(scorer.score(first), kind="stable")[:8]]
-    assert np.array_equal(second[:8], kept)
-    nearest = np.argmin(np.abs(second[8:, None, 13] - kept[None, :, 13]), axis=1)
-    assert len(second) == 96
-    assert np.all(np.abs(second[:, 13] - np.tile(kept[:, 13], 12)) < 1.0)
+    kept = first[np.argsort(np.abs(first[:, 13] - 0.7), kind="stable")[: options.kept]]
+    nearest = np.argmin(np.abs(second[:, None, 13] - kept[None, :, 13]), axis=1)
+    assert len(second) == options.proposals - options.kept
+    assert np.all(np.abs(second[:, 13] - np.tile(kept[:, 13], 11)) < 1.0)
     assert len(set(nearest.tolist())) >= 4
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
 def test_a_start_does_not_depend_on_what_was_tracked_before(made: Synthesiser, name: str) -> None:
     with (
-        closing(create_tracker(name, made.options.hand)) as fresh,
-        closing(create_tracker(name, made.options.hand)) as used,
+        closing(create_tracker(tracker_config(name), made.options.hand)) as fresh,
+        closing(create_tracker(tracker_config(name), made.options.hand)) as used,
     ):
         used.start(observe(made, 30), made.poses[30])
         first, second = (tracker.start(observe(made, 120)) for tracker in (fresh, used))
@@ -179,8 +181,8 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synt
     crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
     frames[1] = replace(frames[1], skin=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
     with (
-        closing(create_tracker(name, made.options.hand)) as whole,
-        closing(create_tracker(name, made.options.hand)) as cut,
+        closing(create_tracker(tracker_config(name), made.options.hand)) as whole,
+        closing(create_tracker(tracker_config(name), made.options.hand)) as cut,
     ):
         estimates = [whole.start(frames[0], made.poses[20]), *(whole.track(frame) for frame in frames[1:])]
         assert [estimate.status for estimate in estimates[1:3]] == ["lost", "started"]
@@ -191,24 +193,11 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synt
     assert endpoint_error(MODEL, poses, MODEL, made.poses[[22, 23]]).values.max() < 10
 
 
-@pytest.mark.parametrize("name", ["ik", "pso"])
-def test_the_papers_have_no_second_thoughts(made: Synthesiser, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The hand jumps by as much as makes every other variant think again."""
-    module = {"ik": "fit_recovery", "pso": "swarm_recovery"}[name]
-    thoughts = import_module(f"depthtrack.tracking.stages.{module}").Recovery
-    thought = list[str]()
-    for method in ("search_locally", "refine_per_finger"):
-        monkeypatch.setattr(thoughts, method, _noted(method, getattr(thoughts, method), thought))
-    for variant in ("paper", "default"):
-        with closing(create_tracker(name, made.options.hand, variant=variant)) as tracker:
-            tracker.start(observe(made, 20), made.poses[20])
-            tracker.track(observe(made, 130))
-        assert bool(thought) == (variant == "default")
-
-
-def _noted(method: str, original: Callable[..., Any], thought: list[str]) -> Callable[..., Any]:
-    def noted(*given: Any) -> Any:
-        thought.append(method)
-        return original(*given)
-
-    return noted
+@pytest.mark.parametrize(("name", "recovers"), [("ik", 1), ("pso", 1), ("schroeder2014", 0), ("oikonomidis2011", 0)])
+def test_the_papers_trackers_do_not_recover(made: Synthesiser, name: str, recovers: bool) -> None:
+    """The hand jumps so far that each other tracker searches near the pose."""
+    with closing(create_tracker(tracker_config(name), made.options.hand)) as tracker:
+        tracker.start(observe(made, 20), made.poses[20])
+        estimate = tracker.track(observe(made, 130))
+    assert ("recover" in tracker.stages) == recovers
+    assert (estimate.stage_ms.get("recover", 0) > 1) == recovers

@@ -7,18 +7,17 @@ from typing import Any, Literal
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+from depthtrack.benchmarks.papers.following import without_recovery
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
-from depthtrack.tracking.stages.swarm_recovery import RecoveryOptions
-from depthtrack.tracking.state import TrackingThresholds
-from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker
+from depthtrack.tracking.registry import create_tracker, tracker_config
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
 REPETITIONS, QUICK_REPETITIONS = 20, 3
-USUAL: Cell = {
+DEFAULTS: Cell = {
     "distance_m": 0.5,
     "viewpoint": 0,
     "depth_noise_mm": 0.0,
@@ -29,21 +28,22 @@ USUAL: Cell = {
 """What an experiment leaves as it is: the budget that the paper retained, half a metre, a perfect sensor."""
 
 
+TRACKERS = {"default": "pso", "paper": "oikonomidis2011"}
+"""Tracker of each variant."""
+
+
 def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
     """Every condition, a change from the usual one, as often as the options ask, each time with another seed."""
     return [
-        USUAL | condition | how(options) | {"frames": options.frames, "repetition": seed}
+        DEFAULTS | condition | tracker_cell(options) | {"frames": options.frames, "repetition": seed}
         for condition in conditions
         for seed in options.seeds(REPETITIONS, QUICK_REPETITIONS)
     ]
 
 
-def how(options: ExperimentOptions) -> Cell:
+def tracker_cell(options: ExperimentOptions) -> Cell:
     """The part of a cell that says how the tracker works."""
     return {"variant": options.variant, "renderer": options.renderer, "resolution": options.side}
-
-
-_NEVER = TrackingThresholds(confidence=0.0, energy=np.inf)
 
 
 def follow(
@@ -74,18 +74,17 @@ def follow(
             frames=frames,
         )
     )
-    options = PsoOptions(
-        variant=variant,
-        particles=particles,
-        generations=generations,
-        seed=repetition,
-        renderer=renderer,
-        resolution=resolution,
-        # Never lost: a search would cost more than many frames of a small swarm, and noise is no loss.
-        lost=_NEVER,
-        recovery=RecoveryOptions(every=0, accept_finger=0, doubted=_NEVER),
+    config = without_recovery(
+        tracker_config(
+            TRACKERS[variant],
+            particles=particles,
+            generations=generations,
+            seed=repetition,
+            renderer=renderer,
+            resolution=resolution,
+        )
     )
-    with closing(PsoTracker(seen.hand, options)) as tracker:
+    with closing(create_tracker(config, seen.hand)) as tracker:
         estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]
     model, poses = HandModel(seen.hand), np.array([estimate.pose for estimate in estimates])
     error = endpoint_error(model, poses, model, seen.poses).statistics()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers import oikonomidis
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.benchmarks.papers.plot import mark
 from depthtrack.evaluation.sweep.rows import Cell, Row
@@ -22,18 +22,18 @@ PAPER_MM = 5.0
 def cells(options: ExperimentOptions) -> list[Cell]:
     particles = QUICK_PARTICLES if options.quick else PARTICLES
     generations = QUICK_GENERATIONS if options.quick else GENERATIONS
-    return following.cells(options, ({"particles": p, "generations": g} for p in particles for g in generations))
+    return oikonomidis.cells(options, ({"particles": p, "generations": g} for p in particles for g in generations))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    return following.tabulate(rows, ("particles", "generations"))
+    return oikonomidis.tabulate(rows, ("particles", "generations"))
 
 
 def compare(rows: Sequence[Row]) -> list[Comparison]:
     table = tabulate(rows)
     larger = [line["error_mm"] for line in table if all(line[name] >= least for name, least in RETAINED.items())]
     speeds = [1000 / line["ms_per_frame"] for line in table if RETAINED.items() <= line.items()]
-    ours = following.median_error(rows, **RETAINED)
+    ours = oikonomidis.median_error(rows, **RETAINED)
     return [
         Comparison("error at 64 particles x 25 generations", "5 mm (its Fig. 2b, 0.5 m)", ours, "mm"),
         Comparison("what more of either gains at most", "0.5 mm", None if ours is None else ours - min(larger), "mm"),
@@ -61,9 +61,9 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 EXPERIMENT = Experiment(
     "oikonomidis-2a",
     "Error against particles and generations",
-    f"{following.OIKONOMIDIS_2011}, Fig. 2a",
+    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2a",
     cells,
-    following.follow,
+    oikonomidis.follow,
     tabulate,
     compare,
     draw,

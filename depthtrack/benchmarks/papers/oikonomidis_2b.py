@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers import oikonomidis
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
@@ -14,15 +14,15 @@ PAPER = {0.5: 5.0, 2.5: 7.5}
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    return following.cells(options, ({"distance_m": d} for d in (QUICK_DISTANCES if options.quick else DISTANCES)))
+    return oikonomidis.cells(options, ({"distance_m": d} for d in (QUICK_DISTANCES if options.quick else DISTANCES)))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    return following.tabulate(rows, ("distance_m",))
+    return oikonomidis.tabulate(rows, ("distance_m",))
 
 
 def compare(rows: Sequence[Row]) -> list[Comparison]:
-    near, far = (following.median_error(rows, distance_m=distance) for distance in PAPER)
+    near, far = (oikonomidis.median_error(rows, distance_m=distance) for distance in PAPER)
     return [
         Comparison("error at 0.5 m", "5 mm", near, "mm"),
         Comparison("error at 2.5 m", "at most 7.5 mm", far, "mm"),
@@ -44,9 +44,9 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 EXPERIMENT = Experiment(
     "oikonomidis-2b",
     "Error against the distance from the sensor",
-    f"{following.OIKONOMIDIS_2011}, Fig. 2b",
+    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2b",
     cells,
-    following.follow,
+    oikonomidis.follow,
     tabulate,
     compare,
     draw,

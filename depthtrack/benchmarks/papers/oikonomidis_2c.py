@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers import oikonomidis
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
@@ -19,18 +19,18 @@ PAPER_MM = (5.0, 25.0)
 def cells(options: ExperimentOptions) -> list[Cell]:
     noise = QUICK_NOISE_MM if options.quick else NOISE_MM
     flips = QUICK_FLIPS_PERCENT if options.quick else FLIPS_PERCENT
-    return following.cells(options, ({"depth_noise_mm": n, "skin_flips_percent": f} for f in flips for n in noise))
+    return oikonomidis.cells(options, ({"depth_noise_mm": n, "skin_flips_percent": f} for f in flips for n in noise))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    return following.tabulate(rows, ("skin_flips_percent", "depth_noise_mm"))
+    return oikonomidis.tabulate(rows, ("skin_flips_percent", "depth_noise_mm"))
 
 
 def compare(rows: Sequence[Row]) -> list[Comparison]:
     errors = [line["error_mm"] for line in tabulate(rows)]
     return [
         Comparison(
-            "error without noise", "5 mm", following.median_error(rows, depth_noise_mm=0, skin_flips_percent=0), "mm"
+            "error without noise", "5 mm", oikonomidis.median_error(rows, depth_noise_mm=0, skin_flips_percent=0), "mm"
         ),
         Comparison("largest error, of all levels of noise", "25 mm", max(errors), "mm"),
     ]
@@ -50,9 +50,9 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 EXPERIMENT = Experiment(
     "oikonomidis-2c",
     "Error against noise in depth and skin labels",
-    f"{following.OIKONOMIDIS_2011}, Fig. 2c",
+    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2c",
     cells,
-    following.follow,
+    oikonomidis.follow,
     tabulate,
     compare,
     draw,

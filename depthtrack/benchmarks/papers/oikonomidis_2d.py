@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers import oikonomidis
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.synthesis.viewpoint import VIEWPOINT_COUNT
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    return following.cells(options, ({"viewpoint": viewpoint} for viewpoint in range(VIEWPOINT_COUNT)))
+    return oikonomidis.cells(options, ({"viewpoint": viewpoint} for viewpoint in range(VIEWPOINT_COUNT)))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    return following.tabulate(rows, ("viewpoint",))
+    return oikonomidis.tabulate(rows, ("viewpoint",))
 
 
 def compare(rows: Sequence[Row]) -> list[Comparison]:
@@ -54,9 +54,9 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 EXPERIMENT = Experiment(
     "oikonomidis-2d",
     "Error from eight viewpoints",
-    f"{following.OIKONOMIDIS_2011}, Fig. 2d",
+    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2d",
     cells,
-    following.follow,
+    oikonomidis.follow,
     tabulate,
     compare,
     draw,

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import oikonomidis as following
+from depthtrack.benchmarks.papers import oikonomidis
 from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
 from depthtrack.benchmarks.papers.plot import mark
 from depthtrack.evaluation.metrics import endpoint_error
@@ -17,7 +17,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
-from depthtrack.tracking.trackers.pso import PsoOptions, PsoTracker
+from depthtrack.tracking.registry import create_tracker, tracker_config
 
 FRAMES = 45
 """Frames at regular intervals; the paper took its 45 from a real recording, of which it held tracked poses for true."""
@@ -33,7 +33,7 @@ def cells(options: ExperimentOptions) -> list[Cell]:
     count = len(film(Synthesis(frames=options.frames)))
     chosen = np.linspace(0, count, min(FRAMES, count), endpoint=False)
     return [
-        following.how(options) | {"frame": int(frame), "repetition": seed}
+        oikonomidis.tracker_cell(options) | {"frame": int(frame), "repetition": seed}
         for frame in chosen
         for seed in options.seeds(SEEDS, QUICK_SEEDS)
     ]
@@ -53,8 +53,8 @@ def measure(
     back of the hand is taken for its inside.
     """
     seen = film(Synthesis())
-    options = PsoOptions(variant=variant, seed=repetition, renderer=renderer, resolution=resolution)
-    with closing(PsoTracker(seen.hand, options)) as tracker:
+    config = tracker_config(oikonomidis.TRACKERS[variant], seed=repetition, renderer=renderer, resolution=resolution)
+    with closing(create_tracker(config, seen.hand)) as tracker:
         estimate = tracker.start(seen[frame])
     assert estimate.pose is not None
     model, true_pose = HandModel(seen.hand), seen.poses[frame]
@@ -121,7 +121,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 EXPERIMENT = Experiment(
     "oikonomidis-4",
     "Error of poses found in a single frame",
-    f"{following.OIKONOMIDIS_2011}, Fig. 4",
+    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 4",
     cells,
     measure,
     tabulate,

@@ -8,19 +8,18 @@ from typing import Any, Literal
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+from depthtrack.benchmarks.papers.following import without_recovery
 from depthtrack.benchmarks.papers.synergy_sources import basis
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import film
-from depthtrack.tracking.stages.fit_recovery import RecoveryOptions
-from depthtrack.tracking.state import TrackingThresholds
+from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.tracker import Estimate
-from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 
 SCHROEDER_2014 = "Schroeder, Maycock, Ritter and Botsch, ICRA 2014"
-USUAL: Cell = {
+DEFAULTS: Cell = {
     "motion": "everyday",
     "model": "skin",
     "icp_iterations": 5,
@@ -32,9 +31,13 @@ USUAL: Cell = {
 """What an experiment leaves as it is: five ICP iterations on a third of the points, all degrees of freedom."""
 
 
+TRACKERS = {"default": "ik", "paper": "schroeder2014"}
+"""Tracker of each variant."""
+
+
 def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
     """Every condition, a change from the usual one. The tracker draws nothing at random: once is enough."""
-    return [USUAL | condition | {"variant": options.variant, "frames": options.frames} for condition in conditions]
+    return [DEFAULTS | condition | {"variant": options.variant, "frames": options.frames} for condition in conditions]
 
 
 def follow(
@@ -61,19 +64,18 @@ def follow(
     on an idle core, whoever else is at work.
     """
     seen = film(Synthesis(motion=motion, model="skin", frames=frames))
-    options = IkOptions(
-        variant=variant,
-        model=model,
-        rounds=icp_iterations,
-        subsample=subsampling,
-        synergies=None if synergies is None else basis(synergies).synergies.truncated(components or 20),
-        soft=soft,
-        # Never lost: what is measured is following, and a search would put right what an experiment is about.
-        lost=TrackingThresholds(confidence=0.0, energy=np.inf),
-        recovery=RecoveryOptions(every=0, accept_finger=0),
+    config = without_recovery(
+        tracker_config(
+            TRACKERS[variant],
+            surface=model,
+            icp_iterations=icp_iterations,
+            subsample=subsampling,
+            **({} if synergies is None else {"synergies": synergies, "synergy_prior": soft}),
+        )
     )
+    known = None if synergies is None else basis(synergies).synergies.truncated(components or 20)
     points, seconds, estimates = [], [], list[Estimate]()
-    with closing(IkTracker(seen.hand, options)) as tracker:
+    with closing(create_tracker(config, seen.hand, synergies=known)) as tracker:
         for index in range(len(seen)):
             observation, begun = seen.again(index), process_time()
             if index == 0:

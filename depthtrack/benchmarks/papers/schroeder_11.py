@@ -1,6 +1,7 @@
 """Fig. 11 of Schroeder et al. 2014 and its text: postures of signs from single frames, with a hierarchy and without."""
 
 from collections.abc import Sequence
+from contextlib import closing
 from functools import lru_cache
 from time import process_time
 from typing import Literal
@@ -17,10 +18,17 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
-from depthtrack.solver.icp import PAPER_ICP, IcpOptions
+from depthtrack.rendering.options import ScoringOptions
+from depthtrack.solver.options import PAPER_ICP, IcpOptions, SurfaceFitOptions
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film, film
-from depthtrack.tracking.stages.coarse_to_fine import DIRECT, PAPER_COARSE_TO_FINE, CoarseToFine, SingleFrameFitter
+from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.stages.coarse_to_fine import (
+    DIRECT,
+    PAPER_COARSE_TO_FINE,
+    CoarseToFine,
+    estimate_single_frame,
+)
 from depthtrack.types import Array
 
 Way = Literal["hierarchical", "all angles at once"]
@@ -62,13 +70,12 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
     coarse_to_fine = (
         DIRECT if way == "all angles at once" else PAPER_COARSE_TO_FINE if variant == "paper" else CoarseToFine()
     )
-    fitter = SingleFrameFitter(
-        seen.hand, known, coarse_to_fine, PAPER_ICP if variant == "paper" else IcpOptions(), seed=repetition
-    )
+    fit = SurfaceFitOptions(subsample=1, icp=PAPER_ICP if variant == "paper" else IcpOptions())
     _compile()
-    observation, begun = seen.again(frame), process_time()
-    pose = fitter.estimate(observation, seen.poses[frame])
-    seconds = process_time() - begun
+    with closing(Toolkit(seen.hand, ScoringOptions(), synergies=known)) as tools:
+        observation, begun = seen.again(frame), process_time()
+        pose = estimate_single_frame(tools, observation, seen.poses[frame], coarse_to_fine, fit, repetition).pose
+        seconds = process_time() - begun
     hand, pose, true = HandModel(seen.hand), pose[None], seen.poses[[frame]]
     return {
         "frame": frame,
@@ -78,7 +85,7 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
     }
 
 
-def held(poses: Array) -> list[tuple[int, int]]:
+def static_intervals(poses: Array) -> list[tuple[int, int]]:
     """First and last frame of every stretch of poses (T, 27) in which nothing moves for a while."""
     still = np.abs(np.diff(poses, axis=0)).max(axis=1) < 1e-9
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
@@ -90,7 +97,7 @@ def _film(frames: int | None) -> Film:
 
 
 def _signs(frames: int | None) -> list[tuple[int, int]]:
-    found = held(_film(frames).poses)
+    found = static_intervals(_film(frames).poses)
     if not found:
         raise InputError(f"the first {frames} frames of {MOTION} hold no sign: ask for 25 or more")
     return found
@@ -108,10 +115,10 @@ def _without(sign: int) -> Synergies:
 def _compile() -> None:
     """Let the first frame that is timed find everything compiled."""
     seen = _film(None)
-    for coarse_to_fine, fit in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
-        SingleFrameFitter(seen.hand, bases.basis(MOTION).synergies, coarse_to_fine, fit, subsample=50).estimate(
-            seen.again(0), seen.poses[0]
-        )
+    for coarse_to_fine, icp in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
+        fit = SurfaceFitOptions(subsample=50, icp=icp)
+        with closing(Toolkit(seen.hand, ScoringOptions(), synergies=bases.basis(MOTION).synergies)) as tools:
+            estimate_single_frame(tools, seen.again(0), seen.poses[0], coarse_to_fine, fit)
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:

@@ -17,7 +17,7 @@ REDUCED = 6
 """The paper's (6 + 6) degrees of freedom."""
 PAPER_DEG = {"skin": 2.0, "cylinders": 4.0}
 """Read from the text: all degrees of freedom."""
-BASES = (schroeder.USUAL["motion"], "leap")
+BASES = (schroeder.DEFAULTS["motion"], "leap")
 """The paper's synergies and motions come from the same recordings: so do the motion's own; and those of other hands."""
 ALL_ANGLES = 21
 """Where all angles stand on the plot's axis of synergies."""
@@ -95,7 +95,7 @@ def _names(rows: Sequence[Row]) -> list[str]:
 
 
 def _label(name: str) -> str:
-    return "of this motion" if name == schroeder.USUAL["motion"] else f"'{bases.label(name)}'"
+    return "of this motion" if name == schroeder.DEFAULTS["motion"] else f"'{bases.label(name)}'"
 
 
 def _hertz(rows: Sequence[Row], components: int | None) -> float | None:

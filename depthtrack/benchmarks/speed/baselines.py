@@ -16,7 +16,8 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective, Terms, evaluate
+from depthtrack.rendering.objective import Terms, evaluate
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Array32, Depth

@@ -23,14 +23,16 @@ from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.solver.icp import IcpFitter
-from depthtrack.solver.residuals import Residual
+from depthtrack.solver.options import IcpOptions, Residual, SurfaceName
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import Film
 from depthtrack.text_table import aligned
-from depthtrack.tracking.surfaces.registry import Model, make_surface
+from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stage_tracker import StageTracker
+from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.tracking.tracker import Estimate
-from depthtrack.tracking.trackers.ik import IkOptions, IkTracker
 from depthtrack.types import Array
 
 Freedom = Literal["26", "6+6"]
@@ -46,23 +48,29 @@ class Setting:
     """What is measured: every `subsample`-th point, matched to `model` by `residual`, `freedom` degrees of freedom,
     `icp` rounds of correspondences with at most `inner` Gauss-Newton steps each."""
 
-    model: Model = "skin"
+    model: SurfaceName = "skin"
     residual: Residual = "symmetric"
     freedom: Freedom = "26"
     subsample: int = 3
     icp: int = 5
     inner: int = 5
 
-    def options(self, film: Film) -> IkOptions:
-        """Of a tracker that works like this."""
-        return IkOptions(
-            model=self.model,
+    @property
+    def config(self) -> TrackerConfig:
+        """Configuration of a tracker with this setting."""
+        return tracker_config(
+            "ik",
+            surface=self.model,
             residual=self.residual,
-            rounds=self.icp,
-            inner=self.inner,
+            icp_iterations=self.icp,
+            gn_iterations=self.inner,
             subsample=self.subsample,
-            synergies=None if self.freedom == "26" else Synergies.fit(film.poses[:, ANGLES]).truncated(SYNERGIES),
+            **({} if self.freedom == "26" else {"synergies": "leap"}),
         )
+
+    def synergies(self, film: Film) -> Synergies | None:
+        """Return the synergies of the film's own motion, None with all degrees of freedom."""
+        return None if self.freedom == "26" else Synergies.fit(film.poses[:, ANGLES]).truncated(SYNERGIES)
 
 
 HEADLINE = Setting()
@@ -70,8 +78,8 @@ SETTINGS: tuple[Setting, ...] = tuple(
     dict.fromkeys(
         [
             HEADLINE,
-            *(Setting(*each) for each in product(get_args(Model), get_args(Residual), get_args(Freedom))),
-            *(Setting(model, subsample=n) for model in get_args(Model) for n in (9, 1)),
+            *(Setting(*each) for each in product(get_args(SurfaceName), get_args(Residual), get_args(Freedom))),
+            *(Setting(model, subsample=n) for model in get_args(SurfaceName) for n in (9, 1)),
             *(Setting(icp=icp, inner=inner) for icp, inner in ((5, 1), (10, 5))),
         ]
     )
@@ -88,7 +96,7 @@ class IkRow:
     """
 
     points: int
-    model: Model
+    model: SurfaceName
     residual: Residual
     freedom: Freedom
     threads: int
@@ -145,7 +153,7 @@ def measure(film: Film, setting: Setting, seconds: float) -> IkRow:
     """The row of a setting, on four frames of the film, each reached from the two before it."""
     frames = [round(at * film.recording.rate) for at in FRAME_TIMES]
     share = seconds / len(frames) / 2
-    with closing(IkTracker(film.hand, setting.options(film))) as tracker:
+    with closing(create_tracker(setting.config, film.hand, synergies=setting.synergies(film))) as tracker:
         timed = [_time_frame(tracker, film, index, share) for index in frames]
     poses, frame_s = np.array([each.pose for each in timed]), [each.seconds for each in timed]
     iteration_s = [
@@ -166,7 +174,7 @@ def measure(film: Film, setting: Setting, seconds: float) -> IkRow:
         iteration_us_median=1e6 * iteration_median,
         frame_ms=1e3 * frame,
         frame_ms_median=1e3 * frame_median,
-        stage_ms={stage: float(np.mean([each.stage_ms[stage] for each in timed])) for stage in IkTracker.stages},
+        stage_ms={stage: float(np.mean([each.stage_ms[stage] for each in timed])) for stage in tracker.stages},
         frames_per_s=1 / frame,
         frames_per_s_median=1 / frame_median,
         calls=sum(map(len, frame_s)),
@@ -184,7 +192,7 @@ class _Timed(NamedTuple):
     stage_ms: dict[str, float]
 
 
-def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> _Timed:
+def _time_frame(tracker: StageTracker, film: Film, index: int, seconds: float) -> _Timed:
     """How long the tracker takes from the frame before to this one."""
     before = [tracker.start(film[index - 2], film.poses[index - 2]), tracker.track(film[index - 1])]
     made = list[Estimate]()
@@ -204,11 +212,16 @@ def _time_frame(tracker: IkTracker, film: Film, index: int, seconds: float) -> _
 
 def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
     """How long each fit to a frame took, from `pose` (27,), without the alignment of the whole hand before it."""
-    options = setting.options(film)
-    fitting = replace(options.fitting, rigid_iterations=0)
-    synergies = options.chosen_synergies
+    synergies = setting.synergies(film)
     space = FULL if synergies is None else PostureSubspace.of(synergies)
-    fitter = IcpFitter(film.hand, make_surface(setting.model, film.hand), fitting)
+    options = replace(
+        IcpOptions(),
+        residual=setting.residual,
+        icp_iterations=setting.icp,
+        gn_iterations=setting.inner,
+        rigid_iterations=0,
+    )
+    fitter = IcpFitter(film.hand, make_surface(setting.model, film.hand), options)
     fitter.set_target(film[index], setting.subsample)
     fitter.fit(pose, space)
     return time_calls(partial(fitter.fit, pose, space), seconds)
@@ -244,7 +257,7 @@ def as_text(report: IkReport) -> str:
             "",
             *aligned([head, *lines], left=2),
             "",
-            "frame: points and normals of all pixels (observe), predict, align and fit, retry, energy and confidence",
+            "frame: scoring target, prediction, point cloud with normals, alignment, fit, energy and confidence",
             *(f"first row, median: {_stages(row)}" for row in report.rows[:1]),
             "iteration: correspondences, and the Gauss-Newton steps on them; ICP: iterations x steps, at most",
             "Schroeder et al. 2014, on eight threads: 25 frames a second with 26 DoF, 30 with 6+6",

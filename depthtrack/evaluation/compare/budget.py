@@ -5,15 +5,17 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.hand.shape import HandShape
+from depthtrack.options import with_options
 from depthtrack.recording.sequence import Sequence as Recording
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Estimate
 
@@ -31,60 +33,65 @@ Stretch = tuple[Estimate, list[Observation]]
 
 @dataclass(frozen=True)
 class Budget:
-    """What calibration chose: the `options` that set the work, and the median frame's `ms` of CPU time with them."""
+    """What calibration chose.
 
-    options: dict[str, Any]
+    config: tracker with the work that takes the time.
+    ms: CPU milliseconds of the median frame with it.
+    """
+
+    config: TrackerConfig
     ms: float
 
 
-def scale_work(tracker: str, options: dict[str, Any], size: float) -> dict[str, Any]:
-    """The options that set a tracker's work, at `size` times what all its `options` ask for.
+def scale_work(config: TrackerConfig, size: float) -> TrackerConfig:
+    """Return the configuration with `size` times its work.
 
-    The swarm keeps the ratio of its generations to its particles, along which the error falls fastest (Oikonomidis
-    et al. 2011, Fig. 2a). Surface fitting first takes more of the points, then more rounds.
+    A swarm keeps the ratio of its generations to its particles, along which the error falls fastest (Oikonomidis et
+    al. 2011, Fig. 2a). Surface fits first take more of the points, then more rounds.
     """
-    if tracker == "pso":
+    changed: dict[str, int] = {}
+    swarm, fit = getattr(config, "swarm", None), getattr(config, "fit", None)
+    if swarm is not None:
         side = math.sqrt(size)
-        particles, generations = options["particles"] * side, options["generations"] * side
-        return {"particles": max(4, round(particles)), "generations": max(1, round(generations))}
-    step = max(1, round(options["subsample"] / math.sqrt(max(size, 1))))
-    rounds = options["rounds"] * size * step / options["subsample"]
-    return {"rounds": min(1000, max(1, round(rounds))), "subsample": step}
+        changed["swarm.particles"] = max(4, round(swarm.particles * side))
+        changed["swarm.generations"] = max(1, round(swarm.generations * side))
+    if fit is not None:
+        step = max(1, round(fit.subsample / math.sqrt(max(size, 1))))
+        iterations = fit.icp.icp_iterations * size * step / fit.subsample
+        changed["fit.icp.icp_iterations"] = min(1000, max(1, round(iterations)))
+        changed["fit.subsample"] = step
+    return with_options(config, changed)
 
 
 def calibrate(
-    recording: Recording,
-    count: int,
-    segmenter: Segmenter,
-    hand: HandShape,
-    tracker: str,
-    options: dict[str, Any],
-    ms: float,
+    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig, ms: float
 ) -> Budget:
-    """Find the work with which a frame takes `ms` of CPU time, by timing some at several places of the first `count`.
+    """Return the work with which a frame takes `ms` of CPU time, from frames timed at several places.
 
-    Where even the least or the most work misses `ms`, the nearest is taken; its own time is told. Where the hand is not
-    found, nothing is chosen.
+    count: number of frames of the recording that are used.
+
+    If even the least or the most work misses `ms`, the nearest is chosen, with its own time. If the hand is not found
+    anywhere, the configuration stays as it is and the time is NaN.
     """
-    places = _stretches(recording, count, segmenter, hand, tracker, options)
+    places = _stretches(recording, count, segmenter, hand, config)
     if not places:
-        return Budget({}, float("nan"))
-
-    def cost(chosen: dict[str, Any]) -> float:
-        return _cost(places, hand, tracker, options | chosen)
-
-    return search(lambda size: scale_work(tracker, options, size), cost, ms)
+        return Budget(config, float("nan"))
+    return search(lambda size: scale_work(config, size), lambda chosen: _cost(places, hand, chosen), ms)
 
 
-def search(at: Callable[[float], dict[str, Any]], cost: Callable[[dict[str, Any]], float], ms: float) -> Budget:
-    """The budget nearest to `ms`: `at` gives the options of a size, `cost` their milliseconds, about linear in size."""
+def search(at: Callable[[float], TrackerConfig], cost: Callable[[TrackerConfig], float], ms: float) -> Budget:
+    """Return the budget nearest to `ms`.
+
+    at: returns the configuration of a size.
+    cost: returns its milliseconds, about linear in size.
+    """
     tried: dict[float, Budget] = {}
     size = 1.0
     for _ in range(TRIES):
-        options = at(size)
-        if any(budget.options == options for budget in tried.values()):
+        config = at(size)
+        if any(budget.config == config for budget in tried.values()):
             break
-        tried[size] = Budget(options, cost(options))
+        tried[size] = Budget(config, cost(config))
         if abs(tried[size].ms / ms - 1) <= CLOSE:
             break
         size = _next_size(tried, ms)
@@ -92,7 +99,7 @@ def search(at: Callable[[float], dict[str, Any]], cost: Callable[[dict[str, Any]
 
 
 def _next_size(tried: dict[float, Budget], ms: float) -> float:
-    """Where the line through the two tries around `ms`, or nearest to it, reaches it."""
+    """Return where the line through the two tries around `ms`, or nearest to it, reaches it."""
     sizes = sorted(tried)
     if len(sizes) == 1:
         # Some of the time is spent whatever the size: the first step goes further than in proportion.
@@ -104,33 +111,31 @@ def _next_size(tried: dict[float, Budget], ms: float) -> float:
     return min(max(wanted, SMALLEST), LARGEST)
 
 
-def _cost(places: Sequence[Stretch], hand: HandShape, tracker: str, options: dict[str, Any]) -> float:
-    """CPU milliseconds of an ordinary tracked frame, the median: a frame in doubt costs a search, whatever the work."""
+def _cost(places: Sequence[Stretch], hand: HandShape, config: TrackerConfig) -> float:
+    """Return CPU milliseconds of the median tracked frame; a frame that triggers a search costs more at any size."""
     spent: list[float] = []
-    with closing(CpuTimed(create_tracker(tracker, hand, **options))) as timed:
+    with closing(CpuTimed(create_tracker(config, hand))) as timed:
         for first, following in places:
             timed.restore([first])
-            # The first frame after a recall also warms up caches; it counts for nothing.
+            # The first frame after a restore also warms up caches and is left out.
             estimates = [timed.track(observation) for observation in following][1:]
             spent += [sum(estimate.stage_ms.values()) for estimate in estimates if estimate.status is Status.TRACKED]
     return float(np.median(spent)) if spent else float("inf")
 
 
 def _stretches(
-    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, tracker: str, options: dict[str, Any]
+    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig
 ) -> list[Stretch]:
-    """Places spread over the recording where the tracker, with the options as they are, finds and keeps the hand."""
+    """Return places spread over the recording where the tracker finds and keeps the hand."""
     length = min(STRETCH + 2, count)
     firsts = sorted({round(place) for place in np.linspace(0, count - length, PLACES)})
     found = []
-    with closing(create_tracker(tracker, hand, **options)) as finder:
-        for first in firsts:
-            segmenter.reset()
+    for first in firsts:
+        segmenter.reset()
+        with closing(create_tracker(config, hand)) as tracker:
             frames = recording.frames(range(first, first + length))
-            seen = [observation for observation in map(segmenter.segment, frames) if observation is not None]
-            if len(seen) < 3:
-                continue
-            start = finder.start(seen[0])
-            if start.status.is_trusted:
-                found.append((start, seen[1:]))
+            tracked = list(track_frames(frames, Pipeline(tracker, segmenter, hand)))
+        seen = [each for each in tracked if each.observation is not None]
+        if len(seen) >= 3 and seen[0].estimate.status.is_trusted:
+            found.append((seen[0].estimate, [each.observation for each in seen[1:] if each.observation is not None]))
     return found

@@ -12,6 +12,7 @@ from depthtrack.evaluation.compare.running import FrameCount, PlannedRun, Source
 from depthtrack.evaluation.compare.specs import TrackerSpec
 from depthtrack.evaluation.sweep.rows import Cell, Journal
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
+from depthtrack.options import to_data
 
 MOST_RUNS = 100_000
 _LOOK_EVERY = 0.4
@@ -81,11 +82,11 @@ def _plans(comparison: Comparison, folder: Path, budgets: dict[tuple[int, int], 
     for s, (source, name) in enumerate(zip(comparison.sources, names, strict=True)):
         for c, spec in enumerate(comparison.specs):
             budget = budgets.get((s, c))
-            options = spec.complete_options | (budget["chosen"] if budget else {})
+            options = budget["chosen"] if budget else to_data(spec.config)
             told = budget and {"equal_ms": comparison.equal_ms, "calibrated_ms": budget["calibrated_ms"]}
             for seed in range(comparison.seed, comparison.seed + comparison.repeats):
                 run = folder / "runs" / f"{name}_{spec.slug}_{seed}"
-                plans.append(PlannedRun(str(run), source, spec.label, spec.tracker, options, seed, told))
+                plans.append(PlannedRun(str(run), source, spec.label, spec.config.name, options, seed, told))
     return plans
 
 
@@ -102,8 +103,8 @@ def _budgets(
     cells: list[Cell] = [
         {
             "source": asdict(comparison.sources[s]),
-            "tracker": comparison.specs[c].tracker,
-            "options": comparison.specs[c].complete_options,
+            "tracker": comparison.specs[c].config.name,
+            "options": to_data(comparison.specs[c].config),
             "ms": comparison.equal_ms,
         }
         for s, c in numbers

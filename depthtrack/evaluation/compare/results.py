@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from depthtrack.evaluation.compare.specs import label_of as tracker_label
 from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.evaluation.metrics import Metric
 from depthtrack.evaluation.sweep.rows import Cell, Row
@@ -17,7 +18,6 @@ from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.files import write_atomic
 from depthtrack.recording.status import Status
 from depthtrack.text_table import aligned
-from depthtrack.tracking.registry import TRACKERS, complete_options
 
 TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
 """Errors against a truth: of the phalanx endpoints of true poses, or of annotated joints."""
@@ -63,7 +63,7 @@ class Line:
     @property
     def source(self) -> str:
         """Where the recording was, which tells recordings of one name apart."""
-        return str(self.evaluations[0].run.configuration.get("sequence"))
+        return self.evaluations[0].configuration.sequence
 
     @property
     def frames(self) -> int:
@@ -107,17 +107,9 @@ def _tracker_time(evaluation: Evaluation) -> Metric:
 
 
 def label_of(evaluation: Evaluation) -> str:
-    """What a run's tracker is called: as its comparison labelled it, or by its name and what is unusual of it."""
-    configuration = evaluation.run.configuration
-    label, tracker = configuration.get("label"), configuration.get("tracker")
-    if isinstance(label, str) and label:
-        return label
-    if tracker not in TRACKERS:
-        return str(tracker or evaluation.run.folder.name)
-    usual = complete_options(tracker, {})
-    unusual = {name: configuration.get(name, value) for name, value in usual.items() if name not in ("seed", "threads")}
-    told = [f"{name}={value}" for name, value in unusual.items() if value != usual[name]]
-    return " ".join([tracker.upper(), *told])
+    """Return the label of a run's tracker: that of its comparison, else its name and the options that it changes."""
+    label = evaluation.configuration.context.get("label")
+    return label if isinstance(label, str) and label else tracker_label(evaluation.configuration.tracker)
 
 
 def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
@@ -128,12 +120,12 @@ def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
     """
     groups: dict[tuple[str, str], list[Evaluation]] = {}
     for evaluation in evaluations:
-        key = (str(evaluation.run.configuration.get("sequence")), label_of(evaluation))
+        key = (evaluation.configuration.sequence, label_of(evaluation))
         groups.setdefault(key, []).append(evaluation)
     recordings = list(dict.fromkeys(path for path, _ in groups))
     lines = []
     for (_, label), runs in sorted(groups.items(), key=lambda group: recordings.index(group[0][0])):
-        if len({run.run.configuration.get("seed") for run in runs}) == len(runs):
+        if len({run.configuration.tracker.seed for run in runs}) == len(runs):
             lines.append(Line(runs[0].recording, label, tuple(runs)))
         else:
             lines += [Line(run.recording, f"{label}, {run.run.folder.name}", (run,)) for run in runs]
@@ -155,14 +147,14 @@ def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
 
 def result(evaluation: Evaluation) -> dict[str, Any]:
     """All figures of a run, under the names that tell it from others."""
-    configuration = evaluation.run.configuration
+    context = evaluation.configuration.context
     return {
         "label": label_of(evaluation),
-        "seed": configuration.get("seed"),
+        "seed": evaluation.configuration.tracker.seed,
         **evaluation.to_json(),
         TRACKER_MS: _tracker_time(evaluation).statistics(),
-        "clock": configuration.get("clock", "wall"),
-        "budget": configuration.get("budget"),
+        "clock": context.get("clock", "wall"),
+        "budget": context.get("budget"),
     }
 
 

@@ -4,8 +4,7 @@ import json
 import math
 import time
 from collections.abc import Sequence as Rows
-from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +15,18 @@ from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.files import write_atomic
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.machine import describe_machine
+from depthtrack.options import from_data, to_data
 from depthtrack.recording import open_sequence
 from depthtrack.recording.hand_choice import chosen_hand
-from depthtrack.recording.run_folder import RunWriter, check_same, read_configuration
+from depthtrack.recording.run_folder import check_same, read_configuration, read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.segmentation.observation import Segmenter
-from depthtrack.tracking.configuration import run_configuration
-from depthtrack.tracking.pipeline import track_sequence
-from depthtrack.tracking.registry import create_tracker
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run_configuration import RunConfiguration
 
 DONE = "done.json"
 """Stands in a run folder once all of its frames are tracked."""
@@ -57,8 +57,14 @@ class Source:
         """Return the hand to track with."""
         return chosen_hand(sequence, self.hand, self.side)
 
+    @property
+    def segmentation(self) -> SegmentationOptions:
+        """Options of the segmentation."""
+        return SegmentationOptions(skin_model=self.skin_model)
+
     def segmenter(self, sequence: Sequence) -> Segmenter:
-        return Segmenter.for_sequence(sequence, None if self.skin_model is None else Path(self.skin_model))
+        """Return a segmenter for the opened recording."""
+        return Segmenter.for_sequence(sequence, self.segmentation)
 
     def count(self, sequence: Sequence) -> int:
         """Frames to track."""
@@ -74,6 +80,7 @@ class PlannedRun:
     label: str
     tracker: str
     options: dict[str, Any]
+    """Nested options of the tracker, as `options.to_data` gives them."""
     seed: int
     budget: dict[str, Any] | None = field(default=None)
 
@@ -84,20 +91,25 @@ class PlannedRun:
     def from_cell(cls, cell: Cell) -> "PlannedRun":
         return cls(**{**cell, "source": Source(**cell["source"])})
 
-    def configuration(self, sequence: Sequence) -> dict[str, Any]:
-        """What its run.json tells."""
+    @property
+    def config(self) -> TrackerConfig:
+        """Configuration of the tracker with this run's seed."""
+        return replace(from_data(CONFIGURATIONS[self.tracker], self.options, "options"), seed=self.seed)
+
+    def configuration(self, sequence: Sequence) -> RunConfiguration:
+        """Return the configuration of the run."""
         source, machine = self.source, describe_machine()
-        return run_configuration(
+        configuration = configure(
             Path(source.path),
             sequence,
+            self.config,
             source.hand_of(sequence),
-            self.tracker,
-            self.options,
+            source.segmentation,
             frames=source.frames,
-            skin_model=None if source.skin_model is None else Path(source.skin_model),
             on_damage=source.on_damage,
+        )
+        return configuration.with_context(
             threads=1,
-            seed=self.seed,
             label=self.label,
             clock="cpu",
             budget=self.budget,
@@ -110,7 +122,7 @@ class PlannedRun:
         if not (folder / "run.json").exists():
             return "new"
         # As JSON would give it back.
-        wanted = json.loads(json.dumps(self.configuration(self.source.open())))
+        wanted = json.loads(json.dumps(self.configuration(self.source.open()).to_fields()))
         check_same(read_configuration(folder), wanted, folder)
         return "done" if (folder / DONE).exists() else "begun"
 
@@ -120,33 +132,24 @@ def track_cell(cell: Cell) -> Row:
     plan = PlannedRun.from_cell(cell)
     # A run is worth one core: others run beside it.
     cv2.setNumThreads(1)
-    sequence = plan.source.open()
-    hand = plan.source.hand_of(sequence)
-    segmenter = plan.source.segmenter(sequence)
-    options = plan.options | {"seed": plan.seed}
-    folder = Path(plan.folder)
-    with (
-        closing(CpuTimed(create_tracker(plan.tracker, hand, **options))) as tracker,
-        RunWriter(folder, plan.configuration(sequence), ("segment", *tracker.stages), resume=True) as run,
-    ):
-        count, clock = plan.source.count(sequence), time.process_time
-        rows = track_sequence(sequence, segmenter, tracker, HandModel(hand), run, count=count, clock=clock)
-        tracked_now = sum(1 for _ in rows)
-        done = {"frames": len(run.rows), "damaged": [asdict(damage) for damage in sequence.damaged]}
+    sequence, folder = plan.source.open(), Path(plan.folder)
+    with TrackingRun(plan.configuration(sequence), sequence, wrap=CpuTimed, clock=time.process_time) as run:
+        tracked_now = sum(1 for _ in run.write(folder, resume=True))
+        done = {"frames": len(read_rows(folder)), "damaged": [asdict(damage) for damage in sequence.damaged]}
     write_atomic(folder / DONE, json.dumps(done) + "\n")
     return {"frames": done["frames"], "tracked_now": tracked_now}
 
 
 def calibrate_cell(cell: Cell) -> Row:
-    """The budget of a contender on a recording: the options chosen, and the CPU milliseconds they took."""
+    """Return the options that take the given time on a recording, and the CPU milliseconds that they took."""
     source = Source(**cell["source"])
     cv2.setNumThreads(1)
-    sequence = source.open()
+    sequence, config = source.open(), from_data(CONFIGURATIONS[cell["tracker"]], cell["options"], "options")
     hand, segmenter = source.hand_of(sequence), source.segmenter(sequence)
-    budget = calibrate(sequence, source.count(sequence), segmenter, hand, cell["tracker"], cell["options"], cell["ms"])
-    # JSON knows no infinity: no hand was followed anywhere.
+    budget = calibrate(sequence, source.count(sequence), segmenter, hand, config, cell["ms"])
+    # JSON has no infinity: no hand was followed anywhere.
     ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
-    return {"chosen": budget.options, "calibrated_ms": ms}
+    return {"chosen": to_data(budget.config), "calibrated_ms": ms}
 
 
 class FrameCount:

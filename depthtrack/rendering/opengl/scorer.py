@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike
 from depthtrack.errors import InputError
 from depthtrack.hand.primitives import PRIMITIVE_COUNT
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective, Terms
+from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.opengl.context import Context, Device, Platform
 from depthtrack.rendering.opengl.impostors import VECTORS, HandTable, place_impostors
 from depthtrack.rendering.opengl.renderer import Grid, Renderer, shared_renderer
 from depthtrack.rendering.opengl.sums import sum_tiles
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import ScorerBase, as_batch
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Array32, Depth, Index

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Objective, Terms
+from depthtrack.rendering.objective import Terms, silhouette_disagreement
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raster import kernel, layout, quadrics
 from depthtrack.rendering.raster import tiles as tiles
-from depthtrack.rendering.scorer import ScorerBase, as_batch
+from depthtrack.rendering.scorer import ScorerBase, Scores, as_batch
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Array32, Depth, Index
 
@@ -84,6 +85,10 @@ class RasterScorer(ScorerBase):
 
     def score(self, poses: ArrayLike) -> Array:
         return self._sums_and_energies(as_batch(poses))[1]
+
+    def evaluate(self, poses: ArrayLike) -> Scores:
+        sums, energies = self._sums_and_energies(as_batch(poses))
+        return Scores(energies, 1 - silhouette_disagreement(sums[:, 1], sums[:, 2]))
 
     def terms(self, poses: ArrayLike) -> Terms:
         batch = as_batch(poses)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
@@ -56,10 +56,10 @@ class View(NamedTuple):
 class CapsuleSurface:
     """See the module, and `matching.Surface`."""
 
-    def __init__(self, shape: HandShape) -> None:
+    def __init__(self, shape: HandShape, scorer: Scorer) -> None:
         self._capsules = fitted_capsules(shape)
         self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
-        self._scorer = RasterScorer(shape)
+        self._scorer = scorer
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         target = observation.reduced(_RESOLUTION)

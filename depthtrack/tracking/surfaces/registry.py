@@ -1,20 +1,19 @@
-"""The surfaces that a hand can be fitted by, by name."""
+"""The surfaces of a hand that points are matched to, by name."""
 
-from typing import Literal
-
-from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.backends import create_scorer
 from depthtrack.solver.correspondences import Surface
+from depthtrack.solver.options import SurfaceName
 from depthtrack.tracking.surfaces.capsules import CapsuleSurface
 from depthtrack.tracking.surfaces.skin import MeshSurface
 
-Model = Literal["skin", "cylinders"]
 
+def make_surface(name: SurfaceName, hand: HandShape, renderer: str = "raster") -> Surface:
+    """Return the surface of a hand.
 
-def make_surface(model: Model, shape: HandShape) -> Surface:
-    """The surface of a hand that observations are matched to. Raises InputError for another name."""
-    if model == "skin":
-        return MeshSurface(shape)
-    if model == "cylinders":
-        return CapsuleSurface(shape)
-    raise InputError(f"no hand model '{model}' for fitting: choose skin or cylinders")
+    renderer: backend that finds which cylinders are hidden.
+
+    Raises:
+        InputError: no skin fits the sizes of the hand.
+    """
+    return MeshSurface(hand) if name == "skin" else CapsuleSurface(hand, create_scorer(renderer, hand))

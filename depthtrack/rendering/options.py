@@ -1,0 +1,50 @@
+"""Options of scoring: the objective of Oikonomidis et al. 2011 and the renderer that evaluates it."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from depthtrack.errors import InputError
+from depthtrack.options import option
+
+RendererName = Literal["raster", "egl", "osmesa", "oracle"]
+
+_OIKONOMIDIS = "Oikonomidis et al. 2011, Sec. 2.3"
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Constants of Oikonomidis et al. 2011, Eq. (1) and (2)."""
+
+    match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
+    clamp_depth: float = option(0.04, "d_M: larger depth differences cost no more", unit="m", source=_OIKONOMIDIS)
+    skin_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS)
+    kinematic_weight: float = option(10.0, "lambda_k: weight of crossing fingers", source=_OIKONOMIDIS)
+    depth_unit: float = option(
+        0.001, "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20", unit="m"
+    )
+    epsilon: float = option(1e-6, "Keeps the quotients of Eq. (2) finite")
+
+    def __post_init__(self) -> None:
+        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
+            if not 0 < getattr(self, name) <= 10:
+                raise InputError(f"objective {name} must lie between 0 and 10, found {getattr(self, name)!r}")
+
+    @property
+    def clamp(self) -> float:
+        """Energy of a pixel whose depth disagrees completely; thresholds on the energy are multiples of it."""
+        return self.clamp_depth / self.depth_unit
+
+    def combine(self, depth: Any, skin: Any, kinematic: Any) -> Any:
+        """Return the energies of Eq. (1) from its separate terms."""
+        return depth + self.skin_weight * skin + self.kinematic_weight * kinematic
+
+
+@dataclass(frozen=True)
+class ScoringOptions:
+    """How hypotheses are rendered and scored."""
+
+    renderer: RendererName = option("raster", "Backend that renders and scores hypotheses")
+    resolution: int | None = option(
+        None, "Longest side of the region that hypotheses are rendered at; the sensor's own if absent", unit="px"
+    )
+    objective: Objective = option(Objective(), "Objective function", advanced=True)

@@ -1,0 +1,132 @@
+"""Options of the solvers: surface fitting (ICP) and particle swarms."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from depthtrack.errors import InputError
+from depthtrack.options import option
+
+Residual = Literal["point", "plane", "symmetric"]
+"""Distance between surface point x and observed point y that a fit minimises.
+
+`point`: x - y (Schroeder et al. 2014, Eq. 3). `plane`: along the hand's normal (Chen and Medioni, "Object modelling by
+registration of multiple range images", 1992). `symmetric`: along the mean of both normals, which vanishes on curved
+surfaces too (Rusinkiewicz, "A symmetric objective function for ICP", 2019).
+"""
+SurfaceName = Literal["skin", "cylinders"]
+"""Surface of the hand that points are matched to."""
+
+_SCHROEDER = "Schroeder et al. 2014"
+
+
+@dataclass(frozen=True)
+class IcpOptions:
+    """How the hand is fitted to a point cloud (Schroeder et al. 2014, Sec. IV)."""
+
+    icp_iterations: int = option(5, "Rounds of correspondences per fit", source=f"{_SCHROEDER}, Fig. 8")
+    gn_iterations: int = option(5, "Gauss-Newton steps per round, at most")
+    rigid_iterations: int = option(2, "Rounds that first align the hand as a rigid body")
+    residual: Residual = option(
+        "symmetric", "Distance to minimise", source="Rusinkiewicz 2019; point: Schroeder et al. 2014, Eq. (3)"
+    )
+    kernel_scale: tuple[float, float] = option(
+        (0.03, 0.007),
+        "Scale of the Geman-McClure robust kernel in the first and the last round; 0 weighs all points alike",
+        unit="m",
+    )
+    max_distance: float = option(0.04, "Largest distance of a correspondence", unit="m")
+    min_normal_cosine: tuple[float, float] = option(
+        (0.25, 0.6), "Least cosine between the normals of a correspondence, in the first and the last round"
+    )
+    damping: float = option(1e-4, "Damping of the finger angles, per 3000 points", unit="m^2/rad^2", source="Eq. (4)")
+    temporal_weight: float = option(
+        5e-5, "Weight of the prior that holds angles at those of the last frame, per 3000 points", unit="m^2/rad^2"
+    )
+    synergy_weight: float = option(
+        3e-7, "Weight of the prior towards postures that the synergies make likely", unit="m^2"
+    )
+    avoid_limits: bool = option(False, "Increase the damping towards joint limits", source=f"{_SCHROEDER}, Sec. IV-B")
+    coarse_every: int = option(4, "The rigid alignment uses every n-th point", advanced=True)
+    reference_count: float = option(
+        3000.0, "Points that damping and priors are stated for; they scale with the number of points", advanced=True
+    )
+    pose_damping: float = option(1e-9, "Damping of the global pose", advanced=True)
+    align_damping: float = option(1.0, "Damping of the fixed posture during the rigid alignment", advanced=True)
+
+    def __post_init__(self) -> None:
+        for name in ("icp_iterations", "gn_iterations"):
+            if not 1 <= getattr(self, name) <= 1000:
+                raise InputError(f"{name} must be between 1 and 1000, found {getattr(self, name)}")
+
+    def annealed(self, progress: float) -> tuple[float, float]:
+        """Return kernel scale (m) and least normal cosine at `progress` (0 to 1) of the rounds.
+
+        Outliers lose influence as the fit improves.
+        """
+        (first, last), (low, high) = self.kernel_scale, self.min_normal_cosine
+        scale = first * (last / first) ** progress if first > 0 and last > 0 else 0.0
+        return float(scale), low + progress * (high - low)
+
+
+PAPER_ICP = IcpOptions(
+    rigid_iterations=1,
+    residual="point",
+    kernel_scale=(0.0, 0.0),
+    min_normal_cosine=(0.0, 0.0),
+    damping=1e-6,
+    temporal_weight=0.0,
+    synergy_weight=0.0,
+    avoid_limits=True,
+)
+"""Schroeder et al. 2014: point-to-point distances, equal weights, damping of the step, joint limit avoidance."""
+
+
+@dataclass(frozen=True)
+class SurfaceFitOptions:
+    """How one stage fits the hand's surface to the point cloud."""
+
+    surface: SurfaceName = option("skin", "Surface to fit: the skin mesh, or tapered cylinders with round ends")
+    subsample: int = option(3, "Use every n-th point of the cloud", source=f"{_SCHROEDER}, Sec. VI-B")
+    icp: IcpOptions = option(IcpOptions(), "Iterative closest points")
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.subsample <= 1000:
+            raise InputError(f"subsample must be between 1 and 1000, found {self.subsample}")
+
+
+def constriction(cognitive: float, social: float) -> float:
+    """Return Clerc and Kennedy's factor w of Oikonomidis et al. 2011, Eq. (3).
+
+    w = 2 / |2 - psi - sqrt(psi^2 - 4 psi)| with psi = c1 + c2.
+
+    Raises:
+        InputError: psi does not exceed 4.
+    """
+    psi = cognitive + social
+    if psi <= 4:
+        raise InputError(f"c1 + c2 of the swarm must exceed 4 (Oikonomidis et al. 2011, Eq. 3), found {psi:g}")
+    return 2 / abs(2 - psi - math.sqrt(psi * psi - 4 * psi))
+
+
+@dataclass(frozen=True)
+class SwarmOptions:
+    """How a particle swarm searches (Oikonomidis et al. 2011, Sec. 2.4)."""
+
+    particles: int = option(64, "Particles of the swarm", source="Oikonomidis et al. 2011, Fig. 2a")
+    generations: int = option(25, "Generations of the swarm", source="Oikonomidis et al. 2011, Fig. 2a")
+    cognitive: float = option(2.8, "Attraction c1 to the particle's own best", source="Eq. (3)")
+    social: float = option(1.3, "Attraction c2 to the swarm's best", source="Eq. (3)")
+    inertia: float = option(constriction(2.8, 1.3), "Factor w of the velocity", source="Eq. (3)")
+    randomise_every: int = option(3, "Randomise finger angles every n generations; 0 never", source="Sec. 2.4")
+    randomise: float = option(0.5, "Share of the particles that are randomised", source="Yasuda et al. 2010")
+    near_best: float = option(0.0, "Share of randomised angles drawn near the best instead of over the whole range")
+    near_spread: float = option(0.15, "Standard deviation of angles drawn near the best", unit="rad")
+
+    def __post_init__(self) -> None:
+        if not (1 <= self.particles <= 100_000 and 1 <= self.generations <= 100_000):
+            raise InputError(
+                f"a swarm needs 1 to 100000 particles and generations, found {self.particles} x {self.generations}"
+            )
+        if not (self.randomise_every >= 0 and 0 <= self.randomise <= 1 and 0 <= self.near_best <= 1):
+            raise InputError(f"the shares of a swarm must be between 0 and 1, found {self}")

@@ -1,0 +1,114 @@
+"""The frame that a tracker works on, and the renderers and fitters that its stages share."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.synergies import Synergies, load_synergies
+from depthtrack.rendering.backends import create_scorer
+from depthtrack.rendering.options import ScoringOptions
+from depthtrack.rendering.scorer import Scorer
+from depthtrack.segmentation.observation import Observation
+from depthtrack.solver.icp import IcpFitter
+from depthtrack.solver.options import SurfaceFitOptions
+from depthtrack.tracking.candidate import Candidate, evaluate
+from depthtrack.tracking.random import frame_generator
+from depthtrack.tracking.state import TrackState
+from depthtrack.tracking.surfaces.registry import make_surface
+from depthtrack.types import Array
+
+
+class Toolkit:
+    """Scorers, fitters and synergies of one hand, made when a stage first asks for them and kept."""
+
+    def __init__(
+        self, hand: HandShape, scoring: ScoringOptions, threads: int = 1, synergies: Synergies | None = None
+    ) -> None:
+        self.hand, self.model, self.scoring = hand, HandModel(hand), scoring
+        self._threads = {"threads": threads} if scoring.renderer == "raster" else {}
+        self.scorer = create_scorer(scoring.renderer, hand, scoring.objective, **self._threads)
+        self.synergies = synergies or load_synergies()
+        self._coarse: dict[int, Scorer] = {}
+        self._fitters: dict[SurfaceFitOptions, IcpFitter] = {}
+        self._targets: dict[object, Observation] = {}
+
+    def set_target(self, observation: Observation) -> None:
+        """Set the observation that the scorer compares with."""
+        resolution = self.scoring.resolution
+        self.scorer.set_target(observation if resolution is None else observation.reduced(resolution))
+
+    def scorer_at(self, resolution: int | None, observation: Observation) -> Scorer:
+        """Return a scorer of `observation` whose longest side has `resolution` pixels; None for the main one."""
+        if resolution is None:
+            return self.scorer
+        if resolution not in self._coarse:
+            self._coarse[resolution] = create_scorer(self.scoring.renderer, self.hand, self.scoring.objective)
+        scorer = self._coarse[resolution]
+        if self._targets.get(resolution) is not observation:
+            scorer.set_target(self.scorer.target.reduced(resolution))
+            self._targets[resolution] = observation
+        return scorer
+
+    def fitter(self, options: SurfaceFitOptions, observation: Observation) -> IcpFitter:
+        """Return a surface fitter with these options for `observation`.
+
+        Raises:
+            InputError: no skin fits the sizes of the hand.
+        """
+        if options not in self._fitters:
+            surface = make_surface(options.surface, self.hand, self.scoring.renderer)
+            self._fitters[options] = IcpFitter(self.hand, surface, options.icp)
+        fitter = self._fitters[options]
+        if self._targets.get(options) is not observation:
+            fitter.set_target(observation, options.subsample)
+            self._targets[options] = observation
+        return fitter
+
+    def close(self) -> None:
+        """Free the renderers."""
+        for scorer in (self.scorer, *self._coarse.values()):
+            scorer.close()
+
+
+@dataclass
+class FrameContext:
+    """One frame on its way through the stages.
+
+    start_pose: (27,) pose given by the user, or None.
+    predictions: candidates that `Predict` made, best first.
+    restarted: whether a search replaced the track, so that the status becomes `started`.
+    """
+
+    observation: Observation
+    tools: Toolkit
+    state: TrackState
+    seed: int
+    start_pose: Array | None = None
+    predictions: list[Candidate] = field(default_factory=list)
+    restarted: bool = False
+
+    def __post_init__(self) -> None:
+        self.random = self.new_random()
+
+    def new_random(self) -> np.random.Generator:
+        """Return the frame's random numbers from their start."""
+        return frame_generator(self.seed, self.observation.frame_index)
+
+    @property
+    def clamp(self) -> float:
+        """Unit of energies in options: see `Objective.clamp`."""
+        return self.tools.scoring.objective.clamp
+
+    def evaluate(self, poses: Array) -> list[Candidate]:
+        """Score poses (N, 27) at the scorer's resolution; return them by increasing energy."""
+        return evaluate(self.tools.scorer, poses)
+
+    def fitter(self, options: SurfaceFitOptions) -> IcpFitter:
+        """Return a surface fitter for this frame.
+
+        Raises:
+            InputError: no skin fits the sizes of the hand.
+        """
+        return self.tools.fitter(options, self.observation)

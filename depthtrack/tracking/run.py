@@ -1,0 +1,117 @@
+"""One run: a recording, its configuration, and the pipeline that tracks it."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.sequence import Sequence
+from depthtrack.segmentation.observation import Segmenter
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
+from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.run_configuration import RunConfiguration, camera_fields, versions
+from depthtrack.tracking.tracker import Tracker
+from depthtrack.types import Array
+
+
+def configure(
+    path: Path,
+    sequence: Sequence,
+    tracker: TrackerConfig,
+    hand: HandShape,
+    segmentation: SegmentationOptions | None = None,
+    **entries: Any,
+) -> RunConfiguration:
+    """Return the configuration of a run of the recording at `path`.
+
+    entries: `start`, `frames` and `on_damage` of `RunConfiguration`, if not the defaults.
+    """
+    return RunConfiguration(
+        str(path.resolve()),
+        camera_fields(sequence.camera),
+        json.loads(hand.to_json()),
+        tracker,
+        segmentation or SegmentationOptions(),
+        **entries,
+        context={"versions": versions()},
+    )
+
+
+class TrackingRun:
+    """Tracks a recording as a configuration says; equal configurations give equal bits.
+
+    threads: threads of the renderer; poses do not depend on it.
+    wrap: returns the tracker to use in place of the one that the configuration describes, to time it for example.
+    clock: seconds, for the time of the segmentation.
+
+    Raises:
+        InputError: the configuration does not fit the recording, or a file that it names cannot be read.
+    """
+
+    def __init__(
+        self,
+        configuration: RunConfiguration,
+        sequence: Sequence,
+        threads: int = 1,
+        wrap: Callable[[Tracker], Tracker] = lambda tracker: tracker,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.configuration, self.sequence = configuration, sequence
+        self.hand = configuration.hand_shape()
+        self._clock, self._start_pose = clock, true_start(sequence) if configuration.start == "truth" else None
+        self.tracker = wrap(create_tracker(configuration.tracker, self.hand, threads))
+
+    def __len__(self) -> int:
+        """Return the number of frames to track."""
+        frames, length = self.configuration.frames, len(self.sequence)
+        return length if frames is None else min(frames, length)
+
+    def track(self) -> Iterator[TrackedFrame]:
+        """Yield each frame as it is tracked."""
+        return track_frames(islice(self.sequence, len(self)), self._pipeline(self._start_pose))
+
+    def write(self, folder: Path, resume: bool = False) -> Iterator[TrackedFrame]:
+        """Yield each frame as it is tracked and appended to a run folder; with `resume`, only those that it lacks.
+
+        Raises:
+            InputError: the folder holds another run, or a run without `resume`.
+        """
+        fields = self.configuration.to_fields()
+        with RunWriter(folder, fields, ("segment", *self.tracker.stages), resume) as run:
+            known = estimates_of(run.rows)
+            awaiting = all(estimate.pose is None for estimate in known)
+            pipeline = self._pipeline(self._start_pose if awaiting else None)
+            yield from write_run(track_frames(islice(self.sequence, len(self)), pipeline, known), run)
+
+    def _pipeline(self, start_pose: Array | None) -> Pipeline:
+        segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)
+        return Pipeline(self.tracker, segmenter, self.hand, start_pose, self._clock)
+
+    def close(self) -> None:
+        """Free the tracker."""
+        self.tracker.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def true_start(sequence: Sequence) -> Array:
+    """Return the true pose (27,) of the recording's first frame. Raises InputError if it has none."""
+    truth = sequence.ground_truth
+    row = None if truth is None else truth.at(float(sequence.timestamps[0]))
+    if truth is None or truth.poses is None or row is None:
+        raise InputError(f"{sequence.name} has no true pose of its first frame: use --start auto")
+    return truth.poses[row]

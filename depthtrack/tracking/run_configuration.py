@@ -1,0 +1,178 @@
+"""The configuration of a run: everything that decides its poses, as `run.json` stores it."""
+
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.synergies import load_synergies
+from depthtrack.options import from_data, to_data
+from depthtrack.recording.run_folder import Run, read_configuration
+from depthtrack.recording.sequence import OnDamage
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.earlier_runs import upgraded
+
+FORMAT = 2
+"""Version of the layout of `run.json`; runs without it were written before the options were nested."""
+
+Start = Literal["auto", "truth"]
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
+    """A recording, a hand, a tracker with its options, and what belongs to neither.
+
+    sequence: path of the recording.
+    camera, hand: contents of `camera.json` and `hand.json`.
+    frames: number of frames to track; None for all.
+    context: entries that do not change poses or only describe the run: label, seed of a comparison, machine, ...
+    """
+
+    sequence: str
+    camera: Mapping[str, Any]
+    hand: Mapping[str, Any]
+    tracker: TrackerConfig
+    segmentation: SegmentationOptions = field(default_factory=SegmentationOptions)
+    start: Start = "auto"
+    frames: int | None = None
+    on_damage: OnDamage = "refuse"
+    context: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def surface(self) -> Literal["skin", "cylinders"]:
+        """Surface whose distance to the observation the tracker minimises; spheres and cylinders for a swarm."""
+        options = self.tracker
+        if options.name in ("pso", "oikonomidis2011"):
+            return "skin" if getattr(options, "refine", False) else "cylinders"
+        return getattr(options, "fit").surface  # noqa: B009 (each other tracker has a fit)
+
+    def to_fields(self) -> dict[str, Any]:
+        """Return the contents of `run.json`.
+
+        A file that the configuration names may change, so its digest is stored with it.
+        """
+        return {
+            "format": FORMAT,
+            "sequence": self.sequence,
+            "tracker": self.tracker.name,
+            "options": to_data(self.tracker),
+            "segmentation": to_data(self.segmentation),
+            "start": self.start,
+            "frames": self.frames,
+            "on_damage": self.on_damage,
+            "camera": dict(self.camera),
+            "hand": dict(self.hand),
+            "digests": digests(self),
+            **self.context,
+        }
+
+    @classmethod
+    def from_fields(cls, fields: Mapping[str, Any], where: str) -> Self:
+        """Return the configuration that the contents of a `run.json` describe, earlier layouts included.
+
+        Raises:
+            InputError: an entry is missing or malformed; it names `where`.
+        """
+        if "format" not in fields:
+            fields = upgraded(fields, where)
+        if fields["format"] != FORMAT:
+            raise InputError(f"{where}: expected format {FORMAT}, found {fields['format']!r:.40}: update depthtrack")
+        name = fields.get("tracker")
+        if name not in CONFIGURATIONS:
+            raise InputError(f"{where}: no tracker {name!r:.60}: expected one of {', '.join(CONFIGURATIONS)}")
+        for entry, kind in (("sequence", str), ("camera", dict), ("hand", dict)):
+            if not isinstance(fields.get(entry), kind):
+                raise InputError(f"{where}: expected an entry '{entry}', found {fields.get(entry)!r:.40}")
+        own = ("format", "tracker", "options", "digests", "segmentation")
+        rest = {name: value for name, value in fields.items() if name not in own}
+        known = {entry: rest.pop(entry) for entry in ("sequence", "camera", "hand")}
+        known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage") if entry in rest}
+        _check_choices(known, where)
+        return cls(
+            **known,
+            tracker=from_data(CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),
+            segmentation=from_data(SegmentationOptions, fields.get("segmentation", {}), f"{where}: segmentation"),
+            context=rest,
+        )
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """Return the configuration of a run. Raises InputError if its `run.json` is malformed."""
+        return cls.from_fields(run.configuration, str(run.folder / "run.json"))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Return the configuration in a run folder or its `run.json`. Raises InputError."""
+        folder = path.parent if path.name == "run.json" else path
+        fields = read_configuration(folder)
+        configuration = cls.from_fields(fields, str(folder / "run.json"))
+        _check_digests(configuration, fields.get("digests", {}), folder)
+        return configuration
+
+    def hand_shape(self, where: str = "run.json") -> HandShape:
+        """Return the hand. Raises InputError if the entry is malformed."""
+        try:
+            return HandShape.from_fields(dict(self.hand))
+        except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+            raise InputError(f"{where} names no usable hand: {error}") from error
+
+    def camera_model(self, where: str = "run.json") -> Camera:
+        """Return the camera. Raises InputError if the entry is malformed."""
+        try:
+            return Camera.from_fields(dict(self.camera))
+        except InputError as error:
+            raise InputError(f"{where}: camera: {error}") from error
+
+    def with_context(self, **entries: Any) -> Self:
+        """Return the configuration with further descriptive entries."""
+        return replace(self, context={**self.context, **entries})
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that decide poses."""
+    return {
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("depthtrack", "numpy", "numba", "opencv-python-headless", "scipy")},
+    }
+
+
+def digests(configuration: RunConfiguration) -> dict[str, str]:
+    """Return SHA-256 of the files that a configuration names: synergies and skin colours."""
+    found = {}
+    synergies = getattr(configuration.tracker, "synergies", None)
+    if synergies is not None and synergies.synergies is not None:
+        found["synergies"] = sha256(load_synergies(synergies.synergies).to_json().encode()).hexdigest()
+    if configuration.segmentation.skin_model is not None:
+        found["skin_model"] = sha256(Path(configuration.segmentation.skin_model).read_bytes()).hexdigest()
+    return found
+
+
+def _check_digests(configuration: RunConfiguration, stored: Mapping[str, str], folder: Path) -> None:
+    for name, digest in digests(configuration).items():
+        if stored.get(name, digest) != digest:
+            raise InputError(
+                f"the file of {name} that {folder / 'run.json'} names has changed since: "
+                "restore it, or name another one"
+            )
+
+
+def _check_choices(entries: Mapping[str, Any], where: str) -> None:
+    frames = entries.get("frames")
+    if entries.get("start", "auto") not in ("auto", "truth"):
+        raise InputError(f"{where}: start must be auto or truth, found {entries['start']!r:.40}")
+    if entries.get("on_damage", "refuse") not in ("refuse", "skip"):
+        raise InputError(f"{where}: on_damage must be refuse or skip, found {entries['on_damage']!r:.40}")
+    if frames is not None and not (isinstance(frames, int) and frames >= 1):
+        raise InputError(f"{where}: frames must be a whole number from 1, found {frames!r:.40}")
+
+
+def camera_fields(camera: Camera) -> dict[str, Any]:
+    """Return the contents of a `camera.json`."""
+    return asdict(camera)

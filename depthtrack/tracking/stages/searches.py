@@ -1,0 +1,128 @@
+"""Searches that improve many start poses: by swarms, or by surface fits from coarse to fine."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from depthtrack.errors import InputError
+from depthtrack.rendering.scorer import Scorer
+from depthtrack.solver.options import SurfaceFitOptions
+from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
+from depthtrack.tracking.configuration import FitSearchOptions, GlobalSearchOptions, SwarmSearchOptions
+from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.proposals.global_ import distinct_orientations, mixed_angles, orientation_proposals
+from depthtrack.tracking.stages.coarse_to_fine import run_rounds
+from depthtrack.tracking.stages.swarm import swarm_around
+from depthtrack.types import Array
+
+FitPose = Callable[[Array], Array]
+"""Moves a pose (27,) onto the observed surface."""
+
+
+class Search(Protocol):
+    """Improves start poses on one frame."""
+
+    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
+        """Return candidates, best first, reached from poses (N, 27).
+
+        min_angle: least angle (rad) between the orientations of the poses that continue; 0 for any.
+        """
+        ...
+
+    def fit(self, frame: FrameContext) -> FitPose | None:
+        """Return how the search fits a single pose to the surface, or None if it does not."""
+        ...
+
+    def random(self, frame: FrameContext) -> np.random.Generator:
+        """Return the random numbers of the search."""
+        ...
+
+
+@dataclass(frozen=True)
+class SwarmSearch:
+    """Search by ever fewer and finer swarms, with surface fits of the best poses between the rounds."""
+
+    options: SwarmSearchOptions
+
+    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
+        starts = evaluate(frame.tools.scorer, poses)
+        return swarm_search(frame.tools.scorer, starts, frame.random, self.options, min_angle, self.fit(frame))
+
+    def fit(self, frame: FrameContext) -> FitPose | None:
+        if not self.options.refine:
+            return None
+        try:
+            fitter = frame.fitter(self.options.fit)
+        except InputError:
+            return None  # no skin fits these sizes
+        return fitter.fit
+
+    def random(self, frame: FrameContext) -> np.random.Generator:
+        return frame.random
+
+
+def swarm_search(
+    scorer: Scorer,
+    starts: list[Candidate],
+    generator: np.random.Generator,
+    options: SwarmSearchOptions,
+    min_angle: float,
+    fit: FitPose | None = None,
+) -> list[Candidate]:
+    """Return candidates, best first, after all rounds from `starts`, best first.
+
+    Starts differ in orientation by `min_angle` (rad), so that the mirrored pose and other likely errors take part.
+    """
+    first = options.rounds[0].starts
+    found = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, first)] if min_angle > 0 else starts
+    for turn in options.rounds:
+        found = by_energy(
+            swarm_around(scorer, start.pose, turn.spread, turn.swarm, generator) for start in found[: turn.starts]
+        )
+        if fit is not None:
+            fitted = evaluate(scorer, np.stack([fit(candidate.pose) for candidate in found[: options.refined]]))
+            found = by_energy([*found, *fitted])
+    return found
+
+
+@dataclass(frozen=True)
+class FitSearch:
+    """Search by surface fits of ever fewer poses."""
+
+    options: FitSearchOptions
+    surface: SurfaceFitOptions
+
+    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
+        starts, keep = frame.evaluate(poses), self.options.rounds[0].keep
+        if min_angle > 0:
+            starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
+        fitter = frame.fitter(self.surface)
+        return run_rounds(fitter, frame.tools.scorer, starts, frame.tools.synergies, self.options.rounds)
+
+    def fit(self, frame: FrameContext) -> FitPose | None:
+        return frame.fitter(self.surface).fit
+
+    def random(self, frame: FrameContext) -> np.random.Generator:
+        return frame.new_random()
+
+
+def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOptions) -> Candidate:
+    """Return the best candidate of repeated global searches of a frame (Oikonomidis et al. 2011, Sec. 3).
+
+    The gain of a repetition ends the search too: a hand of other sizes than the model's has no good pose.
+    """
+    best: Candidate | None = None
+    generator, observation = search.random(frame), frame.observation
+    for _ in range(options.attempts):
+        angles = mixed_angles(frame.tools.synergies, options.synergy_share, generator, options.proposals)
+        arm = observation.arm_direction if options.follow_arm else None
+        poses = orientation_proposals(observation.centre, angles, generator, arm)
+        found = search.improve(frame, poses, options.min_angle)[0]
+        before = np.inf if best is None else best.energy
+        best = found if best is None or found.energy < best.energy else best
+        if best.energy <= options.good_energy * frame.clamp or best.energy > (1 - options.min_gain) * before:
+            break
+    assert best is not None
+    return best

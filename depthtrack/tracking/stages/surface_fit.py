@@ -1,0 +1,82 @@
+"""Surface fits: candidates moved onto the point cloud by ICP (Schroeder et al. 2014, Sec. IV)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from depthtrack.hand.pose import ANGLES
+from depthtrack.solver.options import SurfaceFitOptions
+from depthtrack.solver.prior import Prior
+from depthtrack.solver.subspace import FULL, PostureSubspace
+from depthtrack.tracking.candidate import Candidate, by_energy
+from depthtrack.tracking.frame import FrameContext
+
+
+@dataclass(frozen=True)
+class SurfaceFit:
+    """Fit the hand's surface to the point cloud from the best candidate.
+
+    prior: pull on the angles.
+    hold_last: without `prior`, hold the angles at those of the last frame.
+    subspace: posture parameters that are solved for.
+    align: first move the hand as a rigid body.
+    effort: multiple of the usual ICP iterations.
+    """
+
+    options: SurfaceFitOptions
+    prior: Prior | None = None
+    hold_last: bool = True
+    subspace: PostureSubspace = FULL
+    align: bool = True
+    effort: int = 1
+    name: str = "fit"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        return self.fitted(frame, candidates[:1])
+
+    def fitted(self, frame: FrameContext, candidates: list[Candidate], effort: int | None = None) -> list[Candidate]:
+        """Return all candidates fitted, best first."""
+        fitter, prior = frame.fitter(self.options), self.prior
+        if prior is None and self.hold_last and frame.state.pose is not None:
+            prior = Prior.towards(frame.state.pose[ANGLES], self.options.icp.temporal_weight)
+        iterations = (effort or self.effort) * self.options.icp.icp_iterations
+        poses = [
+            fitter.fit(candidate.pose, self.subspace, iterations, prior, align=self.align) for candidate in candidates
+        ]
+        return frame.evaluate(np.stack(poses))
+
+
+@dataclass(frozen=True)
+class RetryPredictions:
+    """Fit the other predictions too if the first fit ended much higher than the last frame, then fit the best longer.
+
+    ratio, margin: the energy exceeds `ratio` times that of the last frame plus `margin` (clamp).
+    """
+
+    fit: SurfaceFit
+    ratio: float
+    margin: float
+    name: str = "retry"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        satisfied = self.ratio * frame.state.energy + self.margin * frame.clamp
+        if candidates[0].energy <= satisfied:
+            return candidates
+        candidates = by_energy([*candidates, *self.fit.fitted(frame, frame.predictions[1:])])
+        if candidates[0].energy <= satisfied:
+            return candidates
+        return by_energy([*candidates, *self.fit.fitted(frame, candidates[:1], effort=2)])
+
+
+@dataclass(frozen=True)
+class Refine:
+    """Fit the best candidate to the surface, with its own angles as prior."""
+
+    options: SurfaceFitOptions
+    name: str = "refine"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        pose = candidates[0].pose
+        prior = Prior.towards(pose[ANGLES], self.options.icp.temporal_weight)
+        fitted = frame.fitter(self.options).fit(pose, FULL, prior=prior)
+        return frame.evaluate(fitted[None])

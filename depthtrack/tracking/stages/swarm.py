@@ -1,0 +1,111 @@
+"""One particle swarm per frame (Oikonomidis et al. 2011, Sec. 2.4)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from depthtrack.hand.pose import POSITION, retract
+from depthtrack.rendering.scorer import Scorer
+from depthtrack.solver.options import SwarmOptions
+from depthtrack.solver.swarm import minimise
+from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
+from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.visible_centroid import visible_centroid
+from depthtrack.types import Array
+
+Spread = tuple[float, float, float]
+"""Standard deviations of a first generation: position (m), rotation (rad), angles (rad)."""
+
+
+def run_swarm(
+    scorer: Scorer, space: SwarmSpace, particles: Array, generator: np.random.Generator, options: SwarmOptions
+) -> Candidate:
+    """Return the best pose that a swarm meets, from particles (N, D) in the coordinates of `space`."""
+    confidence, least = 0.0, np.inf
+
+    def score(coordinates: Array) -> Array:
+        nonlocal confidence, least
+        scores = scorer.evaluate(space.poses(coordinates))
+        best = int(np.argmin(scores.energy))
+        if scores.energy[best] < least:
+            least, confidence = float(scores.energy[best]), float(scores.agreement[best])
+        return scores.energy
+
+    found = minimise(score, particles, space.lower, space.upper, space.fingers, generator, options)
+    return Candidate(space.poses(found.position[None])[0], found.energy, confidence)
+
+
+def swarm_around(
+    scorer: Scorer, pose: Array, spread: Spread, options: SwarmOptions, generator: np.random.Generator
+) -> Candidate:
+    """Return the best pose that a swarm finds around `pose` (27,), which takes part itself."""
+    space = TangentSpace(pose)
+    particles = generator.standard_normal((options.particles, 26)) * np.repeat(spread, [3, 3, 20])
+    particles[0] = 0
+    return run_swarm(scorer, space, particles, generator, options)
+
+
+@dataclass(frozen=True)
+class SwarmAround:
+    """Refine the best candidate by a swarm around it."""
+
+    options: SwarmOptions
+    spread: Spread
+    name: str = "swarm"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        return [swarm_around(frame.tools.scorer, candidates[0].pose, self.spread, self.options, frame.random)]
+
+
+@dataclass(frozen=True)
+class Swarm:
+    """Follow the last pose by one swarm.
+
+    Space "parameters" holds the 27 raw parameters of the paper, whose first generation surrounds the last pose. Space
+    "tangent" holds the 26-dimensional tangent space; a third of its first generation surrounds each of the last pose,
+    its linear prediction, and the last pose moved onto the observed hand, wider if the hand moved fast by `widen`.
+    """
+
+    options: SwarmOptions
+    spread: Spread
+    space: Literal["tangent", "parameters"] = "tangent"
+    widen: float = 0.0
+    name: str = "swarm"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        last = frame.state.pose
+        assert last is not None
+        first = self._first_generation_of_paper if self.space == "parameters" else self._first_generation
+        make_space: Callable[[Array], SwarmSpace] = ParameterSpace if self.space == "parameters" else TangentSpace
+        space = make_space(last)
+        particles = space.coordinates(first(frame, last))
+        return [run_swarm(frame.tools.scorer, space, particles, frame.random, self.options)]
+
+    def _first_generation_of_paper(self, frame: FrameContext, last: Array) -> Array:
+        """Return perturbations (N, 27) of the last pose."""
+        centres = np.tile(last, (self.options.particles, 1))
+        return self._perturbed(frame, centres, np.repeat(self.spread, [3, 3, 20]))
+
+    def _first_generation(self, frame: FrameContext, last: Array) -> Array:
+        """Return perturbations (N, 27) of the last pose and of two predictions."""
+        centres, velocity = np.tile(last, (self.options.particles, 1)), frame.state.velocity
+        centres[1::3] = retract(last, velocity)
+        centres[2::3, POSITION] += observed_drift(frame, last)
+        return self._perturbed(frame, centres, np.hypot(np.repeat(self.spread, [3, 3, 20]), self.widen * velocity))
+
+    def _perturbed(self, frame: FrameContext, centres: Array, spread: Array) -> Array:
+        steps = frame.random.standard_normal((len(centres), 26)) * spread
+        steps[:3] = 0  # the centres themselves take part
+        return retract(centres, steps)
+
+
+def observed_drift(frame: FrameContext, pose: Array) -> Array:
+    """Return how far (3,), m, the observed hand lies from `pose` (27,) rendered through the same camera."""
+    target = frame.tools.scorer.target
+    intrinsics = (target.camera.fx, target.camera.fy, target.camera.cx, target.camera.cy)
+    rendered = frame.tools.scorer.render(pose)
+    drift = visible_centroid(target.depth, intrinsics) - visible_centroid(rendered, intrinsics)
+    return drift if np.isfinite(drift).all() else np.zeros(3)

@@ -1,0 +1,156 @@
+"""The configuration of a run: its JSON round trip, repeating a run from it, and run folders of earlier versions."""
+
+import json
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+
+from depthtrack.cli import main
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.options import Parameter, from_data, parameters, to_data, with_options
+from depthtrack.recording import open_sequence
+from depthtrack.recording.run_folder import read_configuration
+from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.earlier_runs import upgraded
+from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run_configuration import RunConfiguration
+
+FRAMES = 3
+KEPT = ("scoring.renderer", "search.attempts", "search.good_energy")
+"""Options that keep their value: OpenGL may be missing, and a search must end soon."""
+NEW = {"synergies.synergies": "leap", "synergies.components": 5, "scoring.resolution": 64, "fingers.resolution": 64}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "everyday"
+    assert main(["synth", "everyday", str(folder), "--frames", str(FRAMES), "--model", "skin"]) == 0
+    return folder
+
+
+def changed(config: TrackerConfig) -> TrackerConfig:
+    """Return a configuration in which every option differs from its default."""
+    values = {each.path: _other(each) for each in parameters(config) if each.path not in KEPT}
+    return with_options(config, values)
+
+
+def _other(parameter: Parameter) -> Any:
+    value = parameter.default
+    if parameter.path in NEW:
+        return NEW[parameter.path]
+    if isinstance(value, bool):
+        return not value
+    if get_origin(parameter.kind) is Literal:
+        return next(other for other in get_args(parameter.kind) if other != value)
+    if isinstance(value, int):
+        return max(1, value - 1) if value > 1 else value + 1
+    if isinstance(value, float):
+        return 0.9 * value + 0.001
+    if isinstance(value, tuple) and value and isinstance(value[0], float):
+        return tuple(0.9 * part + 0.001 for part in value)
+    assert isinstance(value, tuple), parameter
+    return [to_data(part) for part in value[1:]]
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+def test_a_configuration_survives_json(name: str) -> None:
+    for config in (CONFIGURATIONS[name](), changed(CONFIGURATIONS[name]())):
+        assert from_data(type(config), json.loads(json.dumps(to_data(config))), "test") == config
+    usual = {each.path: each.default for each in parameters(CONFIGURATIONS[name]())}
+    for each in parameters(config):
+        assert each.default != usual[each.path] or each.path in KEPT, each.path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("all_changed", [False, True])
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+def test_a_run_is_repeated_from_its_configuration(
+    recording: Path, tmp_path: Path, name: str, all_changed: bool
+) -> None:
+    """Only the command line and run.json are used the second time; the poses have the same bits."""
+    config = CONFIGURATIONS[name]()
+    config = with_options(changed(config) if all_changed else config, {"resolution": 64})
+    sequence = open_sequence(recording)
+    hand = HandShape(scale=1.0123456789)
+    with TrackingRun(configure(recording, sequence, config, hand, frames=FRAMES - 1), sequence) as run:
+        assert len(list(run.write(tmp_path / "first"))) == FRAMES - 1
+    again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first" / "run.json")]
+    assert main(again) == 0
+    for file in ("poses.csv", "run.json"):
+        assert (tmp_path / "again" / file).read_bytes() == (tmp_path / "first" / file).read_bytes()
+
+
+def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_path: Path) -> None:
+    first = ["track", str(recording), "-o", str(tmp_path / "first"), "--tracker", "ik", "--frames", "1"]
+    assert main([*first, "--subsample", "9", "--start", "truth"]) == 0
+    again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first")]
+    assert main([*again, "--icp-iterations", "2"]) == 0
+    stored = read_configuration(tmp_path / "again")
+    assert stored["tracker"] == "ik"
+    assert (stored["frames"], stored["start"]) == (1, "truth")
+    assert (stored["options"]["fit"]["subsample"], stored["options"]["fit"]["icp"]["icp_iterations"]) == (9, 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"tracker": "magic"}, "no tracker 'magic'"),
+        ({"format": 99}, "expected format 2"),
+        ({"options": {"colour": "red"}}, "colour"),
+        ({"options": {"seed": "many"}}, "seed"),
+        ({"frames": -1}, "whole number"),
+        ({"camera": 3}, "entry 'camera'"),
+        ({"start": "guess"}, "auto or truth"),
+    ],
+)
+def test_a_malformed_configuration_is_refused(recording: Path, change: dict[str, Any], expected: str) -> None:
+    sequence = open_sequence(recording)
+    fields = configure(recording, sequence, CONFIGURATIONS["ik"](), HandShape()).to_fields()
+    with pytest.raises(InputError, match=expected):
+        RunConfiguration.from_fields(fields | change, "run.json")
+
+
+def test_runs_of_earlier_versions_are_read() -> None:
+    earlier = {
+        "sequence": "/data/everyday",
+        "tracker": "pso",
+        "variant": "default",
+        "finish": "skin",
+        "particles": 16,
+        "resolution": None,
+        "seed": 3,
+        "skin_model": "skin.json",
+        "camera": {},
+        "hand": {},
+        "label": "PSO",
+    }
+    found = RunConfiguration.from_fields(earlier, "run.json")
+    assert found.surface == "skin"
+    assert found.tracker == with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True})
+    assert found.segmentation.skin_model == "skin.json"
+    assert found.context == {"label": "PSO"}
+    paper = {"tracker": "ik", "variant": "paper", "rounds": 7, "model": "cylinders", "synergies": "leap", "soft": True}
+    options = {"icp_iterations": 7, "surface": "cylinders", "synergies": "leap", "synergy_prior": True}
+    found = RunConfiguration.from_fields(earlier | paper, "run.json")
+    assert found.tracker == with_options(CONFIGURATIONS["schroeder2014"](), {**options, "seed": 3})
+    with pytest.raises(InputError, match="pso or ik"):
+        upgraded({"tracker": "magic"}, "run.json")
+
+
+def test_changed_files_are_noticed(recording: Path, tmp_path: Path) -> None:
+    from depthtrack.hand.synergies import load_synergies, save_synergies
+
+    file, folder = tmp_path / "mine.json", tmp_path / "run"
+    save_synergies(load_synergies("leap"), file)
+    config = with_options(CONFIGURATIONS["ik"](), {"synergies": str(file), "resolution": 48})
+    sequence = open_sequence(recording)
+    with TrackingRun(replace(configure(recording, sequence, config, HandShape()), frames=1), sequence) as run:
+        assert len(list(islice(run.write(folder), 1))) == 1
+    assert RunConfiguration.load(folder).tracker == config
+    save_synergies(load_synergies("leap-grasps"), file)
+    with pytest.raises(InputError, match="has changed since"):
+        RunConfiguration.load(folder)
