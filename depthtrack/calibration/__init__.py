@@ -1,1 +1,1 @@
-"""From a recording of a hand to the sizes of that hand."""
+"""Calibration: the sizes of a hand from a recording, or from keypoints."""

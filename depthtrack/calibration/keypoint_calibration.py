@@ -1,4 +1,4 @@
-"""The sizes and the side of a hand, from keypoints of it in some poses; a keypoint that is not known is NaN."""
+"""Sizes and side of a hand from keypoints in several poses; a missing keypoint is NaN."""
 
 from typing import get_args
 
@@ -13,19 +13,22 @@ from depthtrack.solver.keypoints import IN_PALM, fit_poses, is_known
 from depthtrack.types import Array
 
 _ROUNDS = 5
-"""Alignments of all palms to their median, which is then taken again."""
+"""Iterations of aligning all palms to their median and taking the median again."""
 _STRETCHED = 0.7
-"""Sine of the largest flexion at which a finger still shows where forward is."""
+"""Sine of the largest flexion at which the direction of a finger is used."""
 _SAMPLE = 100
-"""Hands that decide which side they are."""
+"""Number of hands that the side is determined from."""
 
 
 def shape_from_keypoints(keypoints: ArrayLike, side: Side, source: str = "measured on keypoints") -> HandShape:
-    """Sizes of a hand whose keypoints (N, 21, 3), metres, were seen in N poses.
+    """Return the sizes of a hand from its keypoints (N, 21, 3), metres, in N poses.
 
-    Phalanx lengths are medians over the poses, the base joints the median of the palms once these lie on one another;
-    what keypoints do not tell, such as radii, is the default hand's in proportion. Zero abduction is, where the wrist
-    is not known, the middle finger's usual direction. Raises InputError where no pose shows a finger or the palm.
+    Phalanx lengths are medians over the poses. Base joints are the median of the aligned palms. Sizes that keypoints do
+    not determine, such as radii, are those of the default hand in proportion. If the wrist is missing, the median
+    direction of the middle finger has zero abduction.
+
+    Raises:
+        InputError: if no pose has two neighbouring joints of a finger, or three points of the palm.
     """
     points = _checked(keypoints)
     default = HandShape()
@@ -50,7 +53,11 @@ def shape_from_keypoints(keypoints: ArrayLike, side: Side, source: str = "measur
 
 
 def side_of(keypoints: ArrayLike) -> Side:
-    """Which side the hands (N, 21, 3) are: the one whose joints bend that way. Raises InputError as above."""
+    """Return the side of the hands (N, 21, 3), metres: the one with the smaller residual of a pose fit.
+
+    Raises:
+        InputError: see `shape_from_keypoints`.
+    """
     points = _checked(keypoints)
     sample = points[:: -(-len(points) // _SAMPLE)]
 
@@ -61,7 +68,7 @@ def side_of(keypoints: ArrayLike) -> Side:
 
 
 def _checked(keypoints: ArrayLike) -> Array:
-    """The hands that show at least three points of the palm; unknown points are NaN in all coordinates."""
+    """Return the hands with at least three points of the palm; missing points are NaN in all coordinates."""
     points = np.array(keypoints, dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES), 3)
     known = is_known(points)
     points[~known] = np.nan
@@ -72,7 +79,7 @@ def _checked(keypoints: ArrayLike) -> Array:
 
 
 def _palm(points: Array, default: HandModel, ratio: float) -> tuple[Array, bool]:
-    """Wrist and base joints (6, 3) in the palm frame, from those of all poses (N, 6, 3); whether the wrist is known."""
+    """Return wrist and base joints (6, 3), palm frame, from points (N, 6, 3), and whether the wrist is known."""
     known = is_known(points)
     filled = np.where(known[..., None], points, 0)
     palm = reference = np.concatenate([default.shape.wrist[None], default.base_transforms[:, :3, 3]]) * ratio
@@ -80,14 +87,15 @@ def _palm(points: Array, default: HandModel, ratio: float) -> tuple[Array, bool]
     for _ in range(_ROUNDS):
         R, t = rigid_alignment(palm, filled, known)
         found = np.where(ever[:, None], _median(np.einsum("nji,nkj->nki", R, points - t[:, None])), palm)
-        # Only the default palm says how a palm frame lies in a palm.
+        # The default palm defines the palm frame.
         R, t = rigid_alignment(found, reference, ever)
         palm = found @ R.T + t
     return palm, bool(ever[0])
 
 
 def _turn(points: Array, palm: Array, side: Side) -> Array:
-    """Rotation (3, 3) about the palm's normal, to be applied from the right, that brings the middle finger forward."""
+    """Return the rotation (3, 3) about the normal of the palm, to apply from the right, that points the middle finger
+    forward."""
     known = is_known(points[:, IN_PALM])
     R, _ = rigid_alignment(palm, np.where(known[..., None], points[:, IN_PALM], 0), known)
     middle = KEYPOINT_NAMES.index("middle_mcp")
@@ -101,7 +109,7 @@ def _turn(points: Array, palm: Array, side: Side) -> Array:
 
 
 def _median(values: Array) -> Array:
-    """Median over the first axis of what is known; NaN where nothing ever is."""
+    """Return the median of the known values over the first axis, NaN if there are none."""
     median = np.full(values.shape[1:], np.nan)
     ever = np.asarray(np.isfinite(values).any(axis=0))
     median[ever] = np.nanmedian(values[:, ever], axis=0)

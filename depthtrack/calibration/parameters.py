@@ -1,7 +1,7 @@
-"""The sizes of a hand as 35 numbers that calibration solves for, how likely they are, and what they move.
+"""The sizes of a hand as 35 parameters: their prior, and the motion of the skin with them.
 
 All are zero for the average adult's hand. Those of lengths, widths and the whole are logarithms of factors, so that
-they stay positive and equal steps mean equal shares; the offsets of the base joints are metres in a hand of scale 1.
+they stay positive and equal steps are equal ratios; the offsets of the base joints are metres in a hand of scale 1.
 """
 
 import numpy as np
@@ -37,7 +37,11 @@ _KNUCKLE_SPREAD, _THUMB_SPREAD = 0.003, 0.004
 
 
 def hand_of(values: Array, side: Side, source: str = "") -> HandShape:
-    """The hand of these sizes (35,). Raises InputError where they are out of any hand's range."""
+    """Return the hand of these sizes (35,).
+
+    Raises:
+        InputError: if a size is outside the range of hands.
+    """
     average = HandShape()
     breadth, length, thickness = np.exp(values[PALM])
     bases = average.bases * [breadth, length, 1.0]
@@ -59,7 +63,7 @@ def hand_of(values: Array, side: Side, source: str = "") -> HandShape:
 
 
 def prior_covariance() -> Array:
-    """(35, 35): how sizes vary among people, about the average adult's. Parts of one finger vary together."""
+    """Return the covariance (35, 35) of the sizes among people; phalanges of a finger covary."""
     C = np.zeros((COUNT, COUNT))
     C[SCALE, SCALE] = _SCALE_SPREAD**2
     C[LENGTHS, LENGTHS] = np.kron(np.eye(5), np.full((3, 3), _FINGER_SPREAD**2)) + _PHALANX_SPREAD**2 * np.eye(15)
@@ -71,10 +75,10 @@ def prior_covariance() -> Array:
 
 
 def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Array:
-    """Derivative (N, 3, 35) by the sizes of `model` of points (N, 3) on the skin of `bodies` (N,), camera frame.
+    """Return the derivative (N, 3, 35) by the sizes of `model` of points (N, 3) on the skin, metres, camera frame.
 
-    The skin is taken to stretch with its bone: along it with its length, across it with its width, and to be carried
-    along by what lies before it. That is exact for bones and scale, and good enough for flesh to find the way by.
+    bodies: (N,) body of each point. The skin stretches along its bone with the length, across it with the width, and
+    moves with the bones before it. That is exact for bones and scale, and an approximation for flesh.
     """
     T, shape = model.transforms(pose), model.shape
     R, scale = T[0, :3, :3], shape.scale
@@ -108,10 +112,10 @@ def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Ar
 
 
 def measures(values: Array) -> dict[str, tuple[float, Array]]:
-    """What people ask for: each length or width (m), and the gradient (35,) of its logarithm by the sizes.
+    """Return each length and width (m) by name, and the gradient (35,) of its logarithm by the sizes.
 
-    The hand from the wrist to the middle finger's tip, fingers from base joint to tip; their width is the diameter of
-    the middle joint, the thumb's of its last one.
+    The hand length is from the wrist to the tip of the middle finger, a finger length from base joint to tip. A width
+    is the diameter of the middle joint, or of the last joint of the thumb.
     """
     hand, table = hand_of(values, "right"), {}
     lengths = hand.lengths * hand.scale

@@ -1,9 +1,9 @@
-"""What one view says of a pose and of the sizes: the distances between hand and observation, linearised.
+"""Residuals of one view between hand and observation, linearised by pose and sizes.
 
-Observed points are drawn to the nearest skin that the camera sees, along normals. The outline of the seen skin is drawn
-to that of the observed silhouette, from either side: skin beside the observed hand inwards (as by Tagliasacchi et al.,
-"Robust articulated-ICP for real-time hand tracking", SGP 2015, Sec. 4), skin that leaves it bare outwards. The first
-alone would let a hand be too small, and depth alone sees neither how broad nor how long a finger is.
+Observed points have residuals along normals to the nearest visible skin. The outline of the visible skin has residuals
+to that of the observed silhouette: inwards for skin outside it (Tagliasacchi et al., "Robust articulated-ICP for
+real-time hand tracking", SGP 2015, Sec. 4), outwards for skin inside it. The inward ones alone would accept a hand that
+is too small, and depth alone determines neither breadth nor length of a finger.
 """
 
 from dataclasses import dataclass
@@ -25,17 +25,17 @@ from depthtrack.solver.robust import geman_mcclure, symmetric_direction
 from depthtrack.types import Array, Index, Mask
 
 _POINTS = 1200
-"""Points of a view that are used, about."""
+"""Approximate number of points of a view that are used."""
 _REACH, _AGREEMENT = 0.04, 0.3
-"""Metres, and the cosine between normals, within which a point can be matched."""
+"""Metres and cosine between normals: limits of a correspondence."""
 _WRIST_ROOM = 0.012
-"""Metres from the wrist within which nothing is asked of the hand: where it was cut off is not sure."""
+"""Metres from the wrist without residuals: the position of the cut between hand and forearm is uncertain."""
 PATCH = 0.010
 """Metres: errors of sensor and model are alike within a patch of this side, which counts as one measurement."""
 
 
 class CalibrationView:
-    """One frame's observation, prepared for many fits."""
+    """The observation of one frame, prepared for many fits."""
 
     def __init__(self, observation: Observation) -> None:
         self.observation = observation
@@ -43,20 +43,23 @@ class CalibrationView:
         pick = slice(every // 2, None, every)
         self.points, self.normals = observation.points[pick], observation.normals[pick]
         self.beyond = _beyond(observation.skin)
-        """(h, w) pixels by which each lies outside the silhouette, negative inside."""
+        """(h, w) signed distance to the silhouette in pixels, negative inside."""
         slope = np.stack([np.gradient(self.beyond, axis=axis) for axis in (0, 1)])
         self.outward = slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-9)
         """(2, h, w) unit, by row and column: away from the silhouette."""
         pixel = float(observation.centre[2]) / observation.camera.fx
         self.patches = max(1.0, np.count_nonzero(observation.depth) * pixel**2 / PATCH**2)
-        """Independent measurements that the view amounts to."""
+        """Number of independent measurements in the view."""
 
 
 class PosedSkin:
-    """The skin of a hand of some sizes, as cameras see it.
+    """The skin of a hand of given sizes, rendered in the views.
 
-    While sizes are sought, it is the average hand's skin stretched along and across its bones, which takes no time;
-    `exact` makes the skin of those very sizes, and raises InputError where it does not hold together.
+    By default it is the skin of the average hand, stretched along and across its bones, which is fast. `exact` builds
+    the skin of the sizes.
+
+    Raises:
+        InputError: if `exact` and the sizes give no single solid hand.
     """
 
     def __init__(self, shape: HandShape, exact: bool = False) -> None:
@@ -66,21 +69,24 @@ class PosedSkin:
         self.wrist = shape.wrist[1] + _WRIST_ROOM
 
     def seen(self, view: CalibrationView, pose: Array) -> Surface:
-        """The skin in a pose (27,) through the view's camera."""
+        """Return the skin in a pose (27,), rendered with the camera of the view."""
         skin = self._skin
         vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)
         return rasterise(view.observation.camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
 
     def is_hand(self, pose: Array, points: Array) -> Mask:
-        """Which points (N, 3) lie before the wrist, towards the fingers."""
+        """Return whether points (N, 3), metres, camera frame, lie on the side of the wrist with the fingers."""
         T = self.model.transforms(pose)[0]
         return np.asarray((points - T[:3, 3]) @ T[:3, 1] > self.wrist)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Weighted sums over a view's residuals e (m) with gradients a by pose and sizes (26 + 35): `H` of a a^T, `g` of
-    a e; `count` of residuals; `distance` (m), the median of the observed points to the skin."""
+    """Normal equations of a view, from residuals e (m) with gradients a by pose and sizes (26 + 35).
+
+    H: (61, 61) weighted sum of a a^T; g: (61,) of a e; count: number of residuals; distance: m, median of the observed
+    points to the skin, infinite if there are none.
+    """
 
     H: Array
     g: Array
@@ -90,8 +96,11 @@ class Evidence:
 
 @dataclass(frozen=True)
 class _Residuals:
-    """`errors` (N,) m of skin points `x` (N, 3) on `bodies` (N,) along `directions` (N, 3); each counts by its whole
-    `distance` (N,)."""
+    """Residuals of skin points along directions.
+
+    bodies: (N,); x: (N, 3) metres, camera frame; directions: (N, 3); errors: (N,) m, signed; distances: (N,) m, from
+    which the robust weights follow.
+    """
 
     bodies: Index
     x: Array
@@ -128,7 +137,7 @@ def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale:
 
 
 def _stretches(shape: HandShape, average: HandShape) -> Array:
-    """(16, 4, 4) that bring the average hand's flesh to these sizes, in the frame of the body it is fixed to."""
+    """Return the stretches (16, 4, 4), body frames, from the flesh of the average hand to these sizes."""
     S = np.tile(np.eye(4), (BODY_COUNT, 1, 1))
     sizes = ("palm_breadth", "palm_length", "palm_thickness")
     S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(average, size) for size in sizes]
@@ -144,7 +153,7 @@ def _stretches(shape: HandShape, average: HandShape) -> Array:
 def _surface_residuals(
     view: CalibrationView, skin: PosedSkin, pose: Array, bodies: Index, x: Array, normals: Array
 ) -> _Residuals:
-    """From the nearest seen skin to each point, along the mean of both normals (Rusinkiewicz 2019)."""
+    """Return the residuals from the nearest visible skin to each point, along the mean of both normals."""
     distance, nearest = map(np.asarray, cKDTree(x).query(view.points, distance_upper_bound=_REACH))
     found = np.flatnonzero(np.isfinite(distance))
     found = found[skin.is_hand(pose, view.points[found])]
@@ -158,8 +167,10 @@ def _surface_residuals(
 def _outline_residuals(
     view: CalibrationView, skin: PosedSkin, pose: Array, bodies: Index, x: Array, places: Index
 ) -> _Residuals:
-    """From the outline of the seen skin to that of the silhouette, across both; `places` (h, w) index `x`, -1 for no
-    skin."""
+    """Return the residuals from the outline of the visible skin to that of the silhouette.
+
+    places: (h, w) index into `x`, -1 without skin.
+    """
     inner = binary_erosion(places >= 0, border_value=1)
     row, column = np.nonzero((places >= 0) & ~inner)
     k = places[row, column]
@@ -175,7 +186,7 @@ def _outline_residuals(
 
 
 def _gradients(model: HandModel, pose: Array, residuals: _Residuals) -> Array:
-    """(N, 26 + 35) of the errors, by pose and sizes."""
+    """Return the gradients (N, 26 + 35) of the errors by pose and sizes."""
     bodies, x, n = residuals.bodies, residuals.x, residuals.directions
     a = np.empty((len(x), TANGENT_SIZE + COUNT))
     a[:, :TANGENT_SIZE] = np.einsum("ni,nij->nj", n, model.point_jacobian(pose, bodies, x))
@@ -184,6 +195,6 @@ def _gradients(model: HandModel, pose: Array, residuals: _Residuals) -> Array:
 
 
 def _beyond(mask: Mask) -> Array:
-    """(h, w) how many pixels each lies outside the mask's outline, negative inside."""
+    """Return the signed distance (h, w) to the outline of the mask in pixels, negative inside."""
     outside, inside = (np.asarray(distance_transform_edt(part), dtype=np.float64) for part in (~mask, mask))
     return np.where(mask, 0.5 - inside, outside - 0.5)

@@ -28,12 +28,12 @@ KEYPOINT_NAMES = ("wrist", *ENDPOINT_NAMES)
 
 
 def body_of(finger: int, phalanx: int) -> int:
-    """Index of a phalanx among the 16 bodies."""
+    """Return the index of a phalanx among the 16 bodies."""
     return 1 + 3 * finger + phalanx
 
 
 def _moves() -> Mask:
-    """(16, 20): whether an angle moves a body. Abduction and first flexion move the whole finger."""
+    """Return whether an angle moves a body (16, 20). Abduction and first flexion move the whole finger."""
     moves = np.zeros((BODY_COUNT, 20), dtype=np.bool_)
     for finger in range(5):
         for phalanx in range(3):
@@ -81,26 +81,26 @@ class HandModel:
         return np.einsum("...ij,j->...i", rotation_matrix(p[..., ORIENTATION]), self.shape.wrist) + p[..., POSITION]
 
     def joints(self, pose: ArrayLike) -> Array:
-        """The 16 joints (..., 16, 3) in the camera frame, metres: the wrist, then the origin of each phalanx."""
+        """Return the 16 joints (..., 16, 3), metres, camera frame: the wrist, then the origin of each phalanx."""
         joints = self.transforms(pose)[..., :3, 3].copy()
         joints[..., 0, :] = self.wrist(pose)
         return joints
 
     def endpoints(self, pose: ArrayLike) -> Array:
-        """The 20 phalanx endpoints (..., 20, 3), metres: per finger the base, two joints and the tip."""
+        """Return the 20 phalanx endpoints (..., 20, 3), metres, camera frame: base, two joints and tip a finger."""
         return self.endpoints_of(self.transforms(pose))
 
     def keypoints(self, pose: ArrayLike) -> Array:
-        """The 21 keypoints (..., 21, 3) in MediaPipe's order, metres: the wrist, then the endpoints."""
+        """Return the 21 keypoints (..., 21, 3), metres, camera frame, in MediaPipe's order."""
         return np.concatenate([self.wrist(pose)[..., None, :], self.endpoints(pose)], axis=-2)
 
     def transform_points(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
-        """Camera-frame positions (..., N, 3) of points (N, 3) fixed to `bodies` (N,)."""
+        """Return the camera-frame positions (..., N, 3), metres, of points (N, 3) fixed to `bodies` (N,)."""
         T = self.transforms(pose)[..., np.asarray(bodies), :, :]
         return np.einsum("...nij,nj->...ni", T[..., :3, :3], np.asarray(local_points)) + T[..., :3, 3]
 
     def point_jacobian(self, pose: ArrayLike, bodies: ArrayLike, points: ArrayLike) -> Array:
-        """Derivative (..., N, 3, 26) of camera-frame points (..., N, 3) fixed to `bodies` (N,).
+        """Return the derivative (..., N, 3, 26) of camera-frame points (..., N, 3) fixed to `bodies` (N,).
 
         Columns follow the tangent space of `pose.retract`. A revolute joint moves a point by the cross product of
         its axis and the lever arm (Schroeder et al. 2014, Eq. 5).
@@ -120,7 +120,7 @@ class HandModel:
         return J
 
     def _axes(self, T: Array) -> tuple[Array, Array]:
-        """Rotation axes and origins (..., 20, 3) of the angles in the camera frame."""
+        """Return the rotation axes and origins (..., 20, 3) of the angles, camera frame."""
         axes = np.empty((*T.shape[:-3], 20, 3))
         origins = np.empty_like(axes)
         abduction = self.base_transforms[:, :3, 2] * -self.shape.mirror
@@ -146,7 +146,7 @@ class HandModel:
 
 
 def _cross_matrix(v: Array) -> Array:
-    """[v]x (..., 3, 3) with [v]x u = v x u."""
+    """Return the matrices [v]x (..., 3, 3) with [v]x u = v x u."""
     x, y, z = np.moveaxis(v, -1, 0)
     zero = np.zeros_like(x)
     rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]

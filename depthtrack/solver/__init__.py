@@ -1,1 +1,1 @@
-"""Fitting a posed hand to data: correspondences, residuals, priors, Gauss-Newton and particle swarms."""
+"""Optimisation of a posed hand: residual blocks, priors, subspaces, one Gauss-Newton, and particle swarms."""

@@ -1,4 +1,4 @@
-"""The seen vertex closest to each observed point, sixteen vertices at a time."""
+"""Search for the visible vertex closest to each observed point, sixteen vertices at a time."""
 
 import math
 
@@ -10,7 +10,7 @@ from depthtrack.types import Array32
 
 LANES = F32X16.lanes
 FAR = np.float32(1e6)
-"""Metres: where nothing is."""
+"""Metres: coordinate of padding, beyond any vertex."""
 _LANE: Array32 = np.arange(LANES, dtype=np.float32)
 
 _load = loader(F32X16)
@@ -19,12 +19,11 @@ _fill = filler(F32X16)
 
 @kernel_part
 def closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, closest):
-    """Find, for each point of the cloud (N), which of the vertices `seen` is closest, into `closest` (N,); -1 for none.
+    """Write the index among `seen` of the vertex closest to each point of the cloud (N) to `closest` (N,), -1 for none.
 
-    None is further than `max_distance` (m); the cosine between the normals is at least `min_normal_cosine`. Cells are
-    looked through
-    in ever wider squares around the point's own, until no vertex beyond can be closer. Those of a row that lie beside
-    one another hold vertices that do; that sixteen of them may reach into further cells does no harm.
+    max_distance: m, largest distance; min_normal_cosine: smallest cosine between the normals. Cells are searched in
+    growing squares around the cell of the point, until no vertex beyond can be closer. Neighbouring cells of a row are
+    contiguous in memory; a load of sixteen vertices may reach into further cells, which does no harm.
     """
     points, normals, origin, first = cloud.points, cloud.normals, seen.origin, seen.first
     sx, sy, sz, nx, ny, nz = (
@@ -42,7 +41,7 @@ def closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, closes
     lanes, limit, least = _load(_LANE, 0), np.float32(max_distance * max_distance), np.float32(min_normal_cosine)
     for i in range(points.shape[0]):
         z = points[i, 2]
-        # The point's place among the cells, and what a cell's side is worth there.
+        # The position of the point among the cells, and the side of a cell in metres there.
         p, q = (points[i, 0] / z - cells.u) / cells.size, (points[i, 1] / z - cells.v) / cells.size
         column, row, side = int(p), int(q), cells.size * z * slant
         inside = min(p - column, column + 1 - p, q - row, row + 1 - q)

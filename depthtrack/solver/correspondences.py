@@ -1,4 +1,4 @@
-"""Correspondences: for each observed point, the closest point of the hand's surface that the camera can see."""
+"""Correspondences: the closest visible point of the surface of the hand for each observed point."""
 
 from typing import NamedTuple, Protocol
 
@@ -10,14 +10,17 @@ from depthtrack.types import Array, Index
 
 
 class PointCloud(NamedTuple):
-    """Observed points (N, 3), metres, camera frame, and their unit normals (N, 3) towards the camera."""
+    """Observed points with normals.
+
+    points: (N, 3) metres, camera frame; normals: (N, 3) unit, camera frame, towards the camera.
+    """
 
     points: Array
     normals: Array
 
     @staticmethod
     def of(observation: Observation, every: int) -> "PointCloud":
-        """Every so many-th point of an observation: uniform subsampling (Schroeder et al. 2014, Sec. VI-B)."""
+        """Return every n-th point of an observation: uniform subsampling (Schroeder et al. 2014, Sec. VI-B)."""
         pick = slice(every // 2, None, every)
         return PointCloud(
             np.ascontiguousarray(observation.points[pick]), np.ascontiguousarray(observation.normals[pick])
@@ -25,8 +28,11 @@ class PointCloud(NamedTuple):
 
 
 class Correspondences(NamedTuple):
-    """What each observed point is matched to: `body` (N,) that moves the surface there, -1 for none; the surface's
-    point `x` (N, 3) and its outward unit normal `n` (N, 3), camera frame."""
+    """The point of the surface that corresponds to each observed point.
+
+    body: (N,) body that moves the surface there, -1 for no correspondence; x: (N, 3) metres, camera frame; n: (N, 3)
+    outward unit normal, camera frame.
+    """
 
     body: Index
     x: Array
@@ -34,15 +40,15 @@ class Correspondences(NamedTuple):
 
     @staticmethod
     def allocate(count: int) -> "Correspondences":
-        """Room for so many."""
+        """Allocate correspondences for `count` points."""
         return Correspondences(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3)))
 
 
 class Surface(Protocol):
-    """A hand's surface that observed points can be matched to."""
+    """A surface of the hand that correspondences are searched on."""
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        """Prepare for matches with points of this cloud; none will be further than `max_distance` (m)."""
+        """Prepare searches for points of this cloud; correspondences are at most `max_distance` (m) long."""
         ...
 
     def match(
@@ -53,10 +59,9 @@ class Surface(Protocol):
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        """The closest seen points of the hand in `pose` (27,), whose `bodies` are already placed, into
-        `correspondences`.
+        """Write the closest visible points of the hand to `correspondences`.
 
-        Only surface whose normal agrees with the observed one counts: `min_normal_cosine` is the least cosine between
-        them.
+        pose: (27,), in which `bodies` are placed already; min_normal_cosine: smallest cosine between the normal of the
+        surface and the observed one.
         """
         ...

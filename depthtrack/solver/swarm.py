@@ -1,7 +1,7 @@
-"""Particle swarm optimisation in a box (Oikonomidis et al. 2011, Sec. 2.4): knows nothing of hands but their fingers.
+"""Particle swarm optimisation in a box (Oikonomidis et al. 2011, Sec. 2.4).
 
-Constriction PSO after Clerc and Kennedy 2002, "nearest point" bounds after Helwig and Wanka 2007, and the partial
-randomisation after Yasuda et al. 2010 that keeps the fingers from collapsing into the first minimum met.
+Constriction PSO after Clerc and Kennedy 2002, "nearest point" bounds after Helwig and Wanka 2007. Partial
+randomisation after Yasuda et al. 2010 keeps the fingers from collapsing into the first minimum.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from depthtrack.types import Array
 
 
 class Optimum(NamedTuple):
-    """The best position (D,) a swarm met, and its energy."""
+    """The best position (D,) of a swarm, and its energy."""
 
     position: Array
     energy: float
@@ -30,10 +30,10 @@ def minimise(
     generator: np.random.Generator,
     options: SwarmOptions,
 ) -> Optimum:
-    """Let a swarm evolve from `particles` (N, D) within the box `lower`, `upper` (D,).
+    """Return the optimum of a swarm that evolves from `particles` (N, D) within the box `lower`, `upper` (D,).
 
-    `score` gives energies (N,) of positions (N, D); `fingers` are the dimensions that may be randomised. The number
-    of evaluations is N times `options.generations`. The same generator state gives the same bits.
+    score: returns energies (N,) of positions (N, D); fingers: dimensions that may be randomised. The number of
+    evaluations is N times `options.generations`. Equal generator states give equal bits.
     """
     position = np.clip(particles, lower, upper)
     velocity = np.zeros_like(position)
@@ -66,7 +66,7 @@ def advance(
     social: float,
     inertia: float,
 ) -> None:
-    """One step of Eq. (3) and (4), in place; a particle that would leave the box stops at its nearest point.
+    """Advance all particles by Eq. (3) and (4), in place; one that would leave the box stops at its nearest point.
 
     `position`, `velocity`, `own_best` (N, D); `best` (D,); `draws` (2, N, D) uniform in 0..1: r1 and r2.
     """
@@ -87,7 +87,7 @@ def randomise(
     generator: np.random.Generator,
     options: SwarmOptions,
 ) -> None:
-    """Disturb a share of the particles, each in one finger dimension drawn at random (Sec. 2.4), in place."""
+    """Draw one random finger dimension of a share of the particles anew (Sec. 2.4), in place."""
     count = round(options.randomise * len(position))
     who = generator.permutation(len(position))[:count]
     dimension = generator.integers(fingers.start, fingers.stop, count)

@@ -1,4 +1,4 @@
-"""The spaces a swarm may fly in: the paper's 27 pose parameters, or the 26-dimensional tangent space of a pose."""
+"""Search spaces of a swarm: the 27 pose parameters of the paper, or the 26-dimensional tangent space of a pose."""
 
 from typing import Protocol
 
@@ -11,22 +11,22 @@ from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, t
 from depthtrack.types import Array
 
 POSITION_RANGE = 0.5
-"""Half side of the box of positions (metres): wide enough that only a lost swarm meets it."""
+"""Metres, half side of the box of positions: only a diverged swarm reaches it."""
 
 
 class SwarmSpace(Protocol):
-    """Coordinates of poses for a swarm: dimensions, bounds, and the way to poses and back."""
+    """Coordinates of poses for a swarm, with their bounds, and the maps to poses and back."""
 
     lower: Array
     upper: Array
     fingers: slice
 
     def poses(self, coordinates: Array) -> Array:
-        """Poses (N, 27) at coordinates (N, D)."""
+        """Return the poses (N, 27) at coordinates (N, D)."""
         ...
 
     def coordinates(self, poses: Array) -> Array:
-        """Coordinates (N, D) of poses (N, 27)."""
+        """Return the coordinates (N, D) of poses (N, 27)."""
         ...
 
 
@@ -41,7 +41,7 @@ class ParameterSpace:
         self._quaternion = reference[ORIENTATION]
 
     def poses(self, coordinates: Array) -> Array:
-        # A quaternion of no length says nothing: it keeps the reference's orientation.
+        # A quaternion of length zero has no orientation: it gets that of the reference.
         poses = coordinates.copy()
         length = np.linalg.norm(poses[:, ORIENTATION], axis=1, keepdims=True)
         usable = length > 1e-6
@@ -49,7 +49,7 @@ class ParameterSpace:
         return poses
 
     def coordinates(self, poses: Array) -> Array:
-        # Of the two quaternions of a rotation, the one on the reference's side.
+        # Of the two quaternions of a rotation, the one nearer to that of the reference.
         flip = np.sign(poses[:, ORIENTATION] @ self._quaternion)[:, None]
         coordinates = poses.copy()
         coordinates[:, ORIENTATION] *= np.where(flip == 0, 1, flip)
@@ -63,9 +63,9 @@ class TangentSpace:
 
     def __init__(self, reference: Array) -> None:
         self.reference = within_limits(reference)
-        allocate = np.concatenate([np.full(3, POSITION_RANGE), np.full(3, np.pi)])
-        self.lower = np.concatenate([-allocate, LOWER - self.reference[ANGLES]])
-        self.upper = np.concatenate([allocate, UPPER - self.reference[ANGLES]])
+        reach = np.concatenate([np.full(3, POSITION_RANGE), np.full(3, np.pi)])
+        self.lower = np.concatenate([-reach, LOWER - self.reference[ANGLES]])
+        self.upper = np.concatenate([reach, UPPER - self.reference[ANGLES]])
 
     def poses(self, coordinates: Array) -> Array:
         poses = np.empty((len(coordinates), POSE_SIZE))
