@@ -56,6 +56,10 @@ class Clearance:
         return start, end
 
     def _between_fingers(self, start: Array, end: Array) -> Array:
+        """Return the depth (...,) of the worst overlap of two phalanges.
+
+        It is measured between the closest points of both axes; `geometry.capsules` has one capsule and a point.
+        """
         flat = (*start.shape[:-3], 15, 3)
         start, end = start.reshape(flat), end.reshape(flat)
         r0, r1 = self._radii[:, :-1].ravel(), self._radii[:, 1:].ravel()

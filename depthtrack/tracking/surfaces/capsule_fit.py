@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from depthtrack.geometry.capsules import capsule_distance
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
@@ -64,15 +65,14 @@ def fitted_capsules(shape: HandShape) -> Capsules:
 
 
 def distance(ends: Array, points: Array) -> Array:
-    """Signed distance (N,) of points (N, 3) to a capsule: start (3), end (3) and both radii, as one vector (8,)."""
+    """Return the signed distance (N,), metres, of points (N, 3) to a capsule (8,): start, end and both radii."""
     axis = ends[3:6] - ends[:3]
     length = float(np.linalg.norm(axis))
     taper = float(_taper(np.array(ends[6] - ends[7]), np.array(length)))
     offset = points - ends[:3]
     along = offset @ axis / length
     across = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset) - along**2, 0))
-    t = np.clip(along - across * taper / np.sqrt(1 - taper**2), 0, length)
-    return np.asarray(np.sqrt((along - t) ** 2 + across**2) - (ends[6] - taper * t))
+    return capsule_distance(along, across, ends[6], taper, length)
 
 
 def _taper(lost: Array, length: Array) -> Array:

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.geometry.capsules import compiled_nearest_ball
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
@@ -98,7 +99,10 @@ def place_capsules(capsules: Capsules, bodies: BodyPoses, placed: Placed) -> Non
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -> None:
-    """Distances of points (N, 3) to all capsules; `out` may have room for more points."""
+    """Write the distances of points (N, 3) to all capsules to `out`, which may have space for more points.
+
+    The distance is `geometry.capsules.capsule_distance`, unsigned and in single precision, written for vectorisation.
+    """
     count = points.shape[0]
     each, least, which = out
     # Single precision, coordinate by coordinate: twice as many points at a time, and tenths of micrometres are left.
@@ -112,7 +116,6 @@ def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -
         ax, ay, az = np.float32(placed.axis[k, 0]), np.float32(placed.axis[k, 1]), np.float32(placed.axis[k, 2])
         length, radius = np.float32(capsules.length[k]), np.float32(capsules.radius[k])
         taper = np.float32(capsules.taper[k])
-        # The nearest of the balls that sweep the capsule lies where the cone's normal leads, not straight across.
         lean = taper / np.float32(math.sqrt(1.0 - taper * taper))
         distance, number = each[k], np.int32(k)
         for i in range(count):
@@ -173,8 +176,7 @@ def surface_point(points: Array, i: int, capsules: Capsules, placed: Placed, k: 
         along += (points[i, j] - placed.start[k, j]) * placed.axis[k, j]
     for j in range(3):
         square += (points[i, j] - placed.start[k, j] - along * placed.axis[k, j]) ** 2
-    t = along - math.sqrt(square) * taper / math.sqrt(1.0 - taper * taper)
-    t = min(max(t, 0.0), capsules.length[k])
+    t = compiled_nearest_ball(along, math.sqrt(square), taper, capsules.length[k])
     radius = capsules.radius[k] - taper * t
     scale = 1 / max(math.sqrt(square + (along - t) ** 2), 1e-12)
     sight = square = 0.0
