@@ -43,5 +43,5 @@ clean:
 	@touch $@
 
 .venv/.ready-test: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf,witness,sweep]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf,embree,sweep]'
 	@touch $@

@@ -1,4 +1,4 @@
-"""Our renderers against an outside witness: rays cast by embree, a library that shares no line with them."""
+"""Compare the renderers with rays cast by embree, a library that shares no code with them."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from depthtrack.rendering.surface import Surface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.types import Array
 
-pytest.importorskip("embreex", reason="no outside witness: pip install 'depthtrack[witness]'")
+pytest.importorskip("embreex", reason="embree is not installed: pip install 'depthtrack[embree]'")
 
 
 def embree_depth(camera: Camera, vertices: Array, faces: NDArray[np.int64]) -> Array:
@@ -65,10 +65,10 @@ def test_the_triangle_renderer_sees_the_skin_as_embree_does(hand: int, seed: int
     vertices = skin.vertices(HandModel(shape).transforms(pose))
     ours = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies).depth
     theirs = embree_depth(camera, vertices, skin.faces)
-    seen, witnessed = ours > 0, theirs > 0
-    assert np.count_nonzero(witnessed) > 200
-    assert np.count_nonzero(seen != witnessed) <= 1e-3 * np.count_nonzero(witnessed)
-    difference = np.abs(ours - theirs)[seen & witnessed]
+    seen, expected = ours > 0, theirs > 0
+    assert np.count_nonzero(expected) > 200
+    assert np.count_nonzero(seen != expected) <= 1e-3 * np.count_nonzero(expected)
+    difference = np.abs(ours - theirs)[seen & expected]
     assert difference.max() < 1e-4
     # trimesh intersects the triangle that embree found once more, in float64.
     assert np.quantile(difference, 0.99) < 1e-9
@@ -83,10 +83,10 @@ def test_the_ray_caster_sees_the_primitives_as_embree_does(seed: int) -> None:
     surface = raycast(camera, primitives.kinds, primitives.placed(transforms), primitives.bodies)
     mesh = Tessellation.of(primitives, subdivisions=5)
     theirs = embree_depth(camera, mesh.posed(transforms), mesh.faces)
-    seen, witnessed = surface.depth > 0, theirs > 0
-    common = seen & witnessed
+    seen, expected = surface.depth > 0, theirs > 0
+    common = seen & expected
     assert np.count_nonzero(common) > 200
-    assert np.count_nonzero(seen != witnessed) <= 3e-3 * np.count_nonzero(witnessed)
+    assert np.count_nonzero(seen != expected) <= 3e-3 * np.count_nonzero(expected)
     # Facets lie up to 20 micrometres inside the true surface, and never outside it.
     deeper = along_normal(camera, surface, theirs)[common]
     assert np.quantile(deeper, [0.005, 0.995]) == pytest.approx(1e-5, abs=1e-5)

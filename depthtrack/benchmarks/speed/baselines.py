@@ -25,7 +25,7 @@ from depthtrack.types import Array, Array32, Depth
 INSTALL = {
     "pyrender": "pip install pyrender && pip install --upgrade PyOpenGL",  # it pins a PyOpenGL too old for numpy 2
     "open3d": "pip install open3d",
-    "embree": "pip install 'depthtrack[witness]'",
+    "embree": "pip install 'depthtrack[embree]'",
 }
 """Libraries compared with, and the line that brings each."""
 
