@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from depthtrack.evaluation.compare.comparison import Comparison, compare
-from depthtrack.evaluation.compare.results import as_table, lines_of
+from depthtrack.evaluation.compare.results import as_table, tracker_results
 from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec
 from depthtrack.evaluation.evaluate import evaluate_run
@@ -28,7 +28,7 @@ def main(folder: str, frames: int = 90, distances: tuple[float, ...] = (0.5, 1.0
     specs = (TrackerSpec("PSO", PsoConfig()), TrackerSpec("IK", IkConfig()))
     runs = compare(Comparison(tuple(sources), specs), Path(folder), LocalWorkers(jobs))
     evaluations = [evaluate_run(Path(run.folder)) for run in runs]
-    print(as_table(lines_of(evaluations)))
+    print(as_table(tracker_results(evaluations)))
     write_report(evaluations, Path(folder) / "report.html")
     return Path(folder) / "report.html"
 

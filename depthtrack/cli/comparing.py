@@ -7,8 +7,8 @@ from pathlib import Path
 
 from depthtrack.cli.output_folder import check_output_folder
 from depthtrack.cli.progress import bar, counter
-from depthtrack.evaluation.compare.comparison import Comparison, Listener, Progress, compare
-from depthtrack.evaluation.compare.results import as_table, evaluate_runs, lines_of, result, write_results
+from depthtrack.evaluation.compare.comparison import Comparison, ComparisonProgress, Listener, compare
+from depthtrack.evaluation.compare.results import as_table, evaluate_runs, run_record, tracker_results, write_results
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.recording.sequence import Frame
@@ -24,9 +24,9 @@ def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, a
     looked_at = evaluate_runs(folders, workers)
     evaluations = list(bar(looked_at, "run", len(folders), "measuring"))
     if as_json:
-        print(json.dumps([result(evaluation) for evaluation in evaluations], indent=2))
+        print(json.dumps([run_record(evaluation) for evaluation in evaluations], indent=2))
     else:
-        print(as_table(lines_of(evaluations)))
+        print(as_table(tracker_results(evaluations)))
     write_everything(evaluations, folder, quiet=as_json)
 
 
@@ -51,7 +51,7 @@ def _bar() -> Iterator[Listener]:
     """A progress bar over the frames of all runs."""
     with counter() as shown:
 
-        def listen(progress: Progress) -> None:
+        def listen(progress: ComparisonProgress) -> None:
             shown.set_description(progress.what)
             if progress.total:
                 shown.total, shown.n = progress.total, progress.frames

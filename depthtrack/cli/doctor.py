@@ -8,7 +8,7 @@ from depthtrack.errors import DepthtrackError, InputError
 from depthtrack.text_table import aligned
 
 if TYPE_CHECKING:
-    from depthtrack.rendering.doctor import Machine, Outcome
+    from depthtrack.rendering.doctor import Outcome, SystemInfo
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Command:
         from dataclasses import asdict
         from json import dumps
 
-        from depthtrack.rendering.doctor import Machine, examine
+        from depthtrack.rendering.doctor import SystemInfo, examine
 
         if not 0 < self.time_limit <= 3600:
             raise InputError(f"--time-limit must lie between 0 and 3600 seconds, found {self.time_limit:g}")
-        machine = Machine.here()
+        machine = SystemInfo.here()
         outcomes = examine(
             self.time_limit,
             progress=lambda trials: bar(trials, "renderer"),
@@ -47,7 +47,7 @@ class Command:
             raise DepthtrackError(f"the default renderer, {default.trial.label}, does not work here: {default.problem}")
 
 
-def _text(machine: "Machine", outcomes: "list[Outcome]") -> str:
+def _text(machine: "SystemInfo", outcomes: "list[Outcome]") -> str:
     """Aligned lines for people, depth in millimetres."""
     libraries = [f"{name} {version}" for name, version in machine.libraries.items() if version]
     absent = [name for name, version in machine.libraries.items() if version is None]

@@ -29,7 +29,7 @@ from depthtrack.recording.sequence import GroundTruth
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.types import Array
 
-Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
+FrameProgress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
 """Wraps the frames as they are looked at again: a progress bar."""
 
 
@@ -88,7 +88,7 @@ class Evaluation:
 
 
 def evaluate_run(
-    folder: Path, sequence: Path | None = None, residuals: bool = True, progress: Progress | None = None
+    folder: Path, sequence: Path | None = None, residuals: bool = True, progress: FrameProgress | None = None
 ) -> Evaluation:
     """Hold the run in `folder` against the recording it tracked, or against `sequence` where that has moved.
 
@@ -98,7 +98,7 @@ def evaluate_run(
     return evaluate(Replay.open(Run.load(folder), sequence), residuals, progress)
 
 
-def evaluate(replay: Replay, residuals: bool = True, progress: Progress | None = None) -> Evaluation:
+def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | None = None) -> Evaluation:
     """See `evaluate_run`."""
     run, model = replay.run, HandModel(replay.hand)
     points, truth_metrics = _against_truth(run, model, replay.sequence.ground_truth)

@@ -23,7 +23,7 @@ _LIBRARIES = (
 
 
 @dataclass(frozen=True)
-class Machine:
+class SystemInfo:
     """What the program runs on. `libraries` maps names to versions, None where not installed."""
 
     depthtrack: str

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from depthtrack import __version__
 from depthtrack.errors import InputError
-from depthtrack.evaluation.compare.results import Line, figures_of, lines_of
+from depthtrack.evaluation.compare.results import TrackerResult, figures_of, tracker_results
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.files import write_atomic
 from depthtrack.recording.sequence import Frame
@@ -80,7 +80,7 @@ def write_report(
     """Write the page; `sequence` is where the recording lies now, if it was moved. Raises InputError."""
     check_reportable(evaluations)
     # In the order of their folders' names, so that the page is the same whoever asks for it.
-    lines = lines_of(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
+    lines = tracker_results(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
     numbers = {label: number for number, label in enumerate(dict.fromkeys(line.label for line in lines))}
     shown = [TrackerSeries(line, numbers[line.label]) for line in lines]
     recordings: dict[str, list[TrackerSeries]] = {}
@@ -183,7 +183,7 @@ def _worst(shown: list[TrackerSeries], metric: str, painter: SideBySide) -> list
     return found
 
 
-def _verdict(lines: Sequence[Line], sections: Sequence[Section]) -> Verdict:
+def _verdict(lines: Sequence[TrackerResult], sections: Sequence[Section]) -> Verdict:
     """`sections` of all recordings, if they are known."""
     contexts = [evaluation.configuration.context for line in lines for evaluation in line.evaluations]
     budgets = {(context.get("budget") or {}).get("equal_ms") for context in contexts}

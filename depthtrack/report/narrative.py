@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from depthtrack.evaluation.compare.results import TRACKER_MS, Line
+from depthtrack.evaluation.compare.results import TRACKER_MS, TrackerResult
 
 ALIKE = 1.05
 """Figures that differ by less than this factor are called the same."""
@@ -36,18 +36,18 @@ class Standing:
     frames: int
 
 
-def judged_by(lines: Sequence[Line]) -> str:
+def judged_by(lines: Sequence[TrackerResult]) -> str:
     """The metric that trackers are judged by: the truth's, where any recording has one, else the distance E3D."""
     return next((line.truth for line in lines if line.truth is not None), "e3d_mm")
 
 
-def error_name(lines: Sequence[Line]) -> str:
+def error_name(lines: Sequence[TrackerResult]) -> str:
     """What the errors are called that trackers are judged by."""
     truths = {line.truth for line in lines if line.truth is not None}
     return "mean error" if len(truths) > 1 else ERRORS[judged_by(lines)]
 
 
-def where(lines: Sequence[Line]) -> str:
+def where(lines: Sequence[TrackerResult]) -> str:
     """On which recordings trackers are judged, where that is not all there is to say."""
     every, judged = {line.source for line in lines}, _winners(lines)
     if not _all_judged(lines):
@@ -55,7 +55,7 @@ def where(lines: Sequence[Line]) -> str:
     return " over all recordings" if len(every) > 1 else ""
 
 
-def standings(lines: Sequence[Line]) -> list[Standing]:
+def standings(lines: Sequence[TrackerResult]) -> list[Standing]:
     """All trackers, the closest first; with an infinite error those that found no hand where others are judged."""
     judged = set(_winners(lines))
     found = []
@@ -75,7 +75,9 @@ def standings(lines: Sequence[Line]) -> list[Standing]:
     return sorted(found, key=lambda standing: standing.error)
 
 
-def verdict(lines: Sequence[Line], equal_ms: float | None = None, matched_model: Sequence[str] = ()) -> Verdict:
+def verdict(
+    lines: Sequence[TrackerResult], equal_ms: float | None = None, matched_model: Sequence[str] = ()
+) -> Verdict:
     """What the comparison says; `equal_ms` where all trackers were given the same time a frame, `matched_model` the
     trackers whose very model every recording's hand was drawn from."""
     found = standings(lines)
@@ -101,7 +103,7 @@ def _matched_model(headline: str, first: str, matched_model: Sequence[str]) -> s
     return f"On {ground}, {headline}"
 
 
-def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
+def _clear(lines: Sequence[TrackerResult], found: Sequence[Standing]) -> tuple[str, str]:
     """One tracker is closest on every recording, or several are alike."""
     first, *others = [standing for standing in found if np.isfinite(standing.error)]
     against = [f"{standing.label}'s {_mm(standing.error)}" for standing in others]
@@ -119,7 +121,7 @@ def _clear(lines: Sequence[Line], found: Sequence[Standing]) -> tuple[str, str]:
     return headline, told
 
 
-def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
+def _split(lines: Sequence[TrackerResult], winners: dict[str, str]) -> tuple[str, str]:
     """Different trackers are closest on different recordings: `winners` by the recordings' paths."""
     labels = list(dict.fromkeys(line.label for line in lines))
     headline = f"{'Neither' if len(labels) == 2 else 'No'} tracker is the closest everywhere"
@@ -141,7 +143,7 @@ def _split(lines: Sequence[Line], winners: dict[str, str]) -> tuple[str, str]:
     return headline, f"Closest are {listed(parts)}."
 
 
-def _elsewhere(lines: Sequence[Line]) -> str:
+def _elsewhere(lines: Sequence[TrackerResult]) -> str:
     """What E3D says of recordings that know no truth, beside others that do."""
     blind = [line for line in lines if judged_by(lines) != "e3d_mm" and line.truth is None]
     judged = _winners([line for line in blind if line.source not in {each.source for each in lines if each.truth}])
@@ -152,7 +154,7 @@ def _elsewhere(lines: Sequence[Line]) -> str:
     return f"Where no truth is known, the sensor's points lie nearest to {told} of {len(judged)}."
 
 
-def _winners(lines: Sequence[Line]) -> dict[str, str]:
+def _winners(lines: Sequence[TrackerResult]) -> dict[str, str]:
     """The label of the closest tracker on each recording that can be judged, by the recording's path."""
     found: dict[str, tuple[float, str]] = {}
     for line in lines:
@@ -162,17 +164,17 @@ def _winners(lines: Sequence[Line]) -> dict[str, str]:
     return {source: label for source, (_, label) in found.items()}
 
 
-def _all_judged(lines: Sequence[Line]) -> bool:
+def _all_judged(lines: Sequence[TrackerResult]) -> bool:
     """Whether every recording says how close trackers are."""
     return set(_winners(lines)) == {line.source for line in lines}
 
 
-def _error(line: Line, lines: Sequence[Line]) -> float | None:
+def _error(line: TrackerResult, lines: Sequence[TrackerResult]) -> float | None:
     """What a line is judged by, mm: its error; where no recording knows a truth, its E3D."""
     return line.figure("e3d_mm", "median") if judged_by(lines) == "e3d_mm" else line.error("mean")
 
 
-def _name(line: Line) -> str:
+def _name(line: TrackerResult) -> str:
     return ERRORS[line.truth or "e3d_mm"]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from depthtrack.evaluation.compare.results import Line
+from depthtrack.evaluation.compare.results import TrackerResult
 from depthtrack.evaluation.compare.specs import label_of as tracker_label
 from depthtrack.recording.sequence import Sequence as Recording
 from depthtrack.report.narrative import listed
@@ -13,7 +13,7 @@ Fact = tuple[str, str]
 _MOST_CHARACTERS = 160
 
 
-def facts_of_recording(recording: Recording, line: Line) -> list[Fact]:
+def facts_of_recording(recording: Recording, line: TrackerResult) -> list[Fact]:
     """Length, camera, hand, and how the recording was made, as far as it says."""
     camera, hand = recording.camera, line.evaluations[0].configuration.hand
     times = recording.timestamps
@@ -31,7 +31,7 @@ def facts_of_recording(recording: Recording, line: Line) -> list[Fact]:
     ]
 
 
-def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
+def facts_of_tracker(label: str, lines: Sequence[TrackerResult]) -> list[Fact]:
     """Tracker, options, seeds, versions and machine; values that differ between runs are told side by side."""
     runs = [evaluation.configuration for line in lines if line.label == label for evaluation in line.evaluations]
     contexts = [run.context for run in runs]
@@ -53,7 +53,7 @@ def facts_of_tracker(label: str, lines: Sequence[Line]) -> list[Fact]:
     return [(name, text) for name, text in facts if text]
 
 
-def bias_warning(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
+def bias_warning(description: Mapping[str, Any], lines: Sequence[TrackerResult]) -> str:
     """Return a warning if a synthetic hand was drawn from the model that some trackers fit, and others do not."""
     favoured = matched_model(description, lines)
     others = [label for label in dict.fromkeys(line.label for line in lines) if label not in favoured]
@@ -66,7 +66,7 @@ def bias_warning(description: Mapping[str, Any], lines: Sequence[Line]) -> str:
     return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
 
 
-def matched_model(description: Mapping[str, Any], lines: Sequence[Line]) -> tuple[str, ...]:
+def matched_model(description: Mapping[str, Any], lines: Sequence[TrackerResult]) -> tuple[str, ...]:
     """Return the trackers that fit the model that a synthetic hand was drawn from, if others fit another; else none."""
     drawn = _drawn_surface(description)
     if not drawn:
@@ -84,7 +84,7 @@ def _drawn_surface(description: Mapping[str, Any]) -> str:
     return str(model) if model in ("skin", "primitives") else ""
 
 
-def _surface(line: Line) -> str:
+def _surface(line: TrackerResult) -> str:
     """Return the surface that the line's tracker fits: see `_drawn_surface`."""
     configuration = line.evaluations[0].configuration
     rig = configuration.hand.get("rig")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from depthtrack.evaluation.compare.results import Line, figures_of
+from depthtrack.evaluation.compare.results import TrackerResult, figures_of
 from depthtrack.evaluation.metrics.success import LIMIT_MM, share_within
 from depthtrack.hand.pose import FINGERS
 from depthtrack.selection import distinct
@@ -20,7 +20,7 @@ E3D_LIMIT_MM = 15.0
 class TrackerSeries:
     """A tracker on a recording, as the page shows it: `number` chooses its colour, on all recordings the same."""
 
-    line: Line
+    line: TrackerResult
     number: int
 
     @property
@@ -42,7 +42,7 @@ class OverTime:
     worst_of: int
 
 
-def over_time(line: Line, metric: str) -> OverTime:
+def over_time(line: TrackerResult, metric: str) -> OverTime:
     """A metric of the line's runs over time; frames that cannot be judged are NaN."""
     length = max(evaluation.frames for evaluation in line.evaluations)
     rows = np.full((len(line.evaluations), length), np.nan)
@@ -61,7 +61,7 @@ def over_time(line: Line, metric: str) -> OverTime:
     return OverTime(seconds, median, low, high, worst_of=each)
 
 
-def shares(line: Line) -> tuple[Array, Array] | None:
+def shares(line: TrackerResult) -> tuple[Array, Array] | None:
     """Thresholds (K,) in mm and the share of frames under each, over all runs; of the largest error of a frame where
     there is a truth, else of E3D. None where neither is known."""
     curves = [evaluation.success for evaluation in line.evaluations if evaluation.success is not None]
@@ -78,7 +78,7 @@ def shares(line: Line) -> tuple[Array, Array] | None:
     return thresholds, np.array([share_within(errors, threshold) for threshold in thresholds])
 
 
-def finger_errors(line: Line) -> dict[str, tuple[float, float]]:
+def finger_errors(line: TrackerResult) -> dict[str, tuple[float, float]]:
     """Mean and 95th percentile of each finger's error over all runs, mm; empty without a truth."""
     found = {}
     for finger in FINGERS:
@@ -89,7 +89,7 @@ def finger_errors(line: Line) -> dict[str, tuple[float, float]]:
     return found
 
 
-def stage_medians(line: Line) -> dict[str, float]:
+def stage_medians(line: TrackerResult) -> dict[str, float]:
     """Median milliseconds of each stage over all frames of all runs, in the order in which they run."""
     stages: dict[str, list[Array]] = {}
     for evaluation in line.evaluations:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from depthtrack.evaluation.compare.results import Column, Line, shown_columns
+from depthtrack.evaluation.compare.results import Column, TrackerResult, shown_columns
 from depthtrack.report.series import TrackerSeries
 
 
@@ -25,7 +25,7 @@ class TableRow:
     of: int
 
 
-def table_head(lines: Sequence[Line]) -> list[tuple[str, str]]:
+def table_head(lines: Sequence[TrackerResult]) -> list[tuple[str, str]]:
     """Headings and units."""
     return [(column.heading, column.unit) for column in shown_columns(lines)]
 
@@ -46,7 +46,7 @@ def table_rows(shown: Sequence[TrackerSeries]) -> list[TableRow]:
     return rows
 
 
-def _best(column: Column, lines: Sequence[Line]) -> float | None:
+def _best(column: Column, lines: Sequence[TrackerResult]) -> float | None:
     """The best value of a column; None where it tells nothing apart."""
     values = [value for line in lines if (value := column.value(line)) is not None]
     if len(set(values)) < 2:
@@ -54,6 +54,6 @@ def _best(column: Column, lines: Sequence[Line]) -> float | None:
     return max(values) if column.higher_is_better else min(values)
 
 
-def _text(column: Column, line: Line) -> str:
+def _text(column: Column, line: TrackerResult) -> str:
     value = column.value(line)
     return "–" if value is None else format(value, column.form)

@@ -16,12 +16,12 @@ from depthtrack.segmentation.roi_tracking import ROI_MARGIN, bounding_box
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
 from depthtrack.types import Array
 
-FILMS_KEPT = 1
-"""A film of 360 frames at half a metre takes 160 MB: experiments go through their conditions one after another, and a
+MOTIONS_KEPT = 1
+"""A motion of 360 frames at half a metre takes 160 MB: experiments go through their conditions one after another, and a
 worker that grows by 300 MB is taken for leaking."""
 
 
-class Film:
+class ObservedMotion:
     """Observations of a synthetic recording, each made when first asked for and kept; true poses (T, 27)."""
 
     def __init__(self, recording: Synthesis) -> None:
@@ -76,7 +76,7 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
     )
 
 
-@lru_cache(maxsize=FILMS_KEPT)
-def film(recording: Synthesis) -> Film:
-    """The film of a recording: this process makes it once, and keeps the last one."""
-    return Film(recording)
+@lru_cache(maxsize=MOTIONS_KEPT)
+def observed_motion(recording: Synthesis) -> ObservedMotion:
+    """Return the observations of a recording, from a cache of the last one."""
+    return ObservedMotion(recording)

@@ -11,18 +11,18 @@ from depthtrack.benchmarks.speed.ik import DISTANCE, HEADLINE, SETTINGS, Setting
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import Film
+from depthtrack.synthesis.observations import ObservedMotion
 
 
 @pytest.fixture(scope="module")
-def film() -> Film:
-    return Film(Synthesis(model="skin", distance=DISTANCE))
+def motion() -> ObservedMotion:
+    return ObservedMotion(Synthesis(model="skin", distance=DISTANCE))
 
 
 @pytest.mark.slow
-def test_the_headline_is_3000_points_and_five_by_five(film: Film) -> None:
+def test_the_headline_is_3000_points_and_five_by_five(motion: ObservedMotion) -> None:
     assert SETTINGS[0] == HEADLINE
-    row = ik.measure(film, HEADLINE, 1e-6)
+    row = ik.measure(motion, HEADLINE, 1e-6)
     assert 2800 < row.points < 3200
     assert (row.model, row.residual, row.freedom, row.threads) == ("skin", "symmetric", "26", 1)
     assert (row.icp, row.inner) == (5, 5)
@@ -45,8 +45,10 @@ def test_the_headline_is_3000_points_and_five_by_five(film: Film) -> None:
         (replace(HEADLINE, subsample=30, icp=2, inner=1), 0.3, 3),
     ],
 )
-def test_a_row_is_of_its_setting(film: Film, setting: Setting, lowest_deg: float, highest_deg: float) -> None:
-    row, headline = ik.measure(film, setting, 1e-6), ik.measure(film, HEADLINE, 1e-6)
+def test_a_row_is_of_its_setting(
+    motion: ObservedMotion, setting: Setting, lowest_deg: float, highest_deg: float
+) -> None:
+    row, headline = ik.measure(motion, setting, 1e-6), ik.measure(motion, HEADLINE, 1e-6)
     for name in ("model", "residual", "freedom", "icp", "inner"):
         assert getattr(row, name) == getattr(setting, name)
     assert row.points == pytest.approx(headline.points * HEADLINE.subsample / setting.subsample, abs=1)

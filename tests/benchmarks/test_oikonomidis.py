@@ -30,9 +30,9 @@ from depthtrack.geometry.rotations import quaternion_exp
 from depthtrack.hand.pose import make_pose
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.segmentation.roi_tracking import ROI_MARGIN
-from depthtrack.synthesis import observations as films
+from depthtrack.synthesis import observations
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.synthesis.observations import film, observe
+from depthtrack.synthesis.observations import observe, observed_motion
 from tests.support.workers import InThisProcess
 
 TINY = ExperimentOptions(quick=True, repetitions=1, resolution=32, frames=2)
@@ -52,8 +52,8 @@ def cells_of(name: str, **options: Any) -> list[Cell]:
 
 
 @pytest.mark.parametrize("recording", [Synthesis(frames=30), Synthesis(frames=30, distance=2.0, viewpoint=5)])
-def test_a_film_shows_the_true_hand_with_room_around(recording: Synthesis) -> None:
-    seen, oracle = film(recording), OracleScorer(recording.hand)
+def test_an_observed_motion_shows_the_true_hand_with_a_margin(recording: Synthesis) -> None:
+    seen, oracle = observed_motion(recording), OracleScorer(recording.hand)
     for index in (0, 29):
         observation = seen[index]
         oracle.set_target(observation)
@@ -69,29 +69,32 @@ def test_a_film_shows_the_true_hand_with_room_around(recording: Synthesis) -> No
         assert np.linalg.norm(observation.centre - seen.poses[index, :3]) < 0.06
 
 
-def test_a_film_carries_the_noise_it_was_asked_for() -> None:
-    clean, noisy = film(Synthesis(frames=1))[0], film(Synthesis(frames=1, depth_noise=0.02, skin_flips=0.3))[0]
+def test_an_observed_motion_has_the_requested_noise() -> None:
+    clean, noisy = (
+        observed_motion(Synthesis(frames=1))[0],
+        observed_motion(Synthesis(frames=1, depth_noise=0.02, skin_flips=0.3))[0],
+    )
     assert noisy.camera == clean.camera
     error = (noisy.depth - clean.depth)[clean.depth > 0]
     assert error.std() == pytest.approx(0.02, rel=0.05)
     assert np.mean(noisy.skin != clean.skin) == pytest.approx(0.3, rel=0.05)
 
 
-def test_a_film_makes_each_frame_once_and_few_films_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_frame_is_made_once_and_few_motions_are_cached(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
 
     def counted(frame: Any, source: Synthesiser, index: int) -> Any:
         made.append(index)
         return observe(frame, source, index)
 
-    monkeypatch.setattr(films, "observe", counted)
+    monkeypatch.setattr(observations, "observe", counted)
     recording = Synthesis(frames=2, seed=77)
     for _ in range(3):
-        assert film(recording)[1] is film(recording)[1]
+        assert observed_motion(recording)[1] is observed_motion(recording)[1]
     assert made == [1]
-    for seed in range(films.FILMS_KEPT):
-        film(Synthesis(frames=2, seed=78 + seed))
-    film(recording)[1]
+    for seed in range(observations.MOTIONS_KEPT):
+        observed_motion(Synthesis(frames=2, seed=78 + seed))
+    observed_motion(recording)[1]
     assert made == [1, 1]
 
 

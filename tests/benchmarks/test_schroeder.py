@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from depthtrack.benchmarks.papers import schroeder, schroeder_7, schroeder_11
-from depthtrack.benchmarks.papers import synergy_sources as bases
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.benchmarks.papers.registry import EXPERIMENTS, load_experiment
-from depthtrack.benchmarks.papers.synergy_sources import basis
+from depthtrack.benchmarks.papers.synergy_sources import load_source, motion_postures, resolve_name, short_label
 from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.pose import ANGLE_NAMES
@@ -37,7 +36,7 @@ def write_postures(path: Path, angles: np.ndarray) -> Path:
 
 
 def test_synergies_of_a_set_a_motion_a_file_and_recorded_postures(tmp_path: Path) -> None:
-    leap, signs = basis("leap"), basis("signs")
+    leap, signs = load_source("leap"), load_source("signs")
     np.testing.assert_array_equal(leap.synergies.components, load_synergies("leap").components)
     assert leap.postures is None
     assert signs.postures is not None
@@ -45,8 +44,8 @@ def test_synergies_of_a_set_a_motion_a_file_and_recorded_postures(tmp_path: Path
     coefficients = signs.synergies.project(signs.postures)
     np.testing.assert_allclose(coefficients.var(axis=0), signs.synergies.variances, atol=1e-12)
     save_synergies(signs.synergies.truncated(7), tmp_path / "mine.json")
-    assert len(basis(str(tmp_path / "mine.json")).synergies) == 7
-    recorded = basis(str(write_postures(tmp_path / "mine.csv", signs.postures[::5])))
+    assert len(load_source(str(tmp_path / "mine.json")).synergies) == 7
+    recorded = load_source(str(write_postures(tmp_path / "mine.csv", signs.postures[::5])))
     assert recorded.postures is not None
     np.testing.assert_allclose(recorded.postures, signs.postures[::5])
 
@@ -54,12 +53,12 @@ def test_synergies_of_a_set_a_motion_a_file_and_recorded_postures(tmp_path: Path
 def test_a_chosen_basis_is_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_synergies(load_synergies("leap-grasps"), tmp_path / "mine.json")
     monkeypatch.chdir(tmp_path)
-    assert bases.chosen("mine.json", "leap") == str(tmp_path / "mine.json")
-    assert bases.chosen(None, "leap") == "leap"
+    assert resolve_name("mine.json", "leap") == str(tmp_path / "mine.json")
+    assert resolve_name(None, "leap") == "leap"
     (tmp_path / "signs").mkdir()
-    assert bases.chosen("signs", "leap") == "signs"
+    assert resolve_name("signs", "leap") == "signs"
     with pytest.raises(InputError, match=r"no synergies 'nonsense': name a set \(leap, leap-grasps\)"):
-        bases.chosen("nonsense", "leap")
+        resolve_name("nonsense", "leap")
 
 
 # What is varied
@@ -77,7 +76,7 @@ def test_the_cells_are_the_papers() -> None:
     ]
     assert not any(cell["soft"] for cell in cells_of("schroeder-10", variant="paper"))
     for cell, share in zip(reduced, (0.99, 0.99, 0.998) * 2, strict=True):
-        synergies, count = basis(cell["synergies"]).synergies, cell["components"]
+        synergies, count = load_source(cell["synergies"]).synergies, cell["components"]
         assert synergies.variance_share(count - 1) < share <= synergies.variance_share(count)
     spaces = {(cell["model"], cell["synergies"], cell["components"]) for cell in cells_of("schroeder-sec6c")}
     assert {(model, None, None) for model in ("skin", "cylinders")} < spaces
@@ -106,7 +105,7 @@ def test_quick_is_coarser_and_options_reach_the_cells(name: str, tmp_path: Path)
     chosen = cells_of(name, variant="paper", frames=30)
     assert {(cell.get("variant", "paper"), cell.get("frames", 30)) for cell in chosen} == {("paper", 30)}
     if any(cell["synergies"] for cell in full):
-        own = write_postures(tmp_path / "own.csv", bases.motion_postures("everyday")[::20])
+        own = write_postures(tmp_path / "own.csv", motion_postures("everyday")[::20])
         used = {cell["synergies"] for cell in cells_of(name, synergies=str(own))}
         assert str(own) in used <= {None, str(own), "grasp"}
 
@@ -259,4 +258,4 @@ def test_shares_of_the_variance_stand_beside_the_papers() -> None:
     mine = [row | {"synergies": "/data/mine.csv", "postures": None} for row in rows[:2]]
     assert list(said("schroeder-7", mine).values()) == [None, 30.0, 60.0, 5.0]
     assert "mean error of its postures, 6 of mine" in said("schroeder-7", mine)
-    assert bases.label("/data/a-name-that-has-no-end.csv") == "a-name-that-h..."
+    assert short_label("/data/a-name-that-has-no-end.csv") == "a-name-that-h..."

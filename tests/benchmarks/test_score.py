@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from depthtrack.benchmarks.speed import scoring
-from depthtrack.benchmarks.speed.baselines import INSTALL, RIVALS, Rival, RivalMissingError
+from depthtrack.benchmarks.speed.baselines import BASELINES, INSTALL, Baseline, BaselineMissingError
 from depthtrack.benchmarks.speed.isolation import in_own_process
 from depthtrack.benchmarks.speed.timing import time_calls
 from depthtrack.benchmarks.speed.workload import CHECKED, HYPOTHESES, ROIS, make_workloads
@@ -139,12 +139,12 @@ def test_nothing_to_measure_is_an_error(
     assert "nothing asked for can run" in captured.err
 
 
-@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("name", BASELINES)
 def test_rivals_see_what_the_oracle_sees(name: str) -> None:
     """But for their facets: in a process of its own, as one of them claims OpenGL for itself."""
     try:
         rows = list(in_own_process(scoring.measure, name, make_workloads(["native", "64"]), 1e-3, patience=120))
-    except RivalMissingError as missing:
+    except BaselineMissingError as missing:
         pytest.skip(f"{name}: {missing}")
     assert [row.roi for row in rows] == ["native", "64"]
     for row in rows:
@@ -157,7 +157,7 @@ def test_a_rival_of_ours_needs_no_library_to_be_scored_as_rivals_are() -> None:
     (workload,) = make_workloads(["96"])
     oracle = OracleScorer(workload.shape)
 
-    class Perfect(Rival):
+    class Perfect(Baseline):
         name = "perfect"
 
         def _load(self) -> None: ...

@@ -14,7 +14,7 @@ from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import Film
+from depthtrack.synthesis.observations import ObservedMotion
 
 TRUE_SCALE = 0.92
 VIEWS = (0, 20, 40, 60, 90, 120)
@@ -26,13 +26,13 @@ def rig(own_glb: Path) -> HandShape:
 
 
 @pytest.fixture(scope="module")
-def film(rig: HandShape) -> Film:
-    return Film(Synthesis(hand=rig.with_(scale=TRUE_SCALE), model="skin"))
+def motion(rig: HandShape) -> ObservedMotion:
+    return ObservedMotion(Synthesis(hand=rig.with_(scale=TRUE_SCALE), model="skin"))
 
 
 @pytest.fixture(scope="module")
-def views(film: Film) -> list[Observation]:
-    return [film[index] for index in VIEWS]
+def views(motion: ObservedMotion) -> list[Observation]:
+    return [motion[index] for index in VIEWS]
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +62,8 @@ def test_sizes_without_a_rig_are_refused(views: list[Observation]) -> None:
         calibrate_rig(views, HandShape(), RasterScorer)
 
 
-def test_the_disagreement_is_least_for_the_true_hand(film: Film, rig: HandShape) -> None:
-    observation, pose = film[VIEWS[0]], film.poses[VIEWS[0]]
+def test_the_disagreement_is_least_for_the_true_hand(motion: ObservedMotion, rig: HandShape) -> None:
+    observation, pose = motion[VIEWS[0]], motion.poses[VIEWS[0]]
     costs = [
         depth_disagreement(HandSurface.of(rig.with_(scale=TRUE_SCALE * factor), skin=True), observation, pose)
         for factor in (0.9, 1.0, 1.1)

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.evaluation.compare.budget import scale_work, search
-from depthtrack.evaluation.compare.comparison import Comparison, Progress, compare
+from depthtrack.evaluation.compare.comparison import Comparison, ComparisonProgress, compare
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
@@ -224,7 +224,7 @@ def test_other_options_need_another_folder(recording: Path, compared: Path, caps
 def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -> None:
     source = Source(str(recording), frames=6)
     comparison = Comparison((source,), tuple(read_specs(["pso:resolution=48,ik:subsample=6"])), equal_ms=6.0)
-    heard: list[Progress] = []
+    heard: list[ComparisonProgress] = []
     plans = compare(comparison, tmp_path, InThisProcess(), heard.append)
     assert "6 ms" in heard[0].what
     assert (heard[-1].frames, heard[-1].total) == (12, 12)

@@ -10,7 +10,7 @@ import pytest
 from depthtrack.cli import main
 from depthtrack.machine import usable_cores
 from depthtrack.rendering import doctor, selfcheck
-from depthtrack.rendering.doctor import Machine, Outcome, Trial, attempt
+from depthtrack.rendering.doctor import Outcome, SystemInfo, Trial, attempt
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.selfcheck import SelfCheck, self_check
@@ -152,6 +152,6 @@ def test_everything_there_is_gets_tried() -> None:
     labels = [trial.label for trial in doctor.trials()]
     assert labels[0] == "raster"
     assert {"egl on a GPU", "egl in software", "osmesa", "oracle"} < set(labels)
-    machine = Machine.here()
+    machine = SystemInfo.here()
     assert machine.threads == usable_cores()
     assert machine.libraries["numba"]

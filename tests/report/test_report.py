@@ -11,7 +11,7 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.errors import InputError
-from depthtrack.evaluation.compare.results import Line, lines_of
+from depthtrack.evaluation.compare.results import TrackerResult, tracker_results
 from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.recording import open_sequence
 from depthtrack.report import film as films
@@ -168,7 +168,7 @@ def test_runs_without_frames_are_refused(recording: Path, tmp_path: Path) -> Non
 def test_a_film_keeps_within_its_bytes(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(films, "LEAST_PICTURES", 2)
     monkeypatch.setattr(films, "FASTEST", 1000.0)
-    shown = [TrackerSeries(line, number) for number, line in enumerate(lines_of(evaluations))]
+    shown = [TrackerSeries(line, number) for number, line in enumerate(tracker_results(evaluations))]
     painter = SideBySide(shown, "endpoint_error_mm", height=60)
     whole = film_of(painter, 10_000_000)
     assert len(whole.pictures) == FRAMES
@@ -179,7 +179,7 @@ def test_a_film_keeps_within_its_bytes(evaluations: list[Evaluation], monkeypatc
 
 
 def test_curves_over_time_and_their_bands(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in lines_of(evaluations) if line.label == "Near")
+    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
     curve = over_time(near, "endpoint_error_mm")
     np.testing.assert_allclose(curve.low, 2, atol=1e-6)
     np.testing.assert_allclose(curve.median, 3, atol=1e-6)
@@ -190,7 +190,7 @@ def test_curves_over_time_and_their_bands(evaluations: list[Evaluation]) -> None
 
 def test_long_recordings_keep_their_peaks(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("depthtrack.report.series.POINTS", 3)
-    far = next(line for line in lines_of(evaluations) if line.label.startswith("Far"))
+    far = next(line for line in tracker_results(evaluations) if line.label.startswith("Far"))
     curve = over_time(far, "endpoint_error_mm")
     assert len(curve.seconds) == 3
     assert curve.worst_of == 3
@@ -198,7 +198,7 @@ def test_long_recordings_keep_their_peaks(evaluations: list[Evaluation], monkeyp
 
 
 def test_shares_count_all_runs(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in lines_of(evaluations) if line.label == "Near")
+    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
     found = shares(near)
     assert found is not None
     thresholds, share = found
@@ -214,12 +214,12 @@ def test_worst_frames_lie_apart() -> None:
 
 
 def test_rare_peaks_leave_the_scale_readable(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in lines_of(evaluations) if line.label == "Near")
+    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
     np.testing.assert_allclose(top_of_scale([over_time(near, "endpoint_error_mm")]), (4.4, 4))
     assert top_of_scale([]) == (1.0, 0.0)
 
 
-class Told(Line):
+class Told(TrackerResult):
     """A line with the figures it is given."""
 
     def __init__(
@@ -241,7 +241,7 @@ class Told(Line):
         return self._figures.get(metric)
 
 
-def said(lines: list[Line], **more: Any) -> str:
+def said(lines: list[TrackerResult], **more: Any) -> str:
     found = verdict(lines, **more)
     return " ".join([f"{found.headline}.", *found.sentences]).replace("\u00a0", " ")
 
@@ -253,7 +253,7 @@ def test_a_single_tracker_is_told_for_itself() -> None:
 
 
 def test_the_headline_says_where_a_tracker_is_at_home() -> None:
-    lines: list[Line] = [Told("a", "PSO", 3.0), Told("a", "IK", 2.0)]
+    lines: list[TrackerResult] = [Told("a", "PSO", 3.0), Told("a", "IK", 2.0)]
     assert said(lines, matched_model=("IK",)).startswith(
         "On its home ground, IK follows the hand more closely than PSO."
     )
@@ -274,7 +274,7 @@ def test_equal_figures_have_no_winner() -> None:
 
 
 def test_many_trackers_and_equal_time() -> None:
-    lines: list[Line] = [Told("a", "A", 3.0, lost=2), Told("a", "B", 0.5, ms=9), Told("a", "C", 7.0, lost=1)]
+    lines: list[TrackerResult] = [Told("a", "A", 3.0, lost=2), Told("a", "B", 0.5, ms=9), Told("a", "C", 7.0, lost=1)]
     assert said(lines, equal_ms=10) == (
         "B follows the hand most closely of three trackers. B's mean endpoint error is 0.50 mm, A's 3.0 mm and "
         "C's 7.0 mm. Each was given 10 ms a frame; taken were: B 9.0 ms, A 10.0 ms and C 10.0 ms. "
@@ -283,12 +283,12 @@ def test_many_trackers_and_equal_time() -> None:
 
 
 def test_different_winners_are_told_apart() -> None:
-    lines: list[Line] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", 9.0), Told("b", "B", 1.0)]
+    lines: list[TrackerResult] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", 9.0), Told("b", "B", 1.0)]
     assert said(lines).startswith(
         "Neither tracker is the closest everywhere. Closest are A on a (3.0 mm mean endpoint error; B 4.0 mm) and "
         "B on b (1.0 mm mean endpoint error; A 9.0 mm)."
     )
-    many: list[Line] = [
+    many: list[TrackerResult] = [
         Told(str(k), label, 1.0 + (k % 3 == 0) * s) for k in range(6) for label, s in (("A", 1), ("B", 2))
     ]
     many += [Told("6", "A", 5.0), Told("6", "B", 1.0)]
@@ -296,7 +296,12 @@ def test_different_winners_are_told_apart() -> None:
 
 
 def test_recordings_without_a_truth_are_left_out_of_errors() -> None:
-    lines: list[Line] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", None), Told("b", "B", None, e3d=1.0)]
+    lines: list[TrackerResult] = [
+        Told("a", "A", 3.0),
+        Told("a", "B", 4.0),
+        Told("b", "A", None),
+        Told("b", "B", None, e3d=1.0),
+    ]
     text = said(lines)
     assert text.startswith("Where the truth is known, A follows the hand more closely than B.")
     assert "Where no truth is known, the sensor's points lie nearest to B on 1 of 1." in text
@@ -305,7 +310,7 @@ def test_recordings_without_a_truth_are_left_out_of_errors() -> None:
 
 
 def test_who_finds_no_hand_is_not_judged_by_the_easy_recordings_alone() -> None:
-    lines: list[Line] = [Told("a", "A", 3.0), Told("b", "A", 9.0), Told("a", "B", 2.0), Told("b", "B", None)]
+    lines: list[TrackerResult] = [Told("a", "A", 3.0), Told("b", "A", 9.0), Told("a", "B", 2.0), Told("b", "B", None)]
     assert [(each.label, each.error) for each in standings(lines)] == [("A", 6.0), ("B", float("inf"))]
 
 
@@ -320,7 +325,7 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
         write_run(tmp_path / "ik_a", recording, poses, tracker="ik", seed=0),
         write_run(tmp_path / "ik_b", recording, poses, tracker="ik", seed=0),
     ]
-    lines = lines_of([evaluate_run(run, residuals=False) for run in runs])
+    lines = tracker_results([evaluate_run(run, residuals=False) for run in runs])
     assert [(line.label, len(line.evaluations)) for line in lines] == [
         ("PSO", 1),
         ("OIKONOMIDIS2011", 2),
@@ -332,7 +337,7 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
 def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, tmp_path: Path) -> None:
     skin = write_run(tmp_path / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin")
     compared = [*evaluations[:2], evaluate_run(skin, residuals=False)]
-    lines = lines_of(compared)
+    lines = tracker_results(compared)
     told = bias_warning({"model": "skin"}, lines)
     assert told.startswith("Home ground")
     assert "that Skin fits, and Far <b> and Near do not" in told

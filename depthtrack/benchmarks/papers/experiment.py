@@ -19,7 +19,7 @@ class ExperimentOptions:
     `quick`: few cells and repetitions, swarms at a reduced resolution. `repetitions` with different seeds,
     None for the experiment's own number; `resolution` of the region of interest, its longest side in pixels, None for
     the sensor's own (QUICK_RESOLUTION when quick); `frames` at the beginning of the motion, None for all; `synergies`
-    in place of the experiment's own, by a name that `bases.basis` knows.
+    in place of the experiment's own, by a name that `load_source` knows.
     """
 
     quick: bool = False
@@ -44,7 +44,7 @@ class ExperimentOptions:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PaperComparison:
     """One statement of the paper's text, and what we measured; `ours` None where the cells do not tell."""
 
     what: str
@@ -72,5 +72,5 @@ class Experiment:
     cells: Callable[[ExperimentOptions], list[Cell]]
     measure: Callable[..., Row]
     tabulate: Callable[[Sequence[Row]], list[Row]]
-    compare: Callable[[Sequence[Row]], list[Comparison]]
+    compare: Callable[[Sequence[Row]], list[PaperComparison]]
     draw: Callable[[Axes, Sequence[Row]], None]

@@ -7,12 +7,12 @@ from typing import Any, Literal
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
-from depthtrack.benchmarks.papers.following import without_recovery
+from depthtrack.benchmarks.papers.no_recovery import without_recovery
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import film
+from depthtrack.synthesis.observations import observed_motion
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
@@ -65,7 +65,7 @@ def follow(
     `error_mm` is the paper's Delta: the phalanx endpoints' distance from the truth, over all of them and all frames.
     Repetitions see the same frames and differ in the swarm's seed.
     """
-    seen = film(
+    seen = observed_motion(
         Synthesis(
             distance=distance_m,
             viewpoint=viewpoint,

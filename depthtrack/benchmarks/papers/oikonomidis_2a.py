@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import oikonomidis
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.plot import mark
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
@@ -29,15 +29,17 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return oikonomidis.tabulate(rows, ("particles", "generations"))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     table = tabulate(rows)
     larger = [line["error_mm"] for line in table if all(line[name] >= least for name, least in RETAINED.items())]
     speeds = [1000 / line["ms_per_frame"] for line in table if RETAINED.items() <= line.items()]
     ours = oikonomidis.median_error(rows, **RETAINED)
     return [
-        Comparison("error at 64 particles x 25 generations", "5 mm (its Fig. 2b, 0.5 m)", ours, "mm"),
-        Comparison("what more of either gains at most", "0.5 mm", None if ours is None else ours - min(larger), "mm"),
-        Comparison(
+        PaperComparison("error at 64 particles x 25 generations", "5 mm (its Fig. 2b, 0.5 m)", ours, "mm"),
+        PaperComparison(
+            "what more of either gains at most", "0.5 mm", None if ours is None else ours - min(larger), "mm"
+        ),
+        PaperComparison(
             "frames a second at 64 x 25 (ours: on one core)",
             "15 (GTX 580)",
             speeds[0] if speeds else None,
@@ -59,12 +61,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "oikonomidis-2a",
-    "Error against particles and generations",
-    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2a",
-    cells,
-    oikonomidis.follow,
-    tabulate,
-    compare,
-    draw,
+    name="oikonomidis-2a",
+    title="Error against particles and generations",
+    source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2a",
+    cells=cells,
+    measure=oikonomidis.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import oikonomidis
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 DISTANCES, QUICK_DISTANCES = (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5), (0.5, 1.0, 1.5, 2.0, 2.5)
@@ -21,11 +21,11 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return oikonomidis.tabulate(rows, ("distance_m",))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     near, far = (oikonomidis.median_error(rows, distance_m=distance) for distance in PAPER)
     return [
-        Comparison("error at 0.5 m", "5 mm", near, "mm"),
-        Comparison("error at 2.5 m", "at most 7.5 mm", far, "mm"),
+        PaperComparison("error at 0.5 m", "5 mm", near, "mm"),
+        PaperComparison("error at 2.5 m", "at most 7.5 mm", far, "mm"),
     ]
 
 
@@ -42,12 +42,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "oikonomidis-2b",
-    "Error against the distance from the sensor",
-    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2b",
-    cells,
-    oikonomidis.follow,
-    tabulate,
-    compare,
-    draw,
+    name="oikonomidis-2b",
+    title="Error against the distance from the sensor",
+    source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2b",
+    cells=cells,
+    measure=oikonomidis.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import oikonomidis
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 NOISE_MM, QUICK_NOISE_MM = (0.0, 10.0, 20.0, 40.0, 80.0), (0.0, 20.0, 80.0)
@@ -26,13 +26,13 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return oikonomidis.tabulate(rows, ("skin_flips_percent", "depth_noise_mm"))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     errors = [line["error_mm"] for line in tabulate(rows)]
     return [
-        Comparison(
+        PaperComparison(
             "error without noise", "5 mm", oikonomidis.median_error(rows, depth_noise_mm=0, skin_flips_percent=0), "mm"
         ),
-        Comparison("largest error, of all levels of noise", "25 mm", max(errors), "mm"),
+        PaperComparison("largest error, of all levels of noise", "25 mm", max(errors), "mm"),
     ]
 
 
@@ -48,12 +48,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "oikonomidis-2c",
-    "Error against noise in depth and skin labels",
-    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2c",
-    cells,
-    oikonomidis.follow,
-    tabulate,
-    compare,
-    draw,
+    name="oikonomidis-2c",
+    title="Error against noise in depth and skin labels",
+    source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2c",
+    cells=cells,
+    measure=oikonomidis.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

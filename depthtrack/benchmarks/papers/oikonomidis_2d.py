@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import oikonomidis
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.synthesis.viewpoint import VIEWPOINT_COUNT
 
@@ -18,11 +18,13 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return oikonomidis.tabulate(rows, ("viewpoint",))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     errors = [line["error_mm"] for line in tabulate(rows)]
     return [
-        Comparison("largest less smallest error of the viewpoints", "not significant", max(errors) - min(errors), "mm"),
-        Comparison("largest error of the viewpoints", "not told", max(errors), "mm"),
+        PaperComparison(
+            "largest less smallest error of the viewpoints", "not significant", max(errors) - min(errors), "mm"
+        ),
+        PaperComparison("largest error of the viewpoints", "not told", max(errors), "mm"),
     ]
 
 
@@ -52,12 +54,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "oikonomidis-2d",
-    "Error from eight viewpoints",
-    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2d",
-    cells,
-    oikonomidis.follow,
-    tabulate,
-    compare,
-    draw,
+    name="oikonomidis-2d",
+    title="Error from eight viewpoints",
+    source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2d",
+    cells=cells,
+    measure=oikonomidis.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import oikonomidis
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.plot import mark
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
@@ -16,7 +16,7 @@ from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import film
+from depthtrack.synthesis.observations import observed_motion
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 FRAMES = 45
@@ -30,7 +30,7 @@ BIN_MM, LAST_BIN_MM = 2.5, 120.0
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    count = len(film(Synthesis(frames=options.frames)))
+    count = len(observed_motion(Synthesis(frames=options.frames)))
     chosen = np.linspace(0, count, min(FRAMES, count), endpoint=False)
     return [
         oikonomidis.tracker_cell(options) | {"frame": int(frame), "repetition": seed}
@@ -52,7 +52,7 @@ def measure(
     `mirrored`: the estimated palm faces away from where the true one does, by more than a right angle, as when the
     back of the hand is taken for its inside.
     """
-    seen = film(Synthesis())
+    seen = observed_motion(Synthesis())
     config = tracker_config(oikonomidis.TRACKERS[variant], seed=repetition, renderer=renderer, resolution=resolution)
     with closing(create_tracker(config, seen.hand)) as tracker:
         estimate = tracker.start(seen[frame])
@@ -91,13 +91,15 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     ]
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     error, mirrored = (np.array([row[name] for row in rows]) for name in ("error_mm", "mirrored"))
     return [
-        Comparison(WITHIN, "74 %", 100 * float(np.mean(error <= CLOSE_MM)), "%"),
-        Comparison("mirrored poses", "the peak at about 8 cm", 100 * float(mirrored.mean()), "%"),
-        Comparison("median error", "not told", float(np.median(error)), "mm"),
-        Comparison("median time of a start", "not told", float(np.median([row["ms"] for row in rows])) / 1000, "s"),
+        PaperComparison(WITHIN, "74 %", 100 * float(np.mean(error <= CLOSE_MM)), "%"),
+        PaperComparison("mirrored poses", "the peak at about 8 cm", 100 * float(mirrored.mean()), "%"),
+        PaperComparison("median error", "not told", float(np.median(error)), "mm"),
+        PaperComparison(
+            "median time of a start", "not told", float(np.median([row["ms"] for row in rows])) / 1000, "s"
+        ),
     ]
 
 
@@ -119,12 +121,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "oikonomidis-4",
-    "Error of poses found in a single frame",
-    f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 4",
-    cells,
-    measure,
-    tabulate,
-    compare,
-    draw,
+    name="oikonomidis-4",
+    title="Error of poses found in a single frame",
+    source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 4",
+    cells=cells,
+    measure=measure,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment
+from depthtrack.benchmarks.papers.experiment import Experiment, PaperComparison
 from depthtrack.evaluation.sweep.rows import Row
 
 _STYLE: dict[Any, Any] = {
@@ -29,7 +29,7 @@ _LINE = 0.2
 """Inches that a line of text takes below the axes."""
 
 
-def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[Comparison], note: str) -> bytes:
+def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[PaperComparison], note: str) -> bytes:
     """The picture as a PNG file; `note` says how the rows came to be."""
     below = [_head(), *map(_line, comparisons), ("", "", ""), (note, "", "")]
     height = _INCHES[1] + _LINE * (len(below) + 1)
@@ -58,7 +58,7 @@ def _head() -> tuple[str, str, str]:
     return "", "paper, in its text", "ours"
 
 
-def _line(comparison: Comparison) -> tuple[str, str, str]:
+def _line(comparison: PaperComparison) -> tuple[str, str, str]:
     return comparison.what, comparison.paper, comparison.ours_text
 
 

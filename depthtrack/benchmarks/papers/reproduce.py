@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.plot import draw_png
 from depthtrack.benchmarks.papers.registry import full_cell, measure_cell
 from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
@@ -21,7 +21,7 @@ from depthtrack.evaluation.sweep.run import Workers, run_sweep
 from depthtrack.files import write_atomic
 from depthtrack.machine import Machine, describe_machine
 
-Progress = Callable[[Iterator[Row], int, int], Iterable[Row]]
+RowProgress = Callable[[Iterator[Row], int, int], Iterable[Row]]
 """Watches new rows go by; told how many there are in all, and how many were there before."""
 
 
@@ -43,7 +43,7 @@ class Reproduction:
     reused: int
     seconds: float
     cell_seconds: float
-    comparisons: list[Comparison]
+    comparisons: list[PaperComparison]
     table: list[Row]
 
     def to_json(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def reproduce(
     options: ExperimentOptions,
     folder: Path,
     workers: Workers,
-    progress: Progress = lambda rows, total, reused: rows,
+    progress: RowProgress = lambda rows, total, reused: rows,
 ) -> Reproduction:
     """Measure the cells that `folder` has no row of yet, then write table, picture and summary there."""
     begun = perf_counter()

@@ -8,13 +8,13 @@ from typing import Any, Literal
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
-from depthtrack.benchmarks.papers.following import without_recovery
-from depthtrack.benchmarks.papers.synergy_sources import basis
+from depthtrack.benchmarks.papers.no_recovery import without_recovery
+from depthtrack.benchmarks.papers.synergy_sources import load_source
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import film
+from depthtrack.synthesis.observations import observed_motion
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.tracker import Estimate
 
@@ -55,7 +55,7 @@ def follow(
     """Track from the true first pose on, by fitting alone.
 
     The hand is rendered from the skin, as the paper's is, by a perfect sensor half a metre away. Of `synergies`, a
-    name that `bases.basis` knows, the first `components` are solved for; None solves for all angles, and so does
+    name that `load_source` knows, the first `components` are solved for; None solves for all angles, and so does
     `soft`, drawn to what those synergies hold likely.
 
     `error_deg` is the paper's posture error, the mean difference of the joint angles; `error_mm` the phalanx
@@ -63,7 +63,7 @@ def follow(
     processor time of the median frame, from the depth map to the pose, point cloud included: what the wall clock shows
     on an idle core, whoever else is at work.
     """
-    seen = film(Synthesis(motion=motion, model="skin", frames=frames))
+    seen = observed_motion(Synthesis(motion=motion, model="skin", frames=frames))
     config = without_recovery(
         tracker_config(
             TRACKERS[variant],
@@ -73,7 +73,7 @@ def follow(
             **({} if synergies is None else {"synergies": synergies, "synergy_prior": soft}),
         )
     )
-    known = None if synergies is None else basis(synergies).synergies.truncated(components or 20)
+    known = None if synergies is None else load_source(synergies).synergies.truncated(components or 20)
     points, seconds, estimates = [], [], list[Estimate]()
     with closing(create_tracker(config, seen.hand, synergies=known)) as tracker:
         for index in range(len(seen)):

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import schroeder
-from depthtrack.benchmarks.papers import synergy_sources as bases
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
+from depthtrack.benchmarks.papers.synergy_sources import load_source, resolve_name
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 MOTION, OTHER_GRASPS = "grasp", "other-grasps"
@@ -22,8 +22,8 @@ def cells(options: ExperimentOptions) -> list[Cell]:
     """All angles; synergies of other grasps, and of these, alone and (not in the paper) as what angles are drawn to."""
     ways = (False,) if options.variant == "paper" else (False, True)
     spaces: list[Cell] = [{}]
-    for name in dict.fromkeys([bases.chosen(options.synergies, OTHER_GRASPS), MOTION]):
-        synergies = bases.basis(name).synergies
+    for name in dict.fromkeys([resolve_name(options.synergies, OTHER_GRASPS), MOTION]):
+        synergies = load_source(name).synergies
         count, larger = synergies.components_for(SHARE), synergies.components_for(LARGER_SHARE)
         spaces += [{"synergies": name, "components": count, "soft": soft} for soft in ways]
         if larger > count:
@@ -35,7 +35,7 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return schroeder.tabulate(rows, ("synergies", "components", "soft"))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     other = next((row["synergies"] for row in rows if row["synergies"] not in (None, MOTION)), MOTION)
     most = max((row["components"] for row in rows if row["synergies"] == other), default=0)
 
@@ -44,21 +44,23 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
 
     hertz = [schroeder.ratio(1000, ours("ms_per_frame", synergies)) for synergies in (None, other)]
     return [
-        Comparison("joint angle error, all angles", "about 12 deg", ours("error_deg", None), "deg"),
-        Comparison("synergies of other grasps alone", "about 4 deg", ours("error_deg"), "deg"),
-        Comparison(
+        PaperComparison("joint angle error, all angles", "about 12 deg", ours("error_deg", None), "deg"),
+        PaperComparison("synergies of other grasps alone", "about 4 deg", ours("error_deg"), "deg"),
+        PaperComparison(
             f"{most} synergies of other grasps alone ({100 * LARGER_SHARE:g} %)",
             "not told",
             schroeder.value(rows, "error_deg", synergies=other, soft=False, components=most),
             "deg",
         ),
-        Comparison("synergies of these grasps alone", "about 4 deg", ours("error_deg", MOTION), "deg"),
-        Comparison("all angles, drawn to synergies of other grasps", "not told", ours("error_deg", soft=True), "deg"),
-        Comparison("synergies for 99 % of other grasps' variance", "5", ours("components"), "of them"),
-        Comparison("endpoint error, all angles", "not told", ours("error_mm", None), "mm"),
-        Comparison("endpoint error, synergies of other grasps alone", "not told", ours("error_mm"), "mm"),
-        Comparison("frames a second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
-        Comparison("frames a second, synergies alone", "30 (8 threads)", hertz[1], "Hz"),
+        PaperComparison("synergies of these grasps alone", "about 4 deg", ours("error_deg", MOTION), "deg"),
+        PaperComparison(
+            "all angles, drawn to synergies of other grasps", "not told", ours("error_deg", soft=True), "deg"
+        ),
+        PaperComparison("synergies for 99 % of other grasps' variance", "5", ours("components"), "of them"),
+        PaperComparison("endpoint error, all angles", "not told", ours("error_mm", None), "mm"),
+        PaperComparison("endpoint error, synergies of other grasps alone", "not told", ours("error_mm"), "mm"),
+        PaperComparison("frames a second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
+        PaperComparison("frames a second, synergies alone", "30 (8 threads)", hertz[1], "Hz"),
     ]
 
 
@@ -83,12 +85,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 _COLOURS = {"all angles": "C1", "synergies alone": "C0"}
 
 EXPERIMENT = Experiment(
-    "schroeder-10",
-    "Grasps with hidden fingers: all angles, and synergies",
-    f"{schroeder.SCHROEDER_2014}, Fig. 10",
-    cells,
-    schroeder.follow,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-10",
+    title="Grasps with hidden fingers: all angles, and synergies",
+    source=f"{schroeder.SCHROEDER_2014}, Fig. 10",
+    cells=cells,
+    measure=schroeder.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import synergy_sources as bases
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.schroeder import SCHROEDER_2014
+from depthtrack.benchmarks.papers.synergy_sources import load_source, resolve_name
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
@@ -21,7 +21,7 @@ from depthtrack.hand.synergies import Synergies
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, IcpOptions, SurfaceFitOptions
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import Film, film
+from depthtrack.synthesis.observations import ObservedMotion, observed_motion
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stages.coarse_to_fine import (
     DIRECT,
@@ -46,7 +46,7 @@ _LEAST_HOLD = 5
 
 def cells(options: ExperimentOptions) -> list[Cell]:
     """A sign is what is held: its frame is the middle of the hold. Only what draws at random is repeated."""
-    name = bases.chosen(options.synergies, MOTION)
+    name = resolve_name(options.synergies, MOTION)
     ways: list[tuple[Way, str]] = [("hierarchical", name), ("all angles at once", name)]
     if name == MOTION:
         ways.insert(1, ("hierarchical", OTHERS))
@@ -64,9 +64,9 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
 
     Errors as in `schroeder.follow`; `s_per_frame` the processor time, point cloud included.
     """
-    seen, holds = _film(None), _signs(None)
+    seen, holds = _motion(None), _signs(None)
     frame = sum(holds[sign]) // 2
-    known = _without(sign) if synergies == OTHERS else bases.basis(synergies).synergies
+    known = _without(sign) if synergies == OTHERS else load_source(synergies).synergies
     coarse_to_fine = (
         DIRECT if way == "all angles at once" else PAPER_COARSE_TO_FINE if variant == "paper" else CoarseToFine()
     )
@@ -92,12 +92,12 @@ def static_intervals(poses: Array) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _LEAST_HOLD]
 
 
-def _film(frames: int | None) -> Film:
-    return film(Synthesis(motion=MOTION, model="skin", frames=frames))
+def _motion(frames: int | None) -> ObservedMotion:
+    return observed_motion(Synthesis(motion=MOTION, model="skin", frames=frames))
 
 
 def _signs(frames: int | None) -> list[tuple[int, int]]:
-    found = static_intervals(_film(frames).poses)
+    found = static_intervals(_motion(frames).poses)
     if not found:
         raise InputError(f"the first {frames} frames of {MOTION} hold no sign: ask for 25 or more")
     return found
@@ -105,7 +105,7 @@ def _signs(frames: int | None) -> list[tuple[int, int]]:
 
 def _without(sign: int) -> Synergies:
     """Synergies of the motion without a sign and the ways to and from it."""
-    poses, holds = _film(None).poses, _signs(None)
+    poses, holds = _motion(None).poses, _signs(None)
     first = holds[sign - 1][1] + 1 if sign > 0 else 0
     last = holds[sign + 1][0] if sign + 1 < len(holds) else len(poses)
     return Synergies.fit(np.delete(poses[:, ANGLES], np.s_[first:last], axis=0), OTHERS)
@@ -114,10 +114,10 @@ def _without(sign: int) -> Synergies:
 @lru_cache(maxsize=1)
 def _compile() -> None:
     """Let the first frame that is timed find everything compiled."""
-    seen = _film(None)
+    seen = _motion(None)
     for coarse_to_fine, icp in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
         fit = SurfaceFitOptions(subsample=50, icp=icp)
-        with closing(Toolkit(seen.hand, ScoringOptions(), synergies=bases.basis(MOTION).synergies)) as tools:
+        with closing(Toolkit(seen.hand, ScoringOptions(), synergies=load_source(MOTION).synergies)) as tools:
             estimate_single_frame(tools, seen.again(0), seen.poses[0], coarse_to_fine, fit)
 
 
@@ -143,32 +143,32 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return table
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     lines = {(line["way"], line["synergies"] == OTHERS): line for line in tabulate(rows)}
 
     def ours(name: str, way: Way, others: bool = False) -> float | None:
         return lines[way, others][name] if (way, others) in lines else None
 
     return [
-        Comparison("joint angle error, hierarchical", "about 0.4 deg", ours("error_deg", "hierarchical"), "deg"),
-        Comparison(
+        PaperComparison("joint angle error, hierarchical", "about 0.4 deg", ours("error_deg", "hierarchical"), "deg"),
+        PaperComparison(
             "joint angle error, all angles at once", "about 22 deg", ours("error_deg", "all angles at once"), "deg"
         ),
-        Comparison(
+        PaperComparison(
             "time of a frame, hierarchical (ours: one core)",
             "about 10 s (8 threads)",
             ours("s_per_frame", "hierarchical"),
             "s",
         ),
-        Comparison("endpoint error, hierarchical", "not told", ours("error_mm", "hierarchical"), "mm"),
-        Comparison(
+        PaperComparison("endpoint error, hierarchical", "not told", ours("error_mm", "hierarchical"), "mm"),
+        PaperComparison(
             "joint angle error, the sign unknown to the synergies",
             "not told",
             ours("error_deg", "hierarchical", others=True),
             "deg",
         ),
-        Comparison("hierarchical, median", "not told", ours("median_deg", "hierarchical"), "deg"),
-        Comparison("hierarchical, worst", "not told", ours("worst_deg", "hierarchical"), "deg"),
+        PaperComparison("hierarchical, median", "not told", ours("median_deg", "hierarchical"), "deg"),
+        PaperComparison("hierarchical, worst", "not told", ours("worst_deg", "hierarchical"), "deg"),
     ]
 
 
@@ -196,12 +196,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "schroeder-11",
-    "Signs from single frames, with a hierarchy and without",
-    f"{SCHROEDER_2014}, Fig. 11",
-    cells,
-    measure,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-11",
+    title="Signs from single frames, with a hierarchy and without",
+    source=f"{SCHROEDER_2014}, Fig. 11",
+    cells=cells,
+    measure=measure,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from depthtrack.benchmarks.papers import synergy_sources as bases
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.schroeder import SCHROEDER_2014, value
+from depthtrack.benchmarks.papers.synergy_sources import load_source, motion_postures, resolve_name, short_label
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
@@ -32,13 +32,13 @@ EITHER = {2: "about 83 % of grasps", 3: "about 80 %, 90 % of grasps", 6: "about 
 def cells(options: ExperimentOptions) -> list[Cell]:
     sets: list[tuple[str, str | None]] = [*SETS]
     if options.synergies is not None:
-        name = bases.chosen(options.synergies, "")
-        sets = [(name, "signs" if bases.basis(name).postures is None else None)]
+        name = resolve_name(options.synergies, "")
+        sets = [(name, "signs" if load_source(name).postures is None else None)]
     return [
         {"synergies": name, "postures": motion, "components": n}
         for name, motion in sets
         for n in (QUICK_COUNTS if options.quick else COUNTS)
-        if n <= len(bases.basis(name).synergies)
+        if n <= len(load_source(name).synergies)
     ]
 
 
@@ -48,8 +48,8 @@ def measure(*, synergies: str, postures: str | None, components: int) -> Row:
     The posture that is least like their mean stands for the paper's particular one. Errors as in `schroeder.follow`,
     the hand as a whole being where it is.
     """
-    found = bases.basis(synergies)
-    true = found.postures if postures is None else bases.motion_postures(postures)
+    found = load_source(synergies)
+    true = found.postures if postures is None else motion_postures(postures)
     assert true is not None
     reduced = found.synergies.truncated(components)
     hand = HandModel(HandShape())
@@ -75,10 +75,10 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return [{name: row[name] for name in (*names, "error_mm")} for row in rows]
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     shares = [
-        Comparison(
-            f"variance in the first {count} of {bases.label(name)}",
+        PaperComparison(
+            f"variance in the first {count} of {short_label(name)}",
             paper,
             value(rows, "variance_percent", synergies=name, components=count),
             "%",
@@ -87,8 +87,8 @@ def compare(rows: Sequence[Row]) -> list[Comparison]:
         for count, paper in PAPER_SHARES.get(name, EITHER).items()
     ]
     errors = [
-        Comparison(
-            f"mean error of {_postures(rows, name)}, 6 of {bases.label(name)}",
+        PaperComparison(
+            f"mean error of {_postures(rows, name)}, 6 of {short_label(name)}",
             "not told",
             value(rows, "error_deg", synergies=name, components=6),
             "deg",
@@ -102,7 +102,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     for number, name in enumerate(_names(rows)):
         mine = [row for row in rows if row["synergies"] == name]
         counts, colour = [row["components"] for row in mine], f"C{number}"
-        label = f"{_postures(rows, name)}, by components of {bases.label(name)}"
+        label = f"{_postures(rows, name)}, by components of {short_label(name)}"
         axes.plot(counts, [row["particular_deg"] for row in mine], marker="o", color=colour, label=label)
         axes.plot(counts, [row["error_deg"] for row in mine], linestyle="--", color=colour)
     axes.plot([], [], linestyle="--", color="0.3", label="mean of all postures")
@@ -122,12 +122,12 @@ def _postures(rows: Sequence[Row], name: str) -> str:
 
 
 EXPERIMENT = Experiment(
-    "schroeder-7",
-    "Approximation of postures by principal components",
-    f"{SCHROEDER_2014}, Fig. 7",
-    cells,
-    measure,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-7",
+    title="Approximation of postures by principal components",
+    source=f"{SCHROEDER_2014}, Fig. 7",
+    cells=cells,
+    measure=measure,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

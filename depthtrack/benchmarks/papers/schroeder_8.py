@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import schroeder
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.plot import error_and_time
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
@@ -25,16 +25,18 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return schroeder.tabulate(rows, ("icp_iterations",))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     one, five = (schroeder.value(rows, "error_deg", icp_iterations=n) for n in (1, RETAINED))
     five_ms, ten_ms = (schroeder.value(rows, "ms_per_frame", icp_iterations=n) for n in (RETAINED, 2 * RETAINED))
     five_mm = schroeder.value(rows, "error_mm", icp_iterations=RETAINED)
     return [
-        Comparison("joint angle error after 5 iterations", "under 2 deg", five, "deg"),
-        Comparison("the same beside that of a single iteration", "under a third", schroeder.ratio(five, one), "of it"),
-        Comparison("endpoint error after 5 iterations", "not told", five_mm, "mm"),
-        Comparison("time of a frame, 5 iterations (ours: one core)", "about 40 ms (8 threads)", five_ms, "ms"),
-        Comparison(
+        PaperComparison("joint angle error after 5 iterations", "under 2 deg", five, "deg"),
+        PaperComparison(
+            "the same beside that of a single iteration", "under a third", schroeder.ratio(five, one), "of it"
+        ),
+        PaperComparison("endpoint error after 5 iterations", "not told", five_mm, "mm"),
+        PaperComparison("time of a frame, 5 iterations (ours: one core)", "about 40 ms (8 threads)", five_ms, "ms"),
+        PaperComparison(
             "time of 10 iterations beside that of 5", "grows linearly", schroeder.ratio(ten_ms, five_ms), "of it"
         ),
     ]
@@ -48,12 +50,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "schroeder-8",
-    "Error and time against ICP iterations",
-    f"{schroeder.SCHROEDER_2014}, Fig. 8",
-    cells,
-    schroeder.follow,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-8",
+    title="Error and time against ICP iterations",
+    source=f"{schroeder.SCHROEDER_2014}, Fig. 8",
+    cells=cells,
+    measure=schroeder.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

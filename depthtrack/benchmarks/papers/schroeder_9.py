@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import schroeder
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.plot import error_and_time
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
@@ -27,29 +27,29 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return schroeder.tabulate(rows, ("subsampling",))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     time = schroeder.value(rows, "ms_per_frame", subsampling=RETAINED)
     return [
-        Comparison(
+        PaperComparison(
             "joint angle error with a third of the points",
             "under 2 deg (its Fig. 8)",
             schroeder.value(rows, "error_deg", subsampling=RETAINED),
             "deg",
         ),
-        Comparison(
+        PaperComparison(
             "the same with a tenth of the points",
             "not told",
             schroeder.value(rows, "error_deg", subsampling=SUBSAMPLINGS[-1]),
             "deg",
         ),
-        Comparison(
+        PaperComparison(
             "endpoint error with a third of the points",
             "not told",
             schroeder.value(rows, "error_mm", subsampling=RETAINED),
             "mm",
         ),
-        Comparison("time of a frame at a third (ours: one core)", "about 40 ms (8 threads)", time, "ms"),
-        Comparison("frames a second at a third", "about 25", schroeder.ratio(1000, time), "Hz"),
+        PaperComparison("time of a frame at a third (ours: one core)", "about 40 ms (8 threads)", time, "ms"),
+        PaperComparison("frames a second at a third", "about 25", schroeder.ratio(1000, time), "Hz"),
     ]
 
 
@@ -60,12 +60,12 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 EXPERIMENT = Experiment(
-    "schroeder-9",
-    "Error and time against subsampling",
-    f"{schroeder.SCHROEDER_2014}, Fig. 9",
-    cells,
-    schroeder.follow,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-9",
+    title="Error and time against subsampling",
+    source=f"{schroeder.SCHROEDER_2014}, Fig. 9",
+    cells=cells,
+    measure=schroeder.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

@@ -6,8 +6,8 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers import schroeder
-from depthtrack.benchmarks.papers import synergy_sources as bases
-from depthtrack.benchmarks.papers.experiment import Comparison, Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
+from depthtrack.benchmarks.papers.synergy_sources import load_source, resolve_name, short_label
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 MODELS = ("skin", "cylinders")
@@ -24,10 +24,10 @@ ALL_ANGLES = 21
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    names = [bases.chosen(options.synergies, name) for name in BASES]
+    names = [resolve_name(options.synergies, name) for name in BASES]
     spaces: list[Cell] = [{}]
     for name in dict.fromkeys(names):
-        known = len(bases.basis(name).synergies)
+        known = len(load_source(name).synergies)
         counts = QUICK_COMPONENTS if options.quick else COMPONENTS
         spaces += [{"synergies": name, "components": n} for n in counts if n <= known]
     return schroeder.cells(options, ({"model": model} | space for space in spaces for model in MODELS))
@@ -37,28 +37,28 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
     return schroeder.tabulate(rows, ("model", "synergies", "components"))
 
 
-def compare(rows: Sequence[Row]) -> list[Comparison]:
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     skin, cylinders = (schroeder.value(rows, "error_deg", model=model, components=None) for model in MODELS)
     skin_mm, cylinders_mm = (schroeder.value(rows, "error_mm", model=model, components=None) for model in MODELS)
     lines = [
-        Comparison("joint angle error, all angles, mesh", "about 2 deg", skin, "deg"),
-        Comparison("joint angle error, all angles, cylinders", "about 4 deg", cylinders, "deg"),
-        Comparison("endpoint error, all angles, mesh", "not told", skin_mm, "mm"),
-        Comparison("endpoint error, all angles, cylinders", "not told", cylinders_mm, "mm"),
+        PaperComparison("joint angle error, all angles, mesh", "about 2 deg", skin, "deg"),
+        PaperComparison("joint angle error, all angles, cylinders", "about 4 deg", cylinders, "deg"),
+        PaperComparison("endpoint error, all angles, mesh", "not told", skin_mm, "mm"),
+        PaperComparison("endpoint error, all angles, cylinders", "not told", cylinders_mm, "mm"),
     ]
     for name in _names(rows):
         skin, cylinders = (
             schroeder.value(rows, "error_deg", model=model, synergies=name, components=REDUCED) for model in MODELS
         )
         lines += [
-            Comparison(f"6 + 6, synergies {_label(name)}, mesh", "not told", skin, "deg"),
-            Comparison(f"6 + 6, synergies {_label(name)}, cylinders", "virtually as mesh", cylinders, "deg"),
+            PaperComparison(f"6 + 6, synergies {_label(name)}, mesh", "not told", skin, "deg"),
+            PaperComparison(f"6 + 6, synergies {_label(name)}, cylinders", "virtually as mesh", cylinders, "deg"),
         ]
     full, few = (_hertz(rows, n) for n in (None, REDUCED))
     return [
         *lines,
-        Comparison("frames a second, all angles (ours: mesh, one core)", "25 (8 threads)", full, "Hz"),
-        Comparison("frames a second, 6 + 6", "30 (8 threads)", few, "Hz"),
+        PaperComparison("frames a second, all angles (ours: mesh, one core)", "25 (8 threads)", full, "Hz"),
+        PaperComparison("frames a second, 6 + 6", "30 (8 threads)", few, "Hz"),
     ]
 
 
@@ -95,7 +95,7 @@ def _names(rows: Sequence[Row]) -> list[str]:
 
 
 def _label(name: str) -> str:
-    return "of this motion" if name == schroeder.DEFAULTS["motion"] else f"'{bases.label(name)}'"
+    return "of this motion" if name == schroeder.DEFAULTS["motion"] else f"'{short_label(name)}'"
 
 
 def _hertz(rows: Sequence[Row], components: int | None) -> float | None:
@@ -103,12 +103,12 @@ def _hertz(rows: Sequence[Row], components: int | None) -> float | None:
 
 
 EXPERIMENT = Experiment(
-    "schroeder-sec6c",
-    "Cylinders in place of the mesh",
-    f"{schroeder.SCHROEDER_2014}, Sec. VI-C",
-    cells,
-    schroeder.follow,
-    tabulate,
-    compare,
-    draw,
+    name="schroeder-sec6c",
+    title="Cylinders in place of the mesh",
+    source=f"{schroeder.SCHROEDER_2014}, Sec. VI-C",
+    cells=cells,
+    measure=schroeder.follow,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
 )

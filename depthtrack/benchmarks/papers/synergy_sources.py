@@ -18,7 +18,7 @@ _LABEL = 16
 """Characters."""
 
 
-class Basis(NamedTuple):
+class SynergySource(NamedTuple):
     """Synergies, and the postures (N, 20), radians, that they were fitted to; None where only the synergies are at
     hand."""
 
@@ -27,11 +27,11 @@ class Basis(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def basis(name: str) -> Basis:
+def load_source(name: str) -> SynergySource:
     """The basis of this name: as `leap`, a .json of `synergies fit`, as `signs` that motion's own postures, or the path
     of recorded postures. Raises InputError for another."""
     if name in synergy_names() or Path(name).suffix == ".json":
-        return Basis(load_synergies(name), None)
+        return SynergySource(load_synergies(name), None)
     if name in motion_names():
         postures = motion_postures(name)
     elif Path(name).exists():
@@ -41,17 +41,17 @@ def basis(name: str) -> Basis:
             f"no synergies '{name}': name a set ({', '.join(synergy_names())}), or a motion to take those of its own "
             f"postures ({', '.join(motion_names())}), or give the path of a .json of synergies or of recorded postures"
         )
-    return Basis(Synergies.fit(postures, name), postures)
+    return SynergySource(Synergies.fit(postures, name), postures)
 
 
-def chosen(name: str | None, own: str) -> str:
+def resolve_name(name: str | None, own: str) -> str:
     """The user's basis, or the experiment's own, as every worker can find it. Raises InputError where there is none."""
     name = own if name is None else name
-    basis(name)
+    load_source(name)
     return str(Path(name).resolve()) if Path(name).exists() and name not in _ours() else name
 
 
-def label(name: str) -> str:
+def short_label(name: str) -> str:
     """The name as there is room for it beside a figure."""
     stem = Path(name).stem
     return stem if len(stem) <= _LABEL else f"{stem[: _LABEL - 3]}..."

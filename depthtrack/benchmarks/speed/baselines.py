@@ -30,12 +30,12 @@ INSTALL = {
 """Libraries compared with, and the line that brings each."""
 
 
-class RivalMissingError(DepthtrackError):
+class BaselineMissingError(DepthtrackError):
     """A library to compare with is not installed, or cannot be loaded; the message names the line that brings it."""
 
 
-class Rival(ScorerBase):
-    """A scorer that draws a mesh of the 37 primitives with someone else's library. Raises RivalMissingError."""
+class Baseline(ScorerBase):
+    """A scorer that draws a mesh of the 37 primitives with someone else's library. Raises BaselineMissingError."""
 
     name: str
 
@@ -45,9 +45,9 @@ class Rival(ScorerBase):
         try:
             self._load()
         except ModuleNotFoundError as error:
-            raise RivalMissingError(f"not installed: run  {INSTALL[self.name]}") from error
+            raise BaselineMissingError(f"not installed: run  {INSTALL[self.name]}") from error
         except (ImportError, AttributeError, OSError) as error:
-            raise RivalMissingError(f"installed, but it cannot be loaded: {error}") from error
+            raise BaselineMissingError(f"installed, but it cannot be loaded: {error}") from error
 
     def set_target(self, target: Target) -> None:
         self._target = target
@@ -82,7 +82,7 @@ class Rival(ScorerBase):
         """Depth (h, w) in metres for T_camera_body (16, 4, 4), 0 where nothing is hit."""
 
 
-class PyrenderScorer(Rival):
+class PyrenderScorer(Baseline):
     """pyrender on EGL: one rigid mesh a body, its depth pass alone."""
 
     name = "pyrender"
@@ -125,7 +125,7 @@ class PyrenderScorer(Rival):
             self._renderer.delete()
 
 
-class RayCaster(Rival):
+class RayCaster(Baseline):
     """Casts a ray through every pixel; (dx, dy, 1) makes the distance along it the depth."""
 
     def _prepare(self, camera: Camera) -> None:
@@ -177,4 +177,4 @@ class EmbreeScorer(RayCaster):
         return np.where(distance < 1e30, distance, 0).reshape(self._rays.shape[:2])
 
 
-RIVALS: dict[str, type[Rival]] = {rival.name: rival for rival in (PyrenderScorer, Open3DScorer, EmbreeScorer)}
+BASELINES: dict[str, type[Baseline]] = {rival.name: rival for rival in (PyrenderScorer, Open3DScorer, EmbreeScorer)}

@@ -26,7 +26,7 @@ from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import IcpOptions, Residual, SurfaceName
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.synthesis.generate import Synthesis
-from depthtrack.synthesis.observations import Film
+from depthtrack.synthesis.observations import ObservedMotion
 from depthtrack.text_table import aligned
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -68,9 +68,9 @@ class Setting:
             **({} if self.freedom == "26" else {"synergies": "leap"}),
         )
 
-    def synergies(self, film: Film) -> Synergies | None:
-        """Return the synergies of the film's own motion, None with all degrees of freedom."""
-        return None if self.freedom == "26" else Synergies.fit(film.poses[:, ANGLES]).truncated(SYNERGIES)
+    def synergies(self, motion: ObservedMotion) -> Synergies | None:
+        """Return the synergies of the motion's own motion, None with all degrees of freedom."""
+        return None if self.freedom == "26" else Synergies.fit(motion.poses[:, ANGLES]).truncated(SYNERGIES)
 
 
 HEADLINE = Setting()
@@ -144,26 +144,26 @@ def plan(seconds: float = 1.0) -> IkPlan:
 
 def run(plan: IkPlan, progress: Callable[[Iterator[IkRow]], Iterable[IkRow]] = iter) -> IkReport:
     """Measure; `progress` may watch the rows go by."""
-    machine, film = describe_machine(), Film(Synthesis(model="skin", distance=DISTANCE))
-    rows = (measure(film, setting, plan.seconds) for setting in plan.settings)
+    machine, motion = describe_machine(), ObservedMotion(Synthesis(model="skin", distance=DISTANCE))
+    rows = (measure(motion, setting, plan.seconds) for setting in plan.settings)
     return IkReport("ik", machine, list(progress(rows)))
 
 
-def measure(film: Film, setting: Setting, seconds: float) -> IkRow:
-    """The row of a setting, on four frames of the film, each reached from the two before it."""
-    frames = [round(at * film.recording.rate) for at in FRAME_TIMES]
+def measure(motion: ObservedMotion, setting: Setting, seconds: float) -> IkRow:
+    """The row of a setting, on four frames of the motion, each reached from the two before it."""
+    frames = [round(at * motion.recording.rate) for at in FRAME_TIMES]
     share = seconds / len(frames) / 2
-    with closing(create_tracker(setting.config, film.hand, synergies=setting.synergies(film))) as tracker:
-        timed = [_time_frame(tracker, film, index, share) for index in frames]
+    with closing(create_tracker(setting.config, motion.hand, synergies=setting.synergies(motion))) as tracker:
+        timed = [_time_frame(tracker, motion, index, share) for index in frames]
     poses, frame_s = np.array([each.pose for each in timed]), [each.seconds for each in timed]
     iteration_s = [
-        _time_fit(film, setting, index, each.before, share) for index, each in zip(frames, timed, strict=True)
+        _time_fit(motion, setting, index, each.before, share) for index, each in zip(frames, timed, strict=True)
     ]
-    hand, truth = HandModel(film.hand), film.poses[frames]
+    hand, truth = HandModel(motion.hand), motion.poses[frames]
     frame, frame_median = _best_and_median(frame_s)
     iteration, iteration_median = (each / setting.icp for each in _best_and_median(iteration_s))
     return IkRow(
-        points=round(np.mean([len(film[index].points) for index in frames]) / setting.subsample),
+        points=round(np.mean([len(motion[index].points) for index in frames]) / setting.subsample),
         model=setting.model,
         residual=setting.residual,
         freedom=setting.freedom,
@@ -192,14 +192,17 @@ class _Timed(NamedTuple):
     stage_ms: dict[str, float]
 
 
-def _time_frame(tracker: StageTracker, film: Film, index: int, seconds: float) -> _Timed:
+def _time_frame(tracker: StageTracker, motion: ObservedMotion, index: int, seconds: float) -> _Timed:
     """How long the tracker takes from the frame before to this one."""
-    before = [tracker.start(film[index - 2], film.poses[index - 2]), tracker.track(film[index - 1])]
+    before = [
+        tracker.start(motion[index - 2], motion.poses[index - 2]),
+        tracker.track(motion[index - 1]),
+    ]
     made = list[Estimate]()
 
     def track() -> None:
         tracker.restore(before)
-        made.append(tracker.track(film.again(index)))
+        made.append(tracker.track(motion.again(index)))
 
     track()
     durations = time_calls(track, seconds)
@@ -210,9 +213,9 @@ def _time_frame(tracker: StageTracker, film: Film, index: int, seconds: float) -
     return _Timed(pose, last, durations, stages)
 
 
-def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
+def _time_fit(motion: ObservedMotion, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
     """How long each fit to a frame took, from `pose` (27,), without the alignment of the whole hand before it."""
-    synergies = setting.synergies(film)
+    synergies = setting.synergies(motion)
     space = FULL if synergies is None else PostureSubspace.of(synergies)
     options = replace(
         IcpOptions(),
@@ -221,8 +224,8 @@ def _time_fit(film: Film, setting: Setting, index: int, pose: Array, seconds: fl
         gn_iterations=setting.inner,
         rigid_iterations=0,
     )
-    fitter = IcpFitter(film.hand, make_surface(setting.model, film.hand), options)
-    fitter.set_target(film[index], setting.subsample)
+    fitter = IcpFitter(motion.hand, make_surface(setting.model, motion.hand), options)
+    fitter.set_target(motion[index], setting.subsample)
     fitter.fit(pose, space)
     return time_calls(partial(fitter.fit, pose, space), seconds)
 

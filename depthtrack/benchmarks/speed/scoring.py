@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from depthtrack.benchmarks.speed.baselines import RIVALS
+from depthtrack.benchmarks.speed.baselines import BASELINES
 from depthtrack.benchmarks.speed.isolation import in_own_process
 from depthtrack.benchmarks.speed.timing import time_calls
 from depthtrack.benchmarks.speed.workload import CHECKED, HYPOTHESES, ROIS, Roi, Workload, make_workloads
@@ -23,11 +23,11 @@ from depthtrack.rendering.backends import BACKENDS, create_scorer
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.text_table import aligned
 
-CONTENDERS = (*BACKENDS, *RIVALS)
-USUAL = tuple(name for name in CONTENDERS if name != "oracle")
+SCORERS = (*BACKENDS, *BASELINES)
+DEFAULT_SCORERS = tuple(name for name in SCORERS if name != "oracle")
 """Who is measured unless told otherwise: all but the reference, which is slow by design."""
 
-_RIVAL_BATCH = HYPOTHESES // 4
+_BASELINE_BATCH = HYPOTHESES // 4
 """Rivals draw one hypothesis at a time and are slow: a quarter of each frame's swarm makes 64 as well."""
 _PATIENCE = 120.0
 """Seconds that a contender may take for a row on top of its time: a cold compile on a slow machine."""
@@ -93,10 +93,10 @@ class ScorePlan:
 
 def plan(specs: Sequence[str] | None = None, seconds: float = 1.0) -> ScorePlan:
     """A plan for these contenders, or the usual ones. Raises InputError for unknown names and unusable times."""
-    chosen = USUAL if specs is None else tuple(dict.fromkeys(specs))
-    unknown = [name for name in chosen if name not in CONTENDERS]
+    chosen = DEFAULT_SCORERS if specs is None else tuple(dict.fromkeys(specs))
+    unknown = [name for name in chosen if name not in SCORERS]
     if unknown or not chosen:
-        raise InputError(f"--backends takes {', '.join(CONTENDERS)}; found {', '.join(unknown) or 'none'}")
+        raise InputError(f"--backends takes {', '.join(SCORERS)}; found {', '.join(unknown) or 'none'}")
     if not 0 < seconds <= 600:
         raise InputError(f"--seconds must lie between 0 and 600 a row, found {seconds:g}")
     return ScorePlan(chosen, seconds)
@@ -132,15 +132,15 @@ def _thread_counts(name: str) -> list[int | None]:
 
 
 def _create(name: str, shape: HandShape, threads: int | None) -> Scorer:
-    if name in RIVALS:
-        return RIVALS[name](shape)
+    if name in BASELINES:
+        return BASELINES[name](shape)
     options: dict[str, Any] = {} if threads is None else {"threads": threads}
     return create_scorer(name, shape, **options)
 
 
 def _row(scorer: Scorer, threads: int | None, workload: Workload, seconds: float, start: float) -> ScoreRow:
-    peer = scorer.name in RIVALS
-    swarms = workload.poses[:, : _RIVAL_BATCH if peer else HYPOTHESES]
+    peer = scorer.name in BASELINES
+    swarms = workload.poses[:, : _BASELINE_BATCH if peer else HYPOTHESES]
     scorer.set_target(workload.targets[0])
     scorer.score(swarms[0])
     first_call = perf_counter() - start

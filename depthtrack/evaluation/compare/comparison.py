@@ -44,7 +44,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Progress:
+class ComparisonProgress:
     """What is going on: `what` in words, `frames` tracked of `total` (0 where not counted in frames)."""
 
     what: str
@@ -52,7 +52,7 @@ class Progress:
     total: int = 0
 
 
-Listener = Callable[[Progress], None]
+Listener = Callable[[ComparisonProgress], None]
 
 
 def compare(
@@ -109,7 +109,7 @@ def _budgets(
         }
         for s, c in numbers
     ]
-    listener(Progress(f"finding the work that takes {comparison.equal_ms:g} ms of CPU time a frame"))
+    listener(ComparisonProgress(f"finding the work that takes {comparison.equal_ms:g} ms of CPU time a frame"))
     with Journal(folder / "budgets.jsonl", list(cells[0])) as journal:
         return dict(zip(numbers, run_sweep(calibrate_cell, cells, journal, workers), strict=True))
 
@@ -131,9 +131,9 @@ def _watching(folders: Sequence[Path], total: int, listener: Listener) -> Iterat
 
     def watch() -> None:
         while not finished.wait(_LOOK_EVERY):
-            listener(Progress("tracking", count(), total))
+            listener(ComparisonProgress("tracking", count(), total))
 
-    listener(Progress("tracking", count(), total))
+    listener(ComparisonProgress("tracking", count(), total))
     thread = Thread(target=watch, daemon=True)
     thread.start()
     try:
@@ -141,4 +141,4 @@ def _watching(folders: Sequence[Path], total: int, listener: Listener) -> Iterat
     finally:
         finished.set()
         thread.join()
-    listener(Progress("tracking", count(), total))
+    listener(ComparisonProgress("tracking", count(), total))

@@ -26,7 +26,7 @@ TRACKER_MS = "tracker_ms"
 
 
 @dataclass(frozen=True)
-class Line:
+class TrackerResult:
     """A tracker on a recording: its runs, which differ in their seeds, and the medians of their figures."""
 
     recording: str
@@ -112,7 +112,7 @@ def label_of(evaluation: Evaluation) -> str:
     return label if isinstance(label, str) and label else tracker_label(evaluation.configuration.tracker)
 
 
-def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
+def tracker_results(evaluations: Sequence[Evaluation]) -> list[TrackerResult]:
     """A line for every recording and tracker, in the order in which they first come.
 
     Runs of one label that have different seeds are repetitions; others are lines of their own, under their folders'
@@ -126,15 +126,15 @@ def lines_of(evaluations: Sequence[Evaluation]) -> list[Line]:
     lines = []
     for (_, label), runs in sorted(groups.items(), key=lambda group: recordings.index(group[0][0])):
         if len({run.configuration.tracker.seed for run in runs}) == len(runs):
-            lines.append(Line(runs[0].recording, label, tuple(runs)))
+            lines.append(TrackerResult(runs[0].recording, label, tuple(runs)))
         else:
-            lines += [Line(run.recording, f"{label}, {run.run.folder.name}", (run,)) for run in runs]
+            lines += [TrackerResult(run.recording, f"{label}, {run.run.folder.name}", (run,)) for run in runs]
     return lines
 
 
 def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
     """Write `results.json`, an object a run, and `results.csv`, the same in columns."""
-    rows = [result(evaluation) for evaluation in evaluations]
+    rows = [run_record(evaluation) for evaluation in evaluations]
     write_atomic(folder / "results.json", json.dumps(rows, indent=2) + "\n")
     flat = [dict(_flat(row)) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
@@ -145,7 +145,7 @@ def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
     write_atomic(folder / "results.csv", text.getvalue())
 
 
-def result(evaluation: Evaluation) -> dict[str, Any]:
+def run_record(evaluation: Evaluation) -> dict[str, Any]:
     """All figures of a run, under the names that tell it from others."""
     context = evaluation.configuration.context
     return {
@@ -165,7 +165,7 @@ class Column:
     heading: str
     unit: str
     form: str
-    value: Callable[[Line], float | None]
+    value: Callable[[TrackerResult], float | None]
     higher_is_better: bool = False
 
 
@@ -184,12 +184,12 @@ COLUMNS = (
 )
 
 
-def shown_columns(lines: Sequence[Line]) -> list[Column]:
+def shown_columns(lines: Sequence[TrackerResult]) -> list[Column]:
     """The columns that any of the lines has a figure for."""
     return [column for column in COLUMNS if any(column.value(line) is not None for line in lines)]
 
 
-def as_table(lines: Sequence[Line]) -> str:
+def as_table(lines: Sequence[TrackerResult]) -> str:
     """The comparison for a terminal; columns that no recording allows are left out."""
     columns = shown_columns(lines)
     head = ["recording", "tracker", "frames", *(f"{c.heading} {c.unit}".strip() for c in columns)]

@@ -22,7 +22,7 @@ _SIDE_SOFTWARE, _SIDE_HARDWARE = 1024, 2048
 
 
 @dataclass(frozen=True)
-class Grid:
+class TileGrid:
     """Tiles of `height` x `width` pixels, `columns` a row, at most `capacity` of them in an atlas."""
 
     height: int
@@ -72,7 +72,7 @@ class Renderer:
         self._pyramid: list[Atlas] = []
         self._side = min(_SIDE_SOFTWARE if context.software else _SIDE_HARDWARE, context.max_side)
 
-    def grid(self, gl: Any, height: int, width: int) -> Grid:
+    def grid(self, gl: Any, height: int, width: int) -> TileGrid:
         """How tiles of a size are laid out; the atlases grow when a single one does not fit."""
         if max(height, width) > self.context.max_side:
             raise InputError(
@@ -89,9 +89,9 @@ class Renderer:
         # Tiles narrower than a block still take one of the pyramid.
         columns, rows = self._side // max(width, _BLOCK), self._side // max(height, _BLOCK)
         columns, rows = max(columns, 1), max(rows, 1)
-        return Grid(height, width, columns, columns * rows)
+        return TileGrid(height, width, columns, columns * rows)
 
-    def draw(self, gl: Any, which: int, grid: Grid, count: int, instances: Array32) -> None:
+    def draw(self, gl: Any, which: int, grid: TileGrid, count: int, instances: Array32) -> None:
         """Draw the impostors (N, 6, 4) of `count` tiles into atlas `which`; returns before it is done."""
         atlas = self._atlases[which]
         height, width = grid.extent(count)
@@ -116,7 +116,7 @@ class Renderer:
         gl.glReadPixels(0, 0, width, height, gl.GL_RED, gl.GL_FLOAT, pixels)
 
     def sum(
-        self, gl: Any, which: int, grid: Grid, count: int, observation: int, match_depth: float, clamp_depth: float
+        self, gl: Any, which: int, grid: TileGrid, count: int, observation: int, match_depth: float, clamp_depth: float
     ) -> Array:
         """Sums of Eq. (2) over the tiles of atlas `which`: (count, 3).
 

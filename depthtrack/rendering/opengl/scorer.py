@@ -12,7 +12,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.opengl.context import Context, Device, Platform
 from depthtrack.rendering.opengl.impostors import VECTORS, HandTable, place_impostors
-from depthtrack.rendering.opengl.renderer import Grid, Renderer, shared_renderer
+from depthtrack.rendering.opengl.renderer import Renderer, TileGrid, shared_renderer
 from depthtrack.rendering.opengl.sums import sum_tiles
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import ScorerBase, as_batch
@@ -109,18 +109,18 @@ class OpenGLScorer(ScorerBase):
             raise RuntimeError("this scorer was closed")
         return self._renderer
 
-    def _part_size(self, grid: Grid, count: int) -> int:
+    def _part_size(self, grid: TileGrid, count: int) -> int:
         wanted = max(-(-count // _PARTS), _SMALLEST_PART) if self.software else count
         return max(min(wanted, grid.capacity), 1)
 
-    def _draw(self, gl: Any, which: int, grid: Grid, poses: Array, regions: Index) -> None:
+    def _draw(self, gl: Any, which: int, grid: TileGrid, poses: Array, regions: Index) -> None:
         if len(self._instances) < len(poses) * PRIMITIVE_COUNT:
             self._instances = np.empty((len(poses) * PRIMITIVE_COUNT, VECTORS, 4), np.float32)
         tile = grid.height, grid.width
         count = place_impostors(poses, self._hand, self._intrinsics, tile, grid.columns, self._instances, regions)
         self._open.draw(gl, which, grid, len(poses), self._instances[:count])
 
-    def _read(self, gl: Any, which: int, grid: Grid, count: int) -> Array32:
+    def _read(self, gl: Any, which: int, grid: TileGrid, count: int) -> Array32:
         height, width = grid.extent(count)
         if self._pixels.size < height * width:
             self._pixels = np.empty(height * width, np.float32)
@@ -128,7 +128,7 @@ class OpenGLScorer(ScorerBase):
         self._open.read(gl, which, pixels)
         return pixels
 
-    def _sum(self, gl: Any, which: int, grid: Grid, regions: Index, sums: Array) -> None:
+    def _sum(self, gl: Any, which: int, grid: TileGrid, regions: Index, sums: Array) -> None:
         o, target = self._objective, self.target
         limits = o.match_depth, o.clamp_depth
         if self.sums == "gpu":
