@@ -18,7 +18,7 @@ from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.robust import geman_mcclure, symmetric_direction
@@ -42,7 +42,7 @@ class CalibrationView:
         every = max(1, round(len(observation.points) / _POINTS))
         pick = slice(every // 2, None, every)
         self.points, self.normals = observation.points[pick], observation.normals[pick]
-        self.beyond = _beyond(observation.skin)
+        self.beyond = _beyond(observation.silhouette)
         """(h, w) signed distance to the silhouette in pixels, negative inside."""
         slope = np.stack([np.gradient(self.beyond, axis=axis) for axis in (0, 1)])
         self.outward = slope / np.maximum(np.linalg.norm(slope, axis=0), 1e-9)
@@ -68,7 +68,7 @@ class PosedSkin:
         self._stretch = np.tile(np.eye(4), (BODY_COUNT, 1, 1)) if exact else _stretches(shape, average)
         self.wrist = shape.wrist[1] + _WRIST_ROOM
 
-    def seen(self, view: CalibrationView, pose: Array) -> Surface:
+    def seen(self, view: CalibrationView, pose: Array) -> RenderedSurface:
         """Return the skin in a pose (27,), rendered with the camera of the view."""
         skin = self._skin
         vertices = skin.vertices(self.model.transforms(pose) @ self._stretch)

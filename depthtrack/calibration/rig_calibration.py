@@ -150,7 +150,7 @@ def depth_disagreement(surface: HandSurface, observation: Observation, pose: Arr
     and nothing without a reading. Pixels below the wrist do not count: a rig and a segmentation end at different
     places there.
     """
-    drawn, silhouette = surface.render(pose, observation.camera).depth, observation.skin > 0
+    drawn, silhouette = surface.render(pose, observation.camera).depth, observation.silhouette > 0
     v, u = np.nonzero((drawn > 0) | silhouette)
     model, observed, is_hand = drawn[v, u], observation.depth[v, u], silhouette[v, u]
     points = observation.camera.unproject(np.stack([u, v], axis=-1), np.where(model > 0, model, observed))

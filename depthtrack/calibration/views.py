@@ -57,6 +57,6 @@ def choose_views(
 def finger_area(observation: Observation, half_breadth: float = ViewChoiceOptions.finger_half_breadth) -> float:
     """Return the area, m^2, of the parts of the silhouette that are narrower than two `half_breadth` (m): fingers."""
     pixel = float(observation.centre[2]) / observation.camera.fx
-    skin = observation.skin.astype(np.uint8)
-    palm = cv2.morphologyEx(skin, cv2.MORPH_OPEN, disc(max(1, round(half_breadth / pixel))))
-    return float(np.count_nonzero(observation.skin & (palm == 0)) * pixel**2)
+    silhouette = observation.silhouette.astype(np.uint8)
+    palm = cv2.morphologyEx(silhouette, cv2.MORPH_OPEN, disc(max(1, round(half_breadth / pixel))))
+    return float(np.count_nonzero(observation.silhouette & (palm == 0)) * pixel**2)

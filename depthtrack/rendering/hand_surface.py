@@ -12,7 +12,7 @@ from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.raycast import raycast
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.types import Array, Mask
 
@@ -20,7 +20,7 @@ from depthtrack.types import Array, Mask
 class HandDrawer(Protocol):
     """Draws a posed hand."""
 
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+    def draw(self, camera: Camera, transforms: Array, onto: RenderedSurface) -> None:
         """Draw the hand into `onto`, labelled by body, 0 to 15.
 
         transforms (16, 4, 4): T_camera_body, metres.
@@ -34,7 +34,7 @@ class PrimitiveHand:
 
     primitives: Primitives
 
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+    def draw(self, camera: Camera, transforms: Array, onto: RenderedSurface) -> None:
         raycast(camera, self.primitives.kinds, self.primitives.placed(transforms), self.primitives.bodies, onto)
 
 
@@ -44,7 +44,7 @@ class SkinHand:
 
     skin: Skin
 
-    def draw(self, camera: Camera, transforms: Array, onto: Surface) -> None:
+    def draw(self, camera: Camera, transforms: Array, onto: RenderedSurface) -> None:
         vertices = self.skin.vertices(transforms)
         rasterise(camera, vertices, self.skin.faces, self.skin.normals(vertices), self.skin.face_bodies, onto)
 
@@ -68,12 +68,12 @@ class HandSurface:
             return cls("skin", HandModel(shape), SkinHand(Skin.of(shape)))
         return cls("cylinders", HandModel(shape), PrimitiveHand(Primitives.of(shape)))
 
-    def render(self, pose: Array, camera: Camera) -> Surface:
+    def render(self, pose: Array, camera: Camera) -> RenderedSurface:
         """Return what `camera` sees of the hand alone; labels are bodies 0 to 15.
 
         pose (27,): metres, quaternion and radians, camera frame.
         """
-        surface = Surface.empty(camera)
+        surface = RenderedSurface.empty(camera)
         self.drawer.draw(camera, self.model.transforms(pose), surface)
         return surface
 

@@ -14,29 +14,29 @@ from depthtrack.types import Array, Mask
 class Terms:
     """Energies (B,) of Eq. (1) and what they are made of.
 
-    `depth` (B,): first term of Eq. (2), in `Objective.depth_unit`. `skin` (B,): second term of Eq. (2) before
+    `depth` (B,): first term of Eq. (2), in `Objective.depth_unit`. `silhouette` (B,): second term of Eq. (2) before
     lambda, 0 to 1. `kinematic` (B,): kc of Eq. (1) before lambda_k, radians.
     """
 
     energy: Array
     depth: Array
-    skin: Array
+    silhouette: Array
     kinematic: Array
 
     @property
     def agreement(self) -> Array:
         """The confidence (B,) in each pose, 0 to 1: how far the rendered and the observed silhouette agree."""
-        return 1 - self.skin
+        return 1 - self.silhouette
 
     @classmethod
     def of_sums(
-        cls, objective: Objective, poses: ArrayLike, clamped: Array, matched_skin: Array, union: Array
+        cls, objective: Objective, poses: ArrayLike, clamped: Array, matched_silhouette: Array, union: Array
     ) -> "Terms":
         """From the sums of Eq. (2): of min(|o_d - r_d|, d_M) in metres, of o_s and r_m, and of o_s or r_m."""
         depth = clamped / objective.depth_unit / (union + objective.epsilon)
-        skin = silhouette_disagreement(matched_skin, union)
+        silhouette = silhouette_disagreement(matched_silhouette, union)
         kinematic = finger_crossing(poses)
-        return cls(objective.combine(depth, skin, kinematic), depth, skin, kinematic)
+        return cls(objective.combine(depth, silhouette, kinematic), depth, silhouette, kinematic)
 
 
 def silhouette_disagreement(matched: Array, union: Array) -> Array:
@@ -52,7 +52,9 @@ def finger_crossing(poses: ArrayLike) -> Array:
     return -np.minimum(phi, 0).sum(axis=-1)
 
 
-def evaluate(objective: Objective, skin: Mask, observed: ArrayLike, rendered: ArrayLike) -> tuple[float, float, float]:
+def evaluate(
+    objective: Objective, silhouette: Mask, observed: ArrayLike, rendered: ArrayLike
+) -> tuple[float, float, float]:
     """Sums of Eq. (2) for one rendered depth map: clamped difference (metres), o_s and r_m, o_s or r_m.
 
     All maps (h, w); depth in metres, 0 where there is no reading or nothing was drawn. A drawn pixel is matched
@@ -64,6 +66,6 @@ def evaluate(objective: Objective, skin: Mask, observed: ArrayLike, rendered: Ar
     matched = (r > 0) & ((difference < objective.match_depth) | (o == 0))
     return (
         float(np.minimum(difference, objective.clamp_depth).sum()),
-        float(np.sum(skin & matched)),
-        float(np.sum(skin | matched)),
+        float(np.sum(silhouette & matched)),
+        float(np.sum(silhouette | matched)),
     )

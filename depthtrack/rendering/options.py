@@ -17,7 +17,7 @@ class Objective:
 
     match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
     clamp_depth: float = option(0.04, "d_M: larger depth differences cost no more", unit="m", source=_OIKONOMIDIS)
-    skin_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS)
+    silhouette_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS)
     kinematic_weight: float = option(10.0, "lambda_k: weight of crossing fingers", source=_OIKONOMIDIS)
     depth_unit: float = option(
         0.001, "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20", unit="m"
@@ -34,9 +34,9 @@ class Objective:
         """Energy of a pixel whose depth disagrees completely; thresholds on the energy are multiples of it."""
         return self.clamp_depth / self.depth_unit
 
-    def combine(self, depth: Any, skin: Any, kinematic: Any) -> Any:
+    def combine(self, depth: Any, silhouette: Any, kinematic: Any) -> Any:
         """Return the energies of Eq. (1) from its separate terms."""
-        return depth + self.skin_weight * skin + self.kinematic_weight * kinematic
+        return depth + self.silhouette_weight * silhouette + self.kinematic_weight * kinematic
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,9 @@ class OracleScorer(ScorerBase):
 
     def terms(self, poses: ArrayLike) -> Terms:
         target, batch = self.target, as_batch(poses)
-        sums = [evaluate(self._objective, target.skin, target.depth, self._depth(pose)) for pose in batch]
-        clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
-        return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
+        sums = [evaluate(self._objective, target.silhouette, target.depth, self._depth(pose)) for pose in batch]
+        clamped, matched_silhouette, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
+        return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 
     def render(self, pose: ArrayLike) -> Depth:
         return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import CYLINDER
-from depthtrack.rendering.surface import NEAR, Surface
+from depthtrack.rendering.rendered_surface import NEAR, RenderedSurface
 from depthtrack.types import Array, Index
 
 
@@ -22,15 +22,15 @@ def raycast(
     kinds: Index,
     T_camera_unit: Array,
     labels: Index,
-    onto: Surface | None = None,
-) -> Surface:
+    onto: RenderedSurface | None = None,
+) -> RenderedSurface:
     """Render N unit primitives placed by `T_camera_unit` (N, 4, 4); returns the nearest hit at every pixel centre.
 
     Only faces seen from outside are drawn, from NEAR onward: a primitive that holds the lens shows nothing.
     Cylinders are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn
     over in place.
     """
-    surface = Surface.empty(camera) if onto is None else onto
+    surface = RenderedSurface.empty(camera) if onto is None else onto
     inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
     regions = np.array([_bounds(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64)
     _cast(

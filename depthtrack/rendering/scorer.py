@@ -26,7 +26,7 @@ class Scores(NamedTuple):
 class Scorer(Protocol):
     """Scores hand hypotheses against one observation at a time (Oikonomidis et al. 2011, Sec. 2.3).
 
-    Poses are (B, 27); depth is metres. Only faces seen from outside are drawn, from `surface.NEAR` onward: a
+    Poses are (B, 27); depth is metres. Only faces seen from outside are drawn, from `rendered_surface.NEAR` onward: a
     primitive that holds the lens shows nothing. Backends agree with `oracle` and give the same bits for any
     number of threads. A scorer is used by one thread at a time and closed when done (or used in a `with`).
     """
@@ -91,7 +91,7 @@ class ScorerBase:
     def evaluate(self, poses: ArrayLike) -> Scores:
         """Return the energies with the agreement of the silhouettes."""
         terms = self.terms(poses)
-        return Scores(terms.energy, 1 - terms.skin)
+        return Scores(terms.energy, 1 - terms.silhouette)
 
     @property
     def target(self) -> Target:

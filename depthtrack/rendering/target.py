@@ -1,4 +1,4 @@
-"""What hypotheses are scored against: the skin and depth maps of a region of interest, at any resolution."""
+"""What hypotheses are scored against: the silhouette and depth maps of a region of interest, at any resolution."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Target:
     """The maps O = (o_s, o_d) of Oikonomidis et al. 2011, Sec. 2.1, that a scorer compares hypotheses with.
 
     `camera`: of the region of interest.
-    `skin` (h, w): True for pixels of the hand's silhouette.
+    `silhouette` (h, w): True for pixels of the hand's silhouette.
     `depth` (h, w): metres, 0 where there is no reading of the hand.
 
     Raises:
@@ -24,13 +24,13 @@ class Target:
     """
 
     camera: Camera
-    skin: Mask
+    silhouette: Mask
     depth: Depth
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "skin", np.ascontiguousarray(self.skin, dtype=np.bool_))
+        object.__setattr__(self, "silhouette", np.ascontiguousarray(self.silhouette, dtype=np.bool_))
         object.__setattr__(self, "depth", np.ascontiguousarray(self.depth, dtype=np.float32))
-        for name, found in (("skin", self.skin.shape), ("depth", self.depth.shape)):
+        for name, found in (("silhouette", self.silhouette.shape), ("depth", self.depth.shape)):
             if found != self.camera.shape:
                 raise InputError(f"the {name} map must be {self.camera.shape} as its camera says, found {found}")
         if not np.all(np.isfinite(self.depth)) or self.depth.min() < 0:
@@ -43,7 +43,7 @@ class Target:
 
     def crop(self, region: Rect) -> "Target":
         """Return the part in a region, which may reach outside: nothing is observed there."""
-        return Target(self.camera.crop(region), region.crop(self.skin), region.crop(self.depth))
+        return Target(self.camera.crop(region), region.crop(self.silhouette), region.crop(self.depth))
 
     def reduced(self, side: int) -> "Target":
         """Return the target sampled so that its longer side has at most `side` pixels.
@@ -62,7 +62,7 @@ class Target:
         columns = _nearest((np.arange(camera.width) + 0.5) / factor - 0.5, self.camera.width)
         rows = _nearest((np.arange(camera.height) + 0.5) / factor - 0.5, self.camera.height)
         pick = np.ix_(rows, columns)
-        return Target(camera, self.skin[pick], self.depth[pick])
+        return Target(camera, self.silhouette[pick], self.depth[pick])
 
 
 def _nearest(position: NDArray[np.floating], size: int) -> Index:

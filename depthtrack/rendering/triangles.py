@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.rendering.surface import NEAR, Surface
+from depthtrack.rendering.rendered_surface import NEAR, RenderedSurface
 from depthtrack.types import Array, Index
 
 
@@ -17,14 +17,14 @@ def rasterise(
     faces: Index,
     vertex_normals: Array,
     labels: Index,
-    onto: Surface | None = None,
-) -> Surface:
+    onto: RenderedSurface | None = None,
+) -> RenderedSurface:
     """Render triangles; both sides are seen, and triangles that reach in front of the lens (z < NEAR) are dropped.
 
     `vertices` (V, 3) metres in the camera frame, `faces` (F, 3), `vertex_normals` (V, 3) of any length, `labels`
     (F,) written where a face is nearest. With `onto`, that surface is drawn over in place.
     """
-    surface = Surface.empty(camera) if onto is None else onto
+    surface = RenderedSurface.empty(camera) if onto is None else onto
     _rasterise(
         np.ascontiguousarray(vertices, dtype=np.float64),
         np.ascontiguousarray(faces, dtype=np.int64),

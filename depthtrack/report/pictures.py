@@ -15,7 +15,7 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import TrackerSeries
 from depthtrack.types import Array, Image, Mask
@@ -146,7 +146,7 @@ def _narrowed(regions: list[Rect], camera: Camera, keypoints: Array, known: Mask
     return [Rect.of_size(region.left + (width - narrow) // 2, region.top, narrow, height) for region in regions]
 
 
-def _outlined(image: Image, surface: Surface, colour: Rgb) -> Image:
+def _outlined(image: Image, surface: RenderedSurface, colour: Rgb) -> Image:
     """`image` with the rim of the surface in a colour."""
     hit = (surface.label >= 0).astype(np.uint8)
     rim = cv2.dilate(hit, np.ones((3, 3), dtype=np.uint8)) - cv2.erode(hit, np.ones((3, 3), dtype=np.uint8))

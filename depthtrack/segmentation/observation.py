@@ -55,7 +55,7 @@ class Observation(Target):
 
     def whole_mask(self, shape: tuple[int, ...]) -> Mask:
         """Return the silhouette in the whole frame of `shape` (height, width)."""
-        return self.region.paste(self.skin, Rect.of_image(shape))
+        return self.region.paste(self.silhouette, Rect.of_image(shape))
 
     @property
     def points(self) -> Array:

@@ -16,7 +16,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.primitives import CYLINDER, SPHERE
 from depthtrack.rendering.raycast import raycast
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.colour import linear_from_srgb, smooth_field
 from depthtrack.types import Array
@@ -32,13 +32,13 @@ class Backdrop:
     """Things drawn so far: `surface` with a label for each, and their `colours` (3,), linear RGB, from FACE on."""
 
     camera: Camera
-    surface: Surface
+    surface: RenderedSurface
     colours: list[Array]
 
     @classmethod
     def empty(cls, camera: Camera, face: Array) -> Self:
         """Nothing yet; `face` (3,) is the colour that a face will have."""
-        return cls(camera, Surface.empty(camera), [face])
+        return cls(camera, RenderedSurface.empty(camera), [face])
 
     def albedo(self, rng: np.random.Generator) -> Array:
         """Linear RGB reflectance (h, w, 3), a little uneven as painted and woven things are; 0 where nothing is."""

@@ -69,7 +69,7 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
         timestamp=frame.timestamp,
         camera=roi,
         region=region,
-        skin=frame.skin[region.slices],
+        silhouette=frame.skin[region.slices],
         depth=depth,
         centre=surface + hand.palm_thickness * hand.scale / 2 * inwards,
         palm_radius=hand.palm_breadth * hand.scale / 2,

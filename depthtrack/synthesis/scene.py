@@ -13,7 +13,7 @@ from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.hand_surface import HandDrawer, PrimitiveHand, SkinHand
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.backdrop import FOREARM, Backdrop
 from depthtrack.synthesis.forearm import Forearm
@@ -26,7 +26,7 @@ HandKind = Literal["primitives", "skin"]
 class View:
     """A rendered frame: the surface, and T_camera_body (17, 4, 4) of the 16 bodies and the forearm."""
 
-    surface: Surface
+    surface: RenderedSurface
     transforms: Array
 
 
@@ -43,7 +43,7 @@ class Scene:
     def view(self, pose: Array, elbow: Array) -> View:
         """The scene with the hand in `pose` (27,) and its forearm pointing at `elbow` (3,), camera frame."""
         still = self.backdrop.surface
-        surface = Surface(still.depth.copy(), still.label.copy(), still.normal.copy())
+        surface = RenderedSurface(still.depth.copy(), still.label.copy(), still.normal.copy())
         transforms = np.empty((BODY_COUNT + 1, 4, 4))
         transforms[:BODY_COUNT] = self.model.transforms(pose)
         self._hand.draw(self.camera, transforms[:BODY_COUNT], surface)

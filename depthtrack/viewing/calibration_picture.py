@@ -11,7 +11,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array, Image, Mask
@@ -68,9 +68,9 @@ def _square(shape: tuple[int, int]) -> Rect:
 def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
     """The observed depth in colours, and the outline of the silhouette (h, w)."""
     square = _square(o.camera.shape)
-    depth, skin = square.crop(o.depth), square.crop(o.skin.astype(np.uint8))
+    depth, silhouette = square.crop(o.depth), square.crop(o.silhouette.astype(np.uint8))
     size = (camera.width, camera.height)
-    large = cv2.resize(skin, size, interpolation=cv2.INTER_NEAREST)
+    large = cv2.resize(silhouette, size, interpolation=cv2.INTER_NEAREST)
     readings = depth[depth > 0]
     near, far = (float(readings.min()), float(readings.max()) + 0.05) if readings.size else (0.3, 1.0)
     image = depth_to_rgb(np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)), near, far)
@@ -78,7 +78,7 @@ def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
     return image, (large > 0) & (cv2.erode(large, np.ones((3, 3), np.uint8)) == 0)
 
 
-def _seen(hand: HandShape, pose: Array, camera: Camera) -> Surface:
+def _seen(hand: HandShape, pose: Array, camera: Camera) -> RenderedSurface:
     skin = Skin.of(hand)
     vertices = skin.at(pose)
     return rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)

@@ -8,7 +8,7 @@ import numpy as np
 
 from depthtrack.evaluation.evaluate import evaluate
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.viewing.annotated_frame import true_keypoints
 from depthtrack.viewing.rerun_stream import CAMERA
 from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, MomentStream, bones, jpeg
@@ -65,7 +65,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
         status = estimate.status
         stream.log("run/status", rr.TextLog(f"frame {item.frame.index}: {status}", color=STATUS_COLOURS[status]))
 
-    def _points(self, surface: Surface) -> Any:
+    def _points(self, surface: RenderedSurface) -> Any:
         """The visible surface in the colours of its fingers, a point for every second pixel."""
         depth, label = surface.depth[::2, ::2], surface.label[::2, ::2]
         v, u = np.nonzero(label >= 0)
@@ -94,7 +94,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
         return self._blueprint(rrb.Horizontal(scene, images, numbers, column_shares=[3, 3, 2]))
 
 
-def _picture(rr: Any, surface: Surface) -> Any:
+def _picture(rr: Any, surface: RenderedSurface) -> Any:
     """The hypothesis as a picture, clear where there is no hand."""
     image = draw_surface(np.zeros((*surface.depth.shape, 3), dtype=np.uint8), surface)
     alpha = np.where(surface.label >= 0, _OPACITY, 0).astype(np.uint8)

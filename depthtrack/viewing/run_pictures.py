@@ -9,7 +9,7 @@ from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import close_ups
@@ -92,7 +92,7 @@ class RunPainter:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
         return image if close.keypoints is None else draw_skeleton(image, camera, close.keypoints)
 
-    def _rendered(self, seen: ReplayedFrame, camera: Camera) -> Surface | None:
+    def _rendered(self, seen: ReplayedFrame, camera: Camera) -> RenderedSurface | None:
         """The hypothesis as a view of this camera shows it."""
         if seen.estimate.pose is None:
             return None

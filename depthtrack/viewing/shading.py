@@ -3,7 +3,7 @@
 import numpy as np
 
 from depthtrack.hand.pose import FINGERS
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Image
 from depthtrack.viewing.theme import FINGER_COLOURS, PALM
 
@@ -13,7 +13,7 @@ BODY_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS fo
 """(16, 3) RGB of the bodies."""
 
 
-def draw_surface(image: Image, surface: Surface, opacity: float = 1.0) -> Image:
+def draw_surface(image: Image, surface: RenderedSurface, opacity: float = 1.0) -> Image:
     """`image` (h, w, 3) with the hand of `surface` (h, w), labelled by body, over it."""
     hit = surface.label >= 0
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)

@@ -58,11 +58,11 @@ def test_an_observed_motion_shows_the_true_hand_with_a_margin(recording: Synthes
         observation = seen[index]
         oracle.set_target(observation)
         expected = oracle.render(seen.poses[index])
-        np.testing.assert_array_equal(observation.skin, expected > 0)
+        np.testing.assert_array_equal(observation.silhouette, expected > 0)
         np.testing.assert_allclose(observation.depth, expected, atol=2e-4)
         assert oracle.score(seen.poses[[index]])[0] < 0.5
-        rows, columns = np.nonzero(observation.skin)
-        height, width = observation.skin.shape
+        rows, columns = np.nonzero(observation.silhouette)
+        height, width = observation.silhouette.shape
         pixel = np.median(expected[expected > 0]) / observation.camera.fx
         for room in (rows.min(), columns.min(), height - 1 - rows.max(), width - 1 - columns.max()):
             assert room * pixel == pytest.approx(ROI_MARGIN, rel=0.05)
@@ -77,7 +77,7 @@ def test_an_observed_motion_has_the_requested_noise() -> None:
     assert noisy.camera == clean.camera
     error = (noisy.depth - clean.depth)[clean.depth > 0]
     assert error.std() == pytest.approx(0.02, rel=0.05)
-    assert np.mean(noisy.skin != clean.skin) == pytest.approx(0.3, rel=0.05)
+    assert np.mean(noisy.silhouette != clean.silhouette) == pytest.approx(0.3, rel=0.05)
 
 
 def test_each_frame_is_made_once_and_few_motions_are_cached(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,12 +32,12 @@ def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:
         camera = target.camera
         assert camera.width == camera.height
         assert camera.fx == PRESETS["kinect1"].fx
-        assert 0.4 < target.depth[target.skin].mean() < 0.6
+        assert 0.4 < target.depth[target.silhouette].mean() < 0.6
         # All of the hand, with room around it.
         edge = np.ones(camera.shape, np.bool_)
         edge[4:-4, 4:-4] = False
-        assert target.skin.any()
-        assert not target.skin[edge].any()
+        assert target.silhouette.any()
+        assert not target.silhouette[edge].any()
     for workload, side in zip(reduced, (96, 64), strict=True):
         assert {target.camera.shape for target in workload.targets} == {(side, side)}
         np.testing.assert_array_equal(workload.poses, native.poses)

@@ -14,7 +14,7 @@ from depthtrack.rendering.selfcheck import scene
 def test_every_backend_is_made_by_its_name(name: str) -> None:
     shape, target, poses = scene()
     try:
-        scorer = create_scorer(name, shape, Objective(skin_weight=5.0))
+        scorer = create_scorer(name, shape, Objective(silhouette_weight=5.0))
     except DepthtrackError as error:
         # One platform a process: whichever OpenGL the other tests use.
         assert name in ("egl", "osmesa")
@@ -23,7 +23,7 @@ def test_every_backend_is_made_by_its_name(name: str) -> None:
         scorer.set_target(target)
         terms = scorer.terms(poses[:3])
     assert scorer.name == name
-    np.testing.assert_allclose(terms.energy, terms.depth + 5 * terms.skin + 10 * terms.kinematic)
+    np.testing.assert_allclose(terms.energy, terms.depth + 5 * terms.silhouette + 10 * terms.kinematic)
 
 
 def test_an_unknown_name_lists_those_there_are() -> None:

@@ -15,7 +15,7 @@ from depthtrack.hand.primitives import Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.raycast import raycast
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.types import Array
 
@@ -93,7 +93,7 @@ def test_the_ray_caster_sees_the_primitives_as_embree_does(seed: int) -> None:
     assert np.count_nonzero(np.abs(surface.depth - theirs)[common] > 1e-4) <= 5e-3 * np.count_nonzero(common)
 
 
-def along_normal(camera: Camera, surface: Surface, depth: Array) -> Array:
+def along_normal(camera: Camera, surface: RenderedSurface, depth: Array) -> Array:
     """How far (h, w) another depth map lies inside a surface, in metres along the surface's normal."""
     v, u = np.mgrid[: camera.height, : camera.width]
     rays = camera.unproject(np.stack([u, v], axis=-1), np.ones(camera.shape))

@@ -14,21 +14,21 @@ from depthtrack.rendering.options import Objective
 
 
 def test_sums_of_a_hand_counted_image() -> None:
-    # seen and matched | seen, too far | only observed | only drawn | missing reading, drawn, on skin | nothing
-    skin = np.array([[True, True, True, False, True, False]])
+    # matched | seen, too far | only observed | only drawn | missing reading, drawn, in the silhouette | nothing
+    silhouette = np.array([[True, True, True, False, True, False]])
     observed = np.array([[0.500, 0.500, 0.500, 0.000, 0.000, 0.0]])
     rendered = np.array([[0.506, 0.520, 0.000, 0.500, 0.500, 0.0]])
-    clamped, matched_skin, union = evaluate(Objective(), skin, observed, rendered)
+    clamped, matched_silhouette, union = evaluate(Objective(), silhouette, observed, rendered)
     assert clamped == pytest.approx(0.006 + 0.020 + 0.040 + 0.040 + 0.040)
-    assert matched_skin == 2  # the first and the fifth
-    assert union == 5  # four of skin, and the drawn one where nothing was read
+    assert matched_silhouette == 2  # the first and the fifth
+    assert union == 5  # four of the silhouette, and the drawn one where nothing was read
 
 
 def test_energy_of_hand_counted_sums() -> None:
     pose = np.zeros(27)
     terms = Terms.of_sums(Objective(epsilon=1e-9), pose[None], np.array([0.146]), np.array([2.0]), np.array([5.0]))
     assert terms.depth[0] == pytest.approx(146 / 5)
-    assert terms.skin[0] == pytest.approx(1 - 4 / 7)
+    assert terms.silhouette[0] == pytest.approx(1 - 4 / 7)
     assert terms.energy[0] == pytest.approx(146 / 5 + 20 * (1 - 4 / 7))
 
 

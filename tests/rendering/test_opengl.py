@@ -114,15 +114,15 @@ def test_a_score_does_not_depend_on_the_batch_around_it(sums: Sums) -> None:
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (3, 257), (5, 7), (1500, 20), (64, 64)])
 def test_the_sums_of_an_empty_view_are_exact_at_any_size(sums: Sums, width: int, height: int) -> None:
     rng = np.random.default_rng(width)
-    skin = rng.random((height, width)) < 0.3
+    silhouette = rng.random((height, width)) < 0.3
     depth = rng.choice(np.array([0, 0.015625, 0.5], np.float32), size=(height, width))
     poses = random_poses(rng, 7, (0, 0, -1), 0.1)
     with OpenGLScorer(HandShape(), sums=sums) as scorer:
-        scorer.set_target(Target(Camera(width, height, 60, 60, 0, 0), skin, depth))
+        scorer.set_target(Target(Camera(width, height, 60, 60, 0, 0), silhouette, depth))
         terms = scorer.terms(poses)
     clamped = np.minimum(depth, 0.04, dtype=np.float64).sum()
-    np.testing.assert_allclose(terms.depth, 1000 * clamped / (skin.sum() + 1e-6), rtol=1e-6)
-    np.testing.assert_array_equal(terms.skin, 1.0)
+    np.testing.assert_allclose(terms.depth, 1000 * clamped / (silhouette.sum() + 1e-6), rtol=1e-6)
+    np.testing.assert_array_equal(terms.silhouette, 1.0)
 
 
 @pytest.mark.usefixtures("egl")
@@ -166,7 +166,7 @@ def test_the_kernel_sums_tiles_as_the_plain_evaluation_does(seed: int) -> None:
     rng, objective = np.random.default_rng(seed), Objective()
     h, w, columns, count = *(int(n) for n in rng.integers(1, 40, 2)), 3, 5
     depth = np.where(rng.random((h, w)) < 0.2, 0, rng.uniform(0.4, 0.5, (h, w))).astype(np.float32)
-    skin = rng.random((h, w)) < 0.5
+    silhouette = rng.random((h, w)) < 0.5
     rendered = np.where(rng.random((count, h, w)) < 0.4, 0, depth + rng.uniform(-0.06, 0.06, (count, h, w)))
     rendered = np.clip(rendered, 0, None).astype(np.float32)
     tiles = np.zeros((2 * h, columns * w), np.float32)
@@ -174,10 +174,10 @@ def test_the_kernel_sums_tiles_as_the_plain_evaluation_does(seed: int) -> None:
         inverse = np.divide(1, rendered[n], out=np.zeros((h, w), np.float32), where=rendered[n] > 0)
         tiles[n // columns * h :, n % columns * w :][:h, :w] = inverse
     regions, sums = np.tile([0, 0, w, h], (count, 1)), np.empty((count, 3))
-    empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(skin.sum())
+    empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(silhouette.sum())
     limits = objective.match_depth, objective.clamp_depth
-    sum_tiles(tiles, columns, regions, depth, skin.astype(np.float32), empty, *limits, sums)
-    expected = [evaluate(objective, skin, depth, image) for image in rendered]
+    sum_tiles(tiles, columns, regions, depth, silhouette.astype(np.float32), empty, *limits, sums)
+    expected = [evaluate(objective, silhouette, depth, image) for image in rendered]
     np.testing.assert_allclose(sums, expected, rtol=1e-5, atol=1e-5)
 
 

@@ -69,7 +69,7 @@ def test_regions_beyond_the_image_observe_nothing_there() -> None:
     full = target_of(shape, poses[0], KINECT, rng)
     region = full.crop(Rect.of_size(500, 380, 300, 300))
     assert not region.depth[100:].any()
-    assert not region.skin[:, 140:].any()
+    assert not region.silhouette[:, 140:].any()
     assert_agrees(shape, region, poses)
 
 
@@ -85,7 +85,7 @@ def test_the_best_pose_is_the_observed_one() -> None:
     terms = scorer.terms(poses)
     assert terms.energy.argmin() == 4
     assert terms.depth[4] < 0.01  # what remains is the float32 of the rendered depth
-    assert terms.skin[4] == 0
+    assert terms.silhouette[4] == 0
 
 
 def test_scores_do_not_depend_on_what_was_scored_before() -> None:

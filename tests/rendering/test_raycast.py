@@ -11,7 +11,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import CYLINDER, PRIMITIVE_COUNT, SPHERE, Primitives, cone, ellipsoid
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
-from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.rendering.triangles import rasterise
 from tests.support.hands import random_pose_in_view
 

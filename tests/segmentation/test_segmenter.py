@@ -199,16 +199,19 @@ def test_observations_lie_where_the_frame_saw_them() -> None:
     found = HandLocator(SkinColourModel.default()).locate(frame)
     assert found is not None
     observation = Observation.of(frame, found)
-    assert observation.skin.shape == observation.depth.shape == observation.camera.shape
+    assert observation.silhouette.shape == observation.depth.shape == observation.camera.shape
     pixels = frame.camera.project(observation.points)
     v, u = np.rint(pixels[:, 1]).astype(int), np.rint(pixels[:, 0]).astype(int)
     np.testing.assert_allclose(pixels, np.stack([u, v], axis=-1), atol=1e-6)
     np.testing.assert_allclose(frame.depth[v, u], observation.points[:, 2])
     # There is room around the hand for hypotheses.
-    rows, columns = np.flatnonzero(observation.skin.any(axis=1)), np.flatnonzero(observation.skin.any(axis=0))
+    rows, columns = (
+        np.flatnonzero(observation.silhouette.any(axis=1)),
+        np.flatnonzero(observation.silhouette.any(axis=0)),
+    )
     room = 0.03 * frame.camera.fx / 0.5
     assert min(rows[0], columns[0]) > room
-    assert observation.skin.shape[0] - rows[-1] > room
+    assert observation.silhouette.shape[0] - rows[-1] > room
 
 
 def test_more_of_the_forearm_is_kept_on_demand() -> None:

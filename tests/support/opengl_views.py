@@ -40,7 +40,7 @@ def assert_agrees(
     true = np.stack([oracle.render(pose) for pose in poses])
     margin = np.abs(np.abs(true - target.depth) - objective.match_depth)
     undecided = ((margin < 1e-5) & (true > 0)).any(axis=0)
-    target = Target(target.camera, target.skin, np.where(undecided, 0, target.depth))
+    target = Target(target.camera, target.silhouette, np.where(undecided, 0, target.depth))
     oracle.set_target(target)
     expected = oracle.terms(poses)
     for sums in BOTH_SUMS:
@@ -53,7 +53,7 @@ def assert_agrees(
         same = ~wrong.any(axis=(1, 2))
         np.testing.assert_allclose(terms.energy[same], expected.energy[same], atol=1e-3)
         np.testing.assert_allclose(terms.depth[same], expected.depth[same], atol=1e-3)
-        np.testing.assert_allclose(terms.skin[same], expected.skin[same], atol=1e-6)
+        np.testing.assert_allclose(terms.silhouette[same], expected.silhouette[same], atol=1e-6)
         np.testing.assert_allclose(terms.kinematic, expected.kinematic, atol=1e-12)
 
 

@@ -38,13 +38,13 @@ def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, floa
 
 
 def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
-    """Return an imperfect observation of a pose, with holes in the depth and wrong skin labels."""
+    """Return an imperfect observation of a pose, with holes in the depth and wrong silhouette labels."""
     empty = Target.blank(camera)
     oracle = OracleScorer(shape)
     oracle.set_target(empty)
     depth = oracle.render(pose)
-    skin = (depth > 0) ^ (rng.random(camera.shape) < 0.02)
-    return Target(camera, skin, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
+    silhouette = (depth > 0) ^ (rng.random(camera.shape) < 0.02)
+    return Target(camera, silhouette, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
 
 
 def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
@@ -69,11 +69,11 @@ def assert_agrees(shape: HandShape, target: Target, poses: np.ndarray, objective
         drawn, truth = ours > 0, theirs > 0
         assert np.count_nonzero(drawn != truth) <= 1e-3 * np.count_nonzero(truth)
         assert np.abs(ours - theirs)[drawn & truth].max(initial=0) < 1e-4
-        # One pixel that changes sides moves the skin term by about 2 lambda over the union's size.
+        # One pixel that changes sides moves the silhouette term by about 2 lambda over the union's size.
         difference = np.abs(theirs - target.depth)
         undecided = np.count_nonzero(truth & (np.abs(difference - objective.match_depth) < 5e-6))
         undecided += np.count_nonzero(drawn != truth)
-        pixel = (2 * objective.skin_weight + objective.clamp_depth / objective.depth_unit) / (
-            1 + np.count_nonzero(target.skin | truth)
+        pixel = (2 * objective.silhouette_weight + objective.clamp_depth / objective.depth_unit) / (
+            1 + np.count_nonzero(target.silhouette | truth)
         )
         assert abs(terms.energy[i] - expected.energy[i]) < 1e-3 + undecided * pixel

@@ -7,7 +7,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.primitives import SPHERE, ellipsoid
 from depthtrack.rendering.raycast import raycast
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import Stream, generator, normal_noise
 from depthtrack.synthesis.sensors import SENSOR_NAMES, kinect1, kinect2, make_sensor, realsense
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
@@ -17,15 +17,15 @@ from depthtrack.types import Array
 SMALL = Camera(160, 120, 525.0, 525.0, 79.5, 59.5)
 
 
-def _facing(camera: Camera, depth: float | Array) -> Surface:
-    surface = Surface.empty(camera)
+def _facing(camera: Camera, depth: float | Array) -> RenderedSurface:
+    surface = RenderedSurface.empty(camera)
     surface.depth[:] = depth
     surface.label[:] = 0
     surface.normal[..., 2] = -1
     return surface
 
 
-def _tilted(camera: Camera, depth: float, degrees: float) -> Surface:
+def _tilted(camera: Camera, depth: float, degrees: float) -> RenderedSurface:
     """A plane through (0, 0, depth), turned about the vertical."""
     normal = np.array([np.sin(np.radians(degrees)), 0, -np.cos(np.radians(degrees))])
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
@@ -35,7 +35,7 @@ def _tilted(camera: Camera, depth: float, degrees: float) -> Surface:
     return surface
 
 
-def _box_before_wall(camera: Camera, near: float, far: float, columns: slice) -> Surface:
+def _box_before_wall(camera: Camera, near: float, far: float, columns: slice) -> RenderedSurface:
     depth = np.full(camera.shape, far)
     depth[30:90, columns] = near
     return _facing(camera, depth)
@@ -55,7 +55,7 @@ def test_sensors_read_the_same_for_the_same_seed_and_leave_the_surface_as_it_is(
     np.testing.assert_array_equal(surface.depth, before)
     assert np.mean(first > 0) > 0.95
     assert abs(np.median((first - before)[first > 0])) < 0.001
-    assert np.all(sensor.read(Surface.empty(sensor.camera), _rng()) == 0)
+    assert np.all(sensor.read(RenderedSurface.empty(sensor.camera), _rng()) == 0)
 
 
 def test_an_unknown_sensor_is_answered_with_the_known_ones() -> None:

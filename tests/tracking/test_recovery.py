@@ -177,9 +177,9 @@ def test_a_start_does_not_depend_on_what_was_tracked_before(made: Synthesiser, n
 def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synthesiser, name: str) -> None:
     """One frame shows a few crumbs far apart, as no hand does: it is lost, and found again beside where it was."""
     frames = [observe(made, index) for index in (20, 21, 22, 23)]
-    crumbs = np.zeros_like(frames[1].skin)
+    crumbs = np.zeros_like(frames[1].silhouette)
     crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
-    frames[1] = replace(frames[1], skin=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
+    frames[1] = replace(frames[1], silhouette=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
     with (
         closing(create_tracker(tracker_config(name), made.options.hand)) as whole,
         closing(create_tracker(tracker_config(name), made.options.hand)) as cut,

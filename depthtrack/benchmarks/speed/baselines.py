@@ -59,11 +59,11 @@ class Baseline(ScorerBase):
     def terms(self, poses: ArrayLike) -> Terms:
         batch, target = as_batch(poses), self.target
         sums = [
-            evaluate(self._objective, target.skin, target.depth, self._depth(transforms))
+            evaluate(self._objective, target.silhouette, target.depth, self._depth(transforms))
             for transforms in self._model.transforms(batch)
         ]
-        clamped, matched_skin, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
-        return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
+        clamped, matched_silhouette, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
+        return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 
     def render(self, pose: ArrayLike) -> Depth:
         batch = as_batch(np.asarray(pose)[None])

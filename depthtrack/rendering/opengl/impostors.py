@@ -15,7 +15,7 @@ import numpy as np
 from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses, Chain, forward_kinematics
 from depthtrack.hand.primitives import CYLINDER, Primitives
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.types import Array, Array32, Index
 
 VECTORS = 6

@@ -12,7 +12,7 @@ from depthtrack.rendering.opengl.context import Context, Device, Platform
 from depthtrack.rendering.opengl.impostors import VECTORS
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.programs import Program
-from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.types import Array, Array32
 
 _BLOCK = 4
@@ -164,7 +164,7 @@ class Renderer:
         return _texture(gl)
 
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
-        """Fill a texture, whatever its size was, with depth (metres) and skin (0 or 1): (h, w, 2)."""
+        """Fill a texture, whatever its size was, with depth (metres) and silhouette (0 or 1): (h, w, 2)."""
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
         gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RG32F, width, height, 0, gl.GL_RG, gl.GL_FLOAT, observation)

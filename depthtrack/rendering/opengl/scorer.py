@@ -61,14 +61,14 @@ class OpenGLScorer(ScorerBase):
         camera = target.camera
         # Floats, whatever the camera file held: one compiled kernel serves all.
         self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
-        self._skin = target.skin.astype(np.float32)
+        self._silhouette = target.silhouette.astype(np.float32)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
-        self._empty = float(clamped), 0.0, float(np.count_nonzero(target.skin))
+        self._empty = float(clamped), 0.0, float(np.count_nonzero(target.silhouette))
         if self.sums == "gpu":
             with self._open.context as gl:
                 if not self._textures:
                     self._textures.append(self._open.new_texture(gl))
-                self._open.upload(gl, self._textures[0], np.stack([target.depth, self._skin], axis=-1))
+                self._open.upload(gl, self._textures[0], np.stack([target.depth, self._silhouette], axis=-1))
         self._target = target
 
     def score(self, poses: ArrayLike) -> Array:
@@ -135,7 +135,7 @@ class OpenGLScorer(ScorerBase):
             sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], *limits)
         else:
             pixels = self._read(gl, which, grid, len(sums))
-            sum_tiles(pixels, grid.columns, regions, target.depth, self._skin, self._empty, *limits, sums)
+            sum_tiles(pixels, grid.columns, regions, target.depth, self._silhouette, self._empty, *limits, sums)
 
 
 def _discard(context: Context, textures: list[int]) -> None:

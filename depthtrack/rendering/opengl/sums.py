@@ -13,7 +13,7 @@ def sum_tiles(
     columns: int,
     regions: Index,
     depth: Array32,
-    skin: Array32,
+    silhouette: Array32,
     empty: tuple[float, float, float],
     match_depth: float,
     clamp_depth: float,
@@ -22,7 +22,7 @@ def sum_tiles(
     """Write (B, 3) `sums`: min(|o_d - r_d|, d_M) in metres, o_s and r_m, o_s or r_m, over each of B tiles.
 
     `inverse_depth` (rows, >= columns * w), 1/m, 0 where nothing is drawn: tiles of the size of `depth` (h, w; metres,
-    0 = missing) and `skin` (h, w; 0 or 1). Only `regions` (B, 4) of the tiles, in the order of
+    0 = missing) and `silhouette` (h, w; 0 or 1). Only `regions` (B, 4) of the tiles, in the order of
     `geometry.rectangle.Rect`, can hold drawn pixels; `empty` are the sums of a tile without any.
     """
     height, width = depth.shape
@@ -34,17 +34,17 @@ def sum_tiles(
         sums[n, 0], sums[n, 1], sums[n, 2] = empty
         for v in range(regions[n, 1], regions[n, 3]):
             drawn_row = inverse_depth[top + v, left + u0 : left + u1]
-            depth_row, skin_row = depth[v, u0:u1], skin[v, u0:u1]
-            clamped, on_skin, off_skin = zero, zero, zero
+            depth_row, silhouette_row = depth[v, u0:u1], silhouette[v, u0:u1]
+            clamped, on_silhouette, off_silhouette = zero, zero, zero
             for u in range(u1 - u0):
-                w, o, s = drawn_row[u], depth_row[u], skin_row[u]
+                w, o, s = drawn_row[u], depth_row[u], silhouette_row[u]
                 drawn = w > zero
                 difference = abs(o - one / w)
                 change = min(difference, clamp) - min(o, clamp)
                 hit = one if drawn & ((difference < match_) | (o == zero)) else zero
                 clamped += change if drawn else zero
-                on_skin += hit * s
-                off_skin += hit - hit * s
+                on_silhouette += hit * s
+                off_silhouette += hit - hit * s
             sums[n, 0] += clamped
-            sums[n, 1] += on_skin
-            sums[n, 2] += off_skin
+            sums[n, 1] += on_silhouette
+            sums[n, 2] += off_silhouette

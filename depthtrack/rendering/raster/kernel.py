@@ -13,7 +13,7 @@ from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.spans import find_spans
 from depthtrack.rendering.raster.tiles import BLOCK, COLUMNS, ROWS
-from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import (
     estimated_reciprocal,
     estimated_reciprocal_sqrt,
@@ -107,12 +107,12 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth):
+def _compare(observed, silhouette, buffer, blocks, low, high, match_depth, clamp_depth):
     """What the drawn pixels change in the sums of Eq. (2); clears the buffer on the way.
 
-    Returns the change of the clamped difference, the matched pixels on skin, and all matched pixels.
+    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
     """
-    clamped, on_skin, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
+    clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
     nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
     for stripe in range(low.shape[0]):
         top, bottom = low[stripe], high[stripe]
@@ -133,10 +133,10 @@ def _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth
             allowed = select(o > 0.0, _fill(match_depth), np.float32(3e38))
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
-            on_skin = on_skin + hit * _load(skin, index)
+            on_silhouette = on_silhouette + hit * _load(silhouette, index)
             store(buffer, index, nothing)
         clamped = clamped + in_stripe
-    return vsum(clamped), vsum(on_skin), vsum(matched)
+    return vsum(clamped), vsum(on_silhouette), vsum(matched)
 
 
 @numba.njit(cache=True, nogil=True, _nrt=False)
@@ -147,7 +147,7 @@ def score_poses(
     hand: Array,
     camera: Array,
     observed: Array32,
-    skin: Array32,
+    silhouette: Array32,
     empty: Array,
     objective: Array,
     scratch: Array,
@@ -162,7 +162,7 @@ def score_poses(
 ) -> None:
     """Score poses `start` to `stop` of a batch.
 
-    `poses` (B, 27) camera frame; `observed` depth (metres, NaN beyond the image) and `skin` (0 or 1) in stripes.
+    `poses` (B, 27) camera frame; `observed` depth (metres, NaN beyond the image) and `silhouette` (0 or 1) in stripes.
     `empty` (3,): the sums of Eq. (2) for an empty image. `objective` (6,): d_m, d_M, unit, epsilon, lambda, lambda_k.
     Writes `sums` (B, 3) and `energies` (B,). Other calls may score other poses of the same batch at the same time,
     if each has arrays of its own for the rest: `scratch`, `table`, `buffer` (stripes, all 0), `first` and `last` (one
@@ -171,10 +171,12 @@ def score_poses(
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
     for n in range(start, stop):
         blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
-        clamped, on_skin, matched = _compare(observed, skin, buffer, blocks, low, high, match_depth, clamp_depth)
+        clamped, on_silhouette, matched = _compare(
+            observed, silhouette, buffer, blocks, low, high, match_depth, clamp_depth
+        )
         sums[n, 0] = empty[0] + clamped
-        sums[n, 1] = on_skin
-        sums[n, 2] = empty[2] + matched - on_skin
+        sums[n, 1] = on_silhouette
+        sums[n, 2] = empty[2] + matched - on_silhouette
         energies[n] = _energy(poses[n], sums[n], objective)
 
 
@@ -183,12 +185,12 @@ def _energy(pose, sums, objective):
     """Eq. (1) from the sums of Eq. (2), as `objective.Terms.of_sums` does for batches."""
     depth = sums[0] / objective[2] / (sums[2] + objective[3])
     total = sums[1] + sums[2]
-    skin = 1.0 - 2.0 * sums[1] / total if total > 0.0 else 1.0
+    silhouette = 1.0 - 2.0 * sums[1] / total if total > 0.0 else 1.0
     crossing = 0.0
     for finger in range(1, 4):
         phi = pose[7 + 4 * finger] - pose[11 + 4 * finger]
         crossing -= min(phi, 0.0)
-    return depth + objective[4] * skin + objective[5] * crossing
+    return depth + objective[4] * silhouette + objective[5] * crossing
 
 
 @numba.njit(cache=True, nogil=True, _nrt=False)

@@ -7,7 +7,7 @@ linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is compute
 
 from depthtrack.rendering.raster import layout
 from depthtrack.rendering.raster import tiles as tiles
-from depthtrack.rendering.surface import NEAR
+from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import narrow, vabs, vfloor, vsqrt
 from depthtrack.simd.vectors import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
 from depthtrack.types import Array32

@@ -63,7 +63,7 @@ class RasterScorer(ScorerBase):
         self._objective = o = objective or Objective()
         self._hand = layout.constants(shape)
         self._constants = np.array(
-            [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.skin_weight, o.kinematic_weight]
+            [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.silhouette_weight, o.kinematic_weight]
         )
         self._camera, self._empty = np.empty(8), np.empty(3)
         self._make_room(256)
@@ -74,11 +74,11 @@ class RasterScorer(ScorerBase):
         shape = target.camera.shape
         if self._target is None or self._target.camera.shape != shape:
             self._workspaces = [_Workspace.of(shape) for _ in range(self._threads)]
-            self._observed, self._skin = tiles.new_stripes(shape), tiles.new_stripes(shape)
+            self._observed, self._silhouette = tiles.new_stripes(shape), tiles.new_stripes(shape)
         tiles.write_stripes(target.depth, np.nan, self._observed)
-        tiles.write_stripes(target.skin, 0, self._skin)
+        tiles.write_stripes(target.silhouette, 0, self._silhouette)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
-        self._empty[:] = clamped, 0.0, np.count_nonzero(target.skin)
+        self._empty[:] = clamped, 0.0, np.count_nonzero(target.silhouette)
         c = target.camera
         self._camera[:] = c.fx, c.fy, c.cx, c.cy, 1 / c.fx, 1 / c.fy, c.width, c.height
         self._target = target
@@ -92,8 +92,8 @@ class RasterScorer(ScorerBase):
 
     def terms(self, poses: ArrayLike) -> Terms:
         batch = as_batch(poses)
-        clamped, matched_skin, union = self._sums_and_energies(batch)[0].T
-        return Terms.of_sums(self._objective, batch, clamped, matched_skin, union)
+        clamped, matched_silhouette, union = self._sums_and_energies(batch)[0].T
+        return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 
     def render(self, pose: ArrayLike) -> Depth:
         shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
@@ -130,7 +130,7 @@ class RasterScorer(ScorerBase):
             self._hand,
             self._camera,
             self._observed,
-            self._skin,
+            self._silhouette,
             self._empty,
             self._constants,
             *self._workspaces[thread].arrays,

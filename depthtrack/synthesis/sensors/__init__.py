@@ -6,7 +6,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array
 
 SENSOR_NAMES = ("ideal", "kinect1", "kinect2", "realsense")
@@ -30,7 +30,7 @@ class Sensor(Protocol):
         """Standard deviation of a pixel's colour, of 255 levels."""
         ...
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
+    def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         """Depth (h, w) in metres that the sensor reads, 0 where it has no reading. The surface is left as it is."""
         ...
 

@@ -6,14 +6,14 @@ import numba
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Mask
 
 JUMP = 0.02
 """Neighbouring depths that differ by more than this share of themselves are two surfaces, not one."""
 
 
-def incidence(surface: Surface, camera: Camera) -> Array:
+def incidence(surface: RenderedSurface, camera: Camera) -> Array:
     """Angle (h, w) in radians between the surface's normal and the line of sight; pi / 2 where there is no surface."""
     out = np.empty(surface.depth.shape)
     _incidence(surface.depth, surface.normal, (camera.fx, camera.fy, camera.cx, camera.cy), out)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from depthtrack.geometry.camera import PRESETS, Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.types import Array
 
@@ -18,7 +18,7 @@ class Ideal:
     usual_distance: float = 0.5
     colour_noise: float = 0.0
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
+    def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         return surface.depth.copy()
 
 

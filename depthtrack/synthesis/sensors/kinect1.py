@@ -20,7 +20,7 @@ import numba
 import numpy as np
 
 from depthtrack.geometry.camera import PRESETS, Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 from depthtrack.types import Array, Array32, Mask
@@ -46,7 +46,7 @@ class Kinect1:
     usual_distance: float = 0.5
     colour_noise: float = 3.0
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
+    def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         shape = surface.depth.shape
         theta = incidence(surface, self.camera)
         out = np.zeros(shape)

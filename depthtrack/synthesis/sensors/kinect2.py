@@ -19,7 +19,7 @@ import numba
 import numpy as np
 
 from depthtrack.geometry.camera import PRESETS, Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence
 from depthtrack.types import Array, Array32, Mask
@@ -39,7 +39,7 @@ class Kinect2:
     usual_distance: float = 0.65
     colour_noise: float = 2.5
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
+    def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         shape = surface.depth.shape
         out = np.zeros(shape)
         _read(

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from depthtrack.geometry.camera import PRESETS, Camera
-from depthtrack.rendering.surface import Surface
+from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import normal_noise
 from depthtrack.synthesis.sensors.geometry import JUMP, edges, incidence, shadow
 from depthtrack.types import Array, Array32, Mask
@@ -53,7 +53,7 @@ class RealSense:
         """Metres: where the disparity reaches the end of its search range."""
         return self.camera.fx * BASELINE / _LARGEST_DISPARITY
 
-    def read(self, surface: Surface, rng: np.random.Generator) -> Array:
+    def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         shape = surface.depth.shape
         disparity_noise, unevenness = SUBPIXEL * _smooth_noise(shape, rng), _smooth_noise(shape, rng)
         chance = rng.random(shape, dtype=np.float32)

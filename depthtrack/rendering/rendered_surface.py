@@ -14,7 +14,7 @@ NEAR = 1e-3
 
 
 @dataclass
-class Surface:
+class RenderedSurface:
     """The nearest surface in every pixel of an image.
 
     `depth` (h, w) metres along the optical axis, 0 where nothing was hit; `label` (h, w) of the thing hit, -1 for
