@@ -3,7 +3,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test quick lint kernels clean
+.PHONY: demo test quick lint kernels docs clean
 
 # Workers of pytest; 0 runs all tests in one process.
 WORKERS ?= 2
@@ -30,6 +30,12 @@ lint: .venv/.ready-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+# Broken links and references between pages are errors.
+docs: .venv/.ready-docs
+	$(BIN)/python tools/generate_parameters.py
+	$(BIN)/mkdocs build --quiet
+	@echo "pages: out/docs/index.html"
+
 clean:
 	rm -rf .venv build dist out
 
@@ -44,4 +50,8 @@ clean:
 
 .venv/.ready-test: pyproject.toml | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,gltf,embree,sweep]'
+	@touch $@
+
+.venv/.ready-docs: pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@

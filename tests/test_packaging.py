@@ -57,6 +57,8 @@ def test_sdist_holds_what_building_and_testing_need(distributions: Path) -> None
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     assert {"pyproject.toml", "README.md", "LICENSE", "Makefile", "sequences/everyday.toml"} <= names
+    assert {"ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "mkdocs.yml"} <= names
+    assert {"docs/parameters.md", "tools/generate_parameters.py"} <= names
     assert any(name.startswith("tests/") for name in names)
 
 

@@ -1,0 +1,101 @@
+"""Pages that `make docs` makes of other files.
+
+They are README and the documents beside it, the examples, and the API.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "depthtrack"
+DOCUMENTS = {"README.md": "index.md", **{f"{name}.md": f"{name}.md" for name in ("ARCHITECTURE", "CONTRIBUTING")}}
+DOCUMENTS["CHANGELOG.md"] = "CHANGELOG.md"
+"""Documents of the root, and their names among the pages."""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages."""
+    for name, page in DOCUMENTS.items():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        files.append(File.generated(config, page, content=moved(text)))
+    files.append(File.generated(config, "examples.md", content=examples_page()))
+    packages = list(package_pages())
+    files.append(File.generated(config, "api/index.md", content=api_page([name for name, _ in packages])))
+    for name, text in packages:
+        files.append(File.generated(config, f"api/{name}.md", content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Let pages under docs/ refer to documents of the root."""
+    return re.sub(r"\]\(\.\./([A-Z]+\.md)", lambda found: f"]({DOCUMENTS.get(found[1], found[1])}", markdown)
+
+
+def moved(text: str) -> str:
+    """Return a document of the root with the links that it has as a page."""
+    text = re.sub(r"\]\(docs/", "](", text)
+    text = re.sub(r"\]\(examples/?[^)]*\)", "](examples.md)", text)
+    text = re.sub(r"\]\((CITATION\.cff|LICENSE)\)", "]", text)
+    return re.sub(r"\]\(README\.md", "](index.md", text)
+
+
+def examples_page() -> str:
+    """Return all examples with their descriptions."""
+    parts = ["# Examples\n\nEach script is run by the tests.\n"]
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        source = path.read_text(encoding="utf-8")
+        parts.append(f"## {path.name}\n\n```python\n{source}```\n")
+    return "\n".join(parts)
+
+
+def api_page(packages: list[str]) -> str:
+    """Return the public names, with links to their documentation, and the list of packages."""
+    rows = [f"| [`{name}`][{place}] | {summary(place)} |" for name, place in public_names()]
+    return "\n".join(
+        [
+            "# API\n",
+            "Names of `import depthtrack`. Each is loaded at its first use.\n",
+            "| name | |",
+            "| --- | --- |",
+            *rows,
+            "\n## Packages\n",
+            "All modules. Names outside the table above may change in a minor version.\n",
+            *(f"- [depthtrack.{name}]({name}.md)" for name in packages),
+        ]
+    )
+
+
+def public_names() -> Iterator[tuple[str, str]]:
+    """Yield public names and full names, as the imports for type checkers state them."""
+    for node in ast.walk(ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("depthtrack."):
+            yield from ((alias.asname or alias.name, f"{node.module}.{alias.name}") for alias in node.names)
+
+
+def summary(place: str) -> str:
+    """Return the first line of the documentation of a full name."""
+    module, _, name = place.rpartition(".")
+    body = ast.parse((ROOT / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8")).body
+    for number, node in enumerate(body):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name and ast.get_docstring(node):
+            return str(ast.get_docstring(node)).partition("\n")[0]
+        following = body[number + 1] if number + 1 < len(body) else None
+        assigned = isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == name for t in node.targets)
+        if assigned and isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+            return str(following.value.value).partition("\n")[0]
+    return ""
+
+
+def package_pages() -> Iterator[tuple[str, str]]:
+    """Yield name and page of each package, without the command line."""
+    for folder in sorted(path for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()):
+        modules = [path for path in sorted(folder.rglob("*.py")) if path.name != "__init__.py"]
+        if folder.name != "cli" and modules:
+            names = (path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for path in modules)
+            yield folder.name, "\n".join([f"# depthtrack.{folder.name}\n", *(f"::: {name}\n" for name in names)])
