@@ -38,7 +38,7 @@ def random_poses(rng: np.random.Generator, count: int, centre: tuple[float, floa
 
 
 def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random.Generator) -> Target:
-    """Return an imperfect observation of a pose, with holes in the depth and wrong silhouette labels."""
+    """Return an imperfect observation of a pose: holes in the depth, wrong silhouette labels."""
     empty = Target.blank(camera)
     oracle = OracleScorer(shape)
     oracle.set_target(empty)
