@@ -89,7 +89,6 @@ class SequenceWriter:
         *,
         colour: Image | None = None,
         mask: Mask | None = None,
-        skin_mask: Mask | None = None,
         exact_depth: NDArray[np.floating[Any]] | None = None,
         pose: ArrayLike | None = None,
         joints: ArrayLike | None = None,
@@ -98,9 +97,8 @@ class SequenceWriter:
 
         `timestamp` in seconds, kept to the microsecond, must increase. `depth` and `exact_depth` (h, w) metres, 0 or
         not finite = none; rounded to the camera's depth scale (exact: 0.05 mm), beyond 65535 units none. `colour`
-        (h, w, 3) RGB, `mask` of the hand and `skin_mask` as a colour segmentation is to find it (h, w), `pose` (27,),
-        `joints` (21, 3) metres in the camera frame. Ground truth may be missing from frames, but where there is some
-        it has the same parts.
+        (h, w, 3) RGB, `mask` (h, w) of the hand, `pose` (27,), `joints` (21, 3) metres in the camera frame. Ground
+        truth may be missing from frames, but where there is some it has the same parts.
         """
         stem = self._stem(timestamp)
         images = self._checked_images(
@@ -108,7 +106,6 @@ class SequenceWriter:
                 "depth": depth,
                 "rgb": colour,
                 "hand_mask": mask,
-                "skin_mask": skin_mask,
                 "exact_depth": exact_depth,
             }
         )
@@ -197,7 +194,7 @@ class SequenceWriter:
     def _encode(self, kind: str, path: Path, image: NDArray[Any]) -> None:
         if kind == "rgb":
             (write_jpeg if path.suffix == ".jpg" else write_png)(path, image)
-        elif kind in ("hand_mask", "skin_mask"):
+        elif kind == "hand_mask":
             write_png(path, (image != 0) * np.uint8(255))
         else:
             write_png(path, _stored(image, self._camera.depth_scale if kind == "depth" else EXACT_DEPTH_SCALE))

@@ -227,7 +227,6 @@ def write_recording(
                 frame.depth,
                 colour=frame.colour,
                 mask=frame.mask,
-                skin_mask=frame.skin if made.options.skin_flips > 0 else None,
                 exact_depth=frame.exact_depth,
                 pose=frame.pose,
                 joints=frame.joints,

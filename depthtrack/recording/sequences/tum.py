@@ -4,10 +4,9 @@ depth.txt, depth/     timestamps and 16-bit PNGs             rgb.txt, rgb/   the
 camera.json           intrinsics and depth scale             sequence.json   how it was made
 hand_poses.csv        27 pose values per timestamp           joints.csv      21 keypoints per timestamp
 hand.json             sizes of the hand
-hand_mask/, skin_mask/, exact_depth/                         PNGs named as in depth/
+hand_mask/, exact_depth/                                     PNGs named as in depth/
 
-A synthetic hand_mask/ shows the hand up to the plane of its wrist, also where the sensor has no reading. skin_mask/
-holds the labels of a simulated colour segmentation; no reader uses it.
+A synthetic hand_mask/ shows the hand up to the plane of its wrist, also where the sensor has no reading.
 """
 
 import os
