@@ -1,1 +1,1 @@
-"""Synthetic sequences with exact ground truth: motions, scenes, sensors."""
+"""Synthetic recordings with exact ground truth: motions, scenes and sensor models."""

@@ -1,7 +1,7 @@
-"""What is behind the hand: things of plain shapes and colours that do not move.
+"""Static objects behind the hand: boxes, planes, ellipsoids and columns in plain colours.
 
-It stays where it is relative to the camera, at every viewpoint: the camera walks around the hand, and behind the hand
-there is always a room. Distances count from the nominal place of the hand.
+The backdrop is fixed to the camera, so every viewpoint has a background. All coordinates are metres in the camera
+frame.
 """
 
 from dataclasses import dataclass
@@ -24,12 +24,16 @@ from depthtrack.types import Array
 FOREARM = BODY_COUNT
 """Label of the forearm, after the 16 bodies of the hand."""
 FACE = FOREARM + 1
-"""Label of the bystander's face: skin, but not the hand's."""
+"""Label of the bystander's face, which has the colour of skin."""
 
 
 @dataclass
 class Backdrop:
-    """Things drawn so far: `surface` with a label for each, and their `colours` (3,), linear RGB, from FACE on."""
+    """A rendered background: its visible surface and the colours of its objects.
+
+    surface: depth, normals and one label an object, from FACE on.
+    colours: one (3,) an object, linear RGB, in the order of the labels.
+    """
 
     camera: Camera
     surface: RenderedSurface
@@ -37,18 +41,28 @@ class Backdrop:
 
     @classmethod
     def empty(cls, camera: Camera, face: Array) -> Self:
-        """Nothing yet; `face` (3,) is the colour that a face will have."""
+        """Return a backdrop without objects.
+
+        face (3,): linear RGB of the bystander's face.
+        """
         return cls(camera, RenderedSurface.empty(camera), [face])
 
     def albedo(self, rng: np.random.Generator) -> Array:
-        """Linear RGB reflectance (h, w, 3), a little uneven as painted and woven things are; 0 where nothing is."""
+        """Return the reflectance of every pixel, with slight random variation.
+
+        Result (h, w, 3): linear RGB; 0 without an object.
+        """
         label = self.surface.label
         colours = np.concatenate([np.stack(self.colours), np.zeros((1, 3))])
         plain = colours[np.where(label >= FACE, label - FACE, -1)]
         return np.asarray(plain * (1 + 0.03 * smooth_field(label.shape, 25, rng))[..., None])
 
     def box(self, centre: ArrayLike, size: ArrayLike, turn: float, colour: tuple[int, int, int]) -> None:
-        """A box of `size` (3,) metres at `centre` (3,), turned by `turn` radians about the vertical."""
+        """Draw a box.
+
+        centre (3,), size (3,): metres.
+        turn: rotation about the vertical, radians.
+        """
         mesh = trimesh.creation.box(extents=np.asarray(size))
         R = Rotation.from_euler("y", turn).as_matrix()
         vertices = np.asarray(mesh.vertices)[mesh.faces].reshape(-1, 3) @ R.T + np.asarray(centre)
@@ -57,7 +71,11 @@ class Backdrop:
         rasterise(self.camera, vertices, faces, normals, np.full(len(faces), self._label(colour)), self.surface)
 
     def plane(self, centre: ArrayLike, across: ArrayLike, along: ArrayLike, colour: tuple[int, int, int]) -> None:
-        """A rectangle around `centre` (3,), reaching as far as `across` and `along` (3,) either way."""
+        """Draw a rectangle.
+
+        centre (3,): metres.
+        across (3,), along (3,): half of its sides, metres.
+        """
         c, a, b = (np.asarray(v, dtype=np.float64) for v in (centre, across, along))
         vertices = np.stack([c - a - b, c + a - b, c + a + b, c - a + b])
         normals = np.tile(np.cross(a, b), (4, 1))
@@ -65,13 +83,20 @@ class Backdrop:
         rasterise(self.camera, vertices, faces, normals, np.full(2, self._label(colour)), self.surface)
 
     def ellipsoid(self, centre: ArrayLike, radii: ArrayLike, colour: tuple[int, int, int] | None) -> None:
-        """An ellipsoid along the camera's axes; without colour, it is the face."""
+        """Draw an ellipsoid along the camera's axes; without a colour it is the face.
+
+        centre (3,), radii (3,): metres.
+        """
         T = np.diag([*np.asarray(radii, dtype=np.float64), 1.0])
         T[:3, 3] = centre
         self._raycast(SPHERE, T, FACE if colour is None else self._label(colour))
 
     def column(self, top: ArrayLike, height: float, radius: float, colour: tuple[int, int, int] | None) -> None:
-        """An upright cylinder that hangs down from `top` (3,), open at its ends; without colour, it is the face."""
+        """Draw an upright cylinder with open ends; without a colour it is the face.
+
+        top (3,): centre of its upper end, metres.
+        height, radius: metres.
+        """
         T = np.array([[radius, 0, 0, 0], [0, 0, height, 0], [0, -radius, 0, 0], [0, 0, 0, 1.0]])
         T[:3, 3] = top
         self._raycast(CYLINDER, T, FACE if colour is None else self._label(colour))

@@ -1,7 +1,7 @@
-"""How deep fingers sink into each other or into the palm: a check that postures are those of a solid hand.
+"""Self-collision of a hand: penetration depth between fingers, and of fingers into the palm.
 
-Phalanges are taken as tapered capsules and the palm as a flat slab. Real fingers press on each other and give way
-by a few millimetres, so a small depth is natural; a finger that passes through another reaches ten and more.
+Phalanges are tapered capsules and the palm is a slab. Soft tissue yields by a few millimetres, so a small penetration
+is natural. A finger that passes through another one penetrates by 10 mm and more.
 """
 
 from functools import cached_property
@@ -16,14 +16,18 @@ from depthtrack.types import Array, Index
 
 
 class Clearance:
-    """Penetration between the parts of a hand of given sizes."""
+    """Self-collision test for a hand of given sizes."""
 
     def __init__(self, shape: HandShape) -> None:
         self._shape = shape
         self._model = HandModel(shape)
 
     def penetration(self, poses: ArrayLike) -> Array:
-        """Depth (...,) in metres of the worst overlap in each pose (..., 27); 0 where nothing touches."""
+        """Return the largest penetration depth of each pose.
+
+        poses (..., 27): see `hand.pose`.
+        Result (...,): metres; 0 without contact.
+        """
         points = self._model.endpoints(poses)
         points = points.reshape(*points.shape[:-2], 5, 4, 3)
         start, end = self._skin_ends(points)
@@ -31,12 +35,15 @@ class Clearance:
 
     @cached_property
     def _radii(self) -> Array:
-        """(5, 4) at base, two joints and tip."""
+        """Return the fingers' radii (5, 4) at base, two joints and tip, metres."""
         return self._shape.radii * self._shape.scale
 
     @cached_property
     def _pairs(self) -> tuple[Index, Index]:
-        """Phalanges (finger * 3 + k) that can meet; knuckles of neighbours share their flesh and are left out."""
+        """Return the pairs of phalanges (3 * finger + k) to test.
+
+        Two proximal phalanges share soft tissue at the knuckles, so their pairs are excluded.
+        """
         pairs = [
             (3 * f + i, 3 * g + j)
             for f, g in combinations(range(5), 2)
@@ -48,7 +55,10 @@ class Clearance:
         return np.array(first), np.array(second)
 
     def _skin_ends(self, points: Array) -> tuple[Array, Array]:
-        """Ends of the capsules' axes (..., 5, 3, 3): the last one stops a radius short of the fingertip."""
+        """Return the ends of the capsules' axes (..., 5, 3, 3).
+
+        The last capsule ends one radius before the fingertip.
+        """
         start, end = points[..., :-1, :], points[..., 1:, :].copy()
         tip = end[..., 2, :] - start[..., 2, :]
         length = np.linalg.norm(tip, axis=-1, keepdims=True)
@@ -65,11 +75,11 @@ class Clearance:
         r0, r1 = self._radii[:, :-1].ravel(), self._radii[:, 1:].ravel()
         a, b = self._pairs
         distance, s, t = closest_points_of_segments(start[..., a, :], end[..., a, :], start[..., b, :], end[..., b, :])
-        reach = r0[a] + s * (r1 - r0)[a] + r0[b] + t * (r1 - r0)[b]
-        return np.maximum(reach - distance, 0).max(axis=-1)
+        radii = r0[a] + s * (r1 - r0)[a] + r0[b] + t * (r1 - r0)[b]
+        return np.maximum(radii - distance, 0).max(axis=-1)
 
     def _into_palm(self, poses: ArrayLike, ends: Array) -> Array:
-        """Depth of the far ends of middle and last phalanges in the slab of the palm."""
+        """Return how deep the distal ends of the middle and last phalanges lie in the palm's slab."""
         T = self._model.transforms(poses)[..., 0, :, :]
         local = np.einsum("...ji,...fkj->...fki", T[..., :3, :3], ends - T[..., None, None, :3, 3])[..., 1:, :]
         shape, radii = self._shape, self._radii[:, 2:]
@@ -80,9 +90,11 @@ class Clearance:
 
 
 def closest_points_of_segments(p0: Array, p1: Array, q0: Array, q1: Array) -> tuple[Array, Array, Array]:
-    """Distance (...) of segments p and q (..., 3), and where along each it is reached (0 to 1).
+    """Return the distance of two line segments and the parameters of their closest points.
 
-    Ericson, "Real-Time Collision Detection", 2005, Sec. 5.1.9.
+    p0, p1, q0, q1 (..., 3): ends of the segments, metres.
+    Result (...,) three times: distance in metres, and the parameters along p and q, 0 to 1.
+    Source: Ericson, "Real-Time Collision Detection", 2005, Sec. 5.1.9.
     """
     u, v, w = p1 - p0, q1 - q0, p0 - q0
     a, e = (u * u).sum(-1), (v * v).sum(-1)

@@ -1,4 +1,4 @@
-"""Synthetic recordings: from a motion and a handful of options to frames with exact ground truth, and to a folder."""
+"""Synthesis of recordings: frames with exact ground truth from a motion and options."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +19,7 @@ from depthtrack.synthesis.backdrop import Backdrop
 from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
 from depthtrack.synthesis.painting import Painter, SkinTone, flip_skin
 from depthtrack.synthesis.randomness import Stream, generator
-from depthtrack.synthesis.room import furnish, put_wall
+from depthtrack.synthesis.room import add_room, add_wall
 from depthtrack.synthesis.scene import HandKind, Scene
 from depthtrack.synthesis.scene_frame import mirrored
 from depthtrack.synthesis.sensors import Sensor, make_sensor
@@ -31,16 +31,19 @@ BackgroundKind = Literal["none", "wall", "room"]
 SensorName = Literal["ideal", "kinect1", "kinect2", "realsense"]
 
 RANDOM_FRAMES = 360
-"""Length of a motion that has none of its own, unless asked for another."""
+"""Default number of frames of a random motion."""
 
 
 @dataclass(frozen=True)
 class Synthesis:
-    """Everything that a synthetic recording depends on: the same options give the same bytes.
+    """Options of a synthetic recording; equal options give equal bytes.
 
-    `distance` metres from the camera to the nominal place of the palm, None for the usual one before that sensor;
-    `forearm` None means with a wall or room behind the hand; `depth_noise` standard deviation, metres; `skin_flips`
-    share of pixels, 0 to 1; `frames` None means the whole motion; `rate` Hz.
+    distance: metres from the camera to the nominal palm position; None for the sensor's default.
+    forearm: whether a forearm is rendered; None means if there is a background.
+    depth_noise: standard deviation of additional depth noise, metres.
+    skin_flips: share of pixels with a flipped skin label, 0 to 1.
+    frames: number of frames; None for the whole motion.
+    rate: frames a second, Hz.
     """
 
     motion: str = "everyday"
@@ -75,9 +78,14 @@ class Synthesis:
 class SyntheticFrame:
     """A frame and its ground truth.
 
-    `depth` (h, w) metres as the sensor read it; `colour` (h, w, 3) RGB; `mask` (h, w) where the hand, up to its wrist,
-    is what the camera sees, whether the sensor has a reading there or not; `skin` (h, w) where skin is seen at all,
-    with the flipped labels; `exact_depth` (h, w) metres; `pose` (27,) and `joints` (21, 3) in the camera frame.
+    timestamp: seconds.
+    depth (h, w): sensor reading, metres; 0 without a reading.
+    colour (h, w, 3): RGB.
+    mask (h, w): visible hand up to the wrist, also without a sensor reading.
+    skin (h, w): visible skin of hand, forearm and bystander, with flipped labels.
+    exact_depth (h, w): rendered depth, metres.
+    pose (27,): camera frame, see `hand.pose`.
+    joints (21, 3): keypoints, metres, camera frame.
     """
 
     timestamp: float
@@ -91,7 +99,7 @@ class SyntheticFrame:
 
 
 class Synthesiser:
-    """Makes the frames of a synthetic recording: any of them, in any order, on any thread."""
+    """Random access to the frames of a synthetic recording, from any thread."""
 
     def __init__(self, options: Synthesis) -> None:
         self.options = options
@@ -118,21 +126,22 @@ class Synthesiser:
 
     @property
     def distance(self) -> float:
-        """Metres from the camera to the nominal place of the palm."""
-        return self.sensor.usual_distance if self.options.distance is None else self.options.distance
+        """Return the distance from the camera to the nominal palm position, metres."""
+        return self.sensor.default_distance if self.options.distance is None else self.options.distance
 
     @property
     def has_forearm(self) -> bool:
+        """Return whether a forearm is rendered."""
         return self.options.background != "none" if self.options.forearm is None else self.options.forearm
 
     def __getitem__(self, index: int) -> SyntheticFrame:
-        view = self._scene.view(self.poses[index], self._elbow)
-        surface = view.surface
+        rendered = self._scene.render(self.poses[index], self._elbow)
+        surface = rendered.surface
         depth = self.sensor.read(surface, self._random(index, Stream.DEPTH))
         if self.options.depth_noise > 0:
             depth = with_gaussian_noise(depth, self.options.depth_noise, self._random(index, Stream.DEPTH_NOISE))
         colour, skin = flip_skin(
-            self._painter.paint(view, self._random(index, Stream.COLOUR)),
+            self._painter.paint(rendered, self._random(index, Stream.COLOUR)),
             surface.label,
             self.options.skin_flips,
             self._tone,
@@ -142,7 +151,7 @@ class Synthesiser:
             timestamp=float(self.timestamps[index]),
             depth=depth,
             colour=colour,
-            mask=self._scene.hand_mask(view),
+            mask=self._scene.hand_mask(rendered),
             skin=skin,
             exact_depth=surface.depth,
             pose=self.poses[index],
@@ -150,7 +159,7 @@ class Synthesiser:
         )
 
     def frames(self, threads: int = 2) -> Iterator[SyntheticFrame]:
-        """All frames in order, made by `threads` workers; a few wait in memory."""
+        """Yield all frames in order, synthesised by `threads` workers with a bounded queue."""
         with ThreadPoolExecutor(threads, thread_name_prefix="synthesise") as pool:
             waiting: deque[Future[SyntheticFrame]] = deque()
             for index in range(len(self)):
@@ -161,7 +170,7 @@ class Synthesiser:
                 yield waiting.popleft().result()
 
     def description(self) -> dict[str, Any]:
-        """What `sequence.json` tells: how the recording was made, completely."""
+        """Return the content of `sequence.json`: all options and the program's version."""
         options = asdict(self.options) | {"distance": self.distance, "forearm": self.has_forearm, "frames": len(self)}
         options["hand"] = self.options.hand.side
         if self.options.hand.rig is not None and self.options.model == "skin":
@@ -171,9 +180,9 @@ class Synthesiser:
     def _backdrop(self, rng: np.random.Generator) -> Backdrop:
         backdrop = Backdrop.empty(self.sensor.camera, face=SkinTone.sample(rng).back)
         if self.options.background == "wall":
-            put_wall(backdrop, self.distance, rng)
+            add_wall(backdrop, self.distance, rng)
         elif self.options.background == "room":
-            furnish(backdrop, self.distance, rng)
+            add_room(backdrop, self.distance, rng)
         return backdrop
 
     def _frame_count(self) -> int:
@@ -182,46 +191,47 @@ class Synthesiser:
         count = (RANDOM_FRAMES if duration is None else longest) if options.frames is None else options.frames
         if not 1 <= count <= longest:
             raise InputError(
-                f"'{self.motion.name}' at {options.rate:g} Hz can have 1 to {longest} frames, asked for {count}"
+                f"'{self.motion.name}' at {options.rate:g} Hz can have 1 to {longest} frames, found {count}"
             )
         return count
 
     def _poses(self) -> Array:
         poses = self.motion.poses(self.timestamps, self.options.seed)
-        return self.viewpoint.see(poses if self.options.hand.side == "right" else mirrored(poses))
+        return self.viewpoint.transform_poses(poses if self.options.hand.side == "right" else mirrored(poses))
 
     @cached_property
     def _elbow(self) -> Array:
-        """(3,) where this person's forearm comes from, in the camera frame."""
+        """Return the elbow position (3,), metres, camera frame."""
         elbow = self.motion.elbow + self._random(0, Stream.ARM).uniform(-0.04, 0.04, 3)
-        return self.viewpoint.see_points(elbow * [self.options.hand.mirror, 1, 1])
+        return self.viewpoint.transform_points(elbow * [self.options.hand.mirror, 1, 1])
 
     def _random(self, frame: int, stream: Stream) -> np.random.Generator:
         return generator(self.options.seed, frame, stream)
 
 
 def write_recording(
-    made: Synthesiser,
+    synthesiser: Synthesiser,
     folder: Path,
     overwrite: bool = False,
     threads: int = 2,
     progress: Callable[[Iterator[SyntheticFrame]], Iterable[SyntheticFrame]] = iter,
 ) -> None:
-    """Write a sequence folder, complete or not at all; `progress` wraps the stream of frames.
+    """Write a synthetic recording to a sequence folder, atomically.
 
-    Raises InputError for a folder that is there already, unless `overwrite`.
+    progress: wraps the iterator of frames, for a progress bar.
+    Raises: InputError if the folder exists already and `overwrite` is False, or cannot be written.
     """
     with SequenceWriter(
         folder,
-        made.sensor.camera,
-        hand=made.options.hand.with_(rig=None),
-        description=made.description(),
-        # JPEG shares colour between neighbouring pixels, which would undo flips of single ones.
-        colour_format="png" if made.options.skin_flips > 0 else "jpg",
+        synthesiser.sensor.camera,
+        hand=synthesiser.options.hand.with_(rig=None),
+        description=synthesiser.description(),
+        # JPEG subsamples chroma, which would undo flips of single pixels.
+        colour_format="png" if synthesiser.options.skin_flips > 0 else "jpg",
         overwrite=overwrite,
         threads=threads,
     ) as writer:
-        for frame in progress(made.frames(threads)):
+        for frame in progress(synthesiser.frames(threads)):
             writer.append(
                 frame.timestamp,
                 frame.depth,

@@ -1,4 +1,4 @@
-"""Motions of a hand over time: keyframed ones, interpolated smoothly, and random ones; both come from small files."""
+"""Hand motions over time from TOML files: interpolated keyframes or seeded random motion."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,44 +16,54 @@ from depthtrack.synthesis.scene_frame import orientation
 from depthtrack.types import Array
 
 MAX_DURATION = 3600.0
-"""Longest motion, in seconds: an hour at 30 Hz is 100,000 frames."""
+"""Longest motion, seconds; at 30 Hz it has 108,000 frames."""
 _MAX_KEYS = 10_000
 _SHORTEST = 0.001
 _CHANNELS = ("position", "tilt", "nod", "turn", *FINGERS)
 
 
 class Motion(Protocol):
-    """A right hand's pose over time, in the scene frame."""
+    """The pose of a right hand over time, in the scene frame of `scene_frame`."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Return the name of the motion."""
+        ...
 
     @property
     def about(self) -> str:
-        """One line for people."""
+        """Return a one-line description."""
         ...
 
     @property
     def duration(self) -> float | None:
-        """Seconds; None for a motion of any length."""
+        """Return the duration in seconds; None if the motion has no end."""
         ...
 
     @property
     def elbow(self) -> Array:
-        """(3,) where the forearm comes from, scene frame, metres."""
+        """Return the elbow position (3,), metres, scene frame."""
         ...
 
     def poses(self, times: ArrayLike, seed: int) -> Array:
-        """Poses (T, 27) at `times` (T,) seconds, every angle within its limits; `seed` matters to random motions."""
+        """Return the poses at given times; every angle is within its joint limits.
+
+        times (T,): seconds.
+        seed: seed of random motions; keyframed motions ignore it.
+        Result (T, 27): scene frame.
+        """
         ...
 
 
 def load_motion(name: str) -> Motion:
-    """The motion of that name, or in that .toml file. Raises InputError saying what is wrong with it."""
+    """Load a motion by its name or from a .toml file.
+
+    Raises: InputError if no motion has that name or the file is invalid.
+    """
     path = motion_file.find_motion(name)
     table = motion_file.read_table(path)
     if "like" in table:
-        return _at_other_speed(path, table)
+        return _with_speed(path, table)
     if "random" in table:
         return RandomMotion.from_table(path.stem, table, str(path))
     return KeyframedMotion.from_table(path.stem, table, str(path))
@@ -61,10 +71,10 @@ def load_motion(name: str) -> Motion:
 
 @dataclass(frozen=True)
 class KeyframedMotion:
-    """Channels of keys, each interpolated by itself; before its first and after its last key a channel rests.
+    """A motion interpolated between keys, channel by channel.
 
-    Piecewise cubic Hermite interpolation after Fritsch and Carlson 1980: smooth, and monotone between keys, so that
-    nothing overshoots: with its keys within the joint limits, the whole motion is.
+    A channel is constant before its first key and after its last. The interpolation is piecewise cubic Hermite (Fritsch
+    and Carlson 1980). It is monotone between keys, so it stays within the joint limits if the keys do.
     """
 
     name: str
@@ -77,7 +87,10 @@ class KeyframedMotion:
 
     @classmethod
     def from_table(cls, name: str, table: dict[str, Any], where: str) -> "KeyframedMotion":
-        """Build from a parsed motion file; `where` names it in error messages. Raises InputError."""
+        """Return the motion of a parsed file; `where` names it in error messages.
+
+        Raises: InputError if an entry is missing, unknown or out of range.
+        """
         motion_file.check_names(table, ("about", "keys", "postures", "elbow"), where)
         postures = motion_file.shared_postures(table, where)
         keys = motion_file.tables(table, "keys", _MAX_KEYS, where)
@@ -88,20 +101,23 @@ class KeyframedMotion:
             motion_file.check_names(key, ("at", "posture", *_CHANNELS), place)
             at = motion_file.number(key, "at", 0, MAX_DURATION, place)
             if at < last + _SHORTEST:
-                raise InputError(f"{place}: keys must be in order of time, 1 ms apart; found {at:g} s after {last:g} s")
+                raise InputError(
+                    f"{place}: keys must be in order of time and at least 1 ms apart, found {at:g} s after {last:g} s"
+                )
             last = at
             for channel, value in _values(key, postures, place).items():
                 channels[channel][0].append(at)
                 channels[channel][1].append(value)
         missing = [finger for finger in FINGERS if not channels[finger][0]]
         if missing:
-            raise InputError(f"{where}: some key must give a posture, or {', '.join(missing)}")
+            raise InputError(f"{where}: at least one key must set a posture, or {', '.join(missing)}")
         if last <= 0:
-            raise InputError(f"{where}: the last key must lie after 0 s: it ends the motion")
+            raise InputError(f"{where}: the last key ends the motion, so it must lie after 0 s, found {last:g} s")
         arrays = {channel: (np.array(t), np.array(values)) for channel, (t, values) in channels.items() if t}
         return cls(name, motion_file.text(table, "about", where), last, arrays, motion_file.elbow(table, where))
 
     def poses(self, times: ArrayLike, seed: int) -> Array:
+        """See `Motion`."""
         t = np.asarray(times, dtype=np.float64) * self.speed
         tilt, nod, turn = (self._channel(name, t, 1)[:, 0] for name in ("tilt", "nod", "turn"))
         angles = np.concatenate([self._channel(finger, t, 4) for finger in FINGERS], axis=-1)
@@ -115,12 +131,12 @@ class KeyframedMotion:
 
 
 def _values(key: dict[str, Any], postures: dict[str, Array], where: str) -> dict[str, Array]:
-    """What a key sets, by channel."""
+    """Return the values that a key sets, by channel."""
     values: dict[str, Array] = {}
     if "posture" in key:
         name = motion_file.text(key, "posture", where)
         if name not in postures:
-            raise InputError(f"{where}: there is no posture '{name}'; use {', '.join(postures)}")
+            raise InputError(f"{where}: unknown posture '{name}', use {', '.join(postures)}")
         values.update(zip(FINGERS, postures[name].reshape(5, 4), strict=True))
     values.update(motion_file.posture(key, where))
     if "position" in key:
@@ -131,8 +147,8 @@ def _values(key: dict[str, Any], postures: dict[str, Array], where: str) -> dict
     return values
 
 
-def _at_other_speed(path: Path, table: dict[str, Any]) -> Motion:
-    """The motion of a file that only says: like that one, so many times as fast."""
+def _with_speed(path: Path, table: dict[str, Any]) -> Motion:
+    """Return another keyframed motion at `speed` times its rate."""
     where = str(path)
     motion_file.check_names(table, ("about", "like", "speed"), where)
     speed = motion_file.number(table, "speed", 0.05, 20, where)

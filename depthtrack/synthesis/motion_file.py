@@ -1,4 +1,4 @@
-"""Reads the motion files of `sequences/`, and a user's own: small TOML tables, checked before they are used."""
+"""Reading and validation of motion files (TOML): those of `sequences/` and a user's own."""
 
 import math
 import tomllib
@@ -19,12 +19,15 @@ POSTURES_FILE = "postures.toml"
 
 
 def motion_names() -> list[str]:
-    """Names of the motions that come with the program."""
+    """Return the names of the built-in motions."""
     return sorted(path.stem for path in resource_folder("sequences").glob("*.toml") if path.name != POSTURES_FILE)
 
 
 def find_motion(name: str) -> Path:
-    """File of a motion given by name, or by the path of a .toml file. Raises InputError listing the names."""
+    """Return the file of a built-in motion, or the given path of a .toml file.
+
+    Raises: InputError if neither exists.
+    """
     if name in motion_names():
         return resource_folder("sequences") / f"{name}.toml"
     path = Path(name)
@@ -34,7 +37,10 @@ def find_motion(name: str) -> Path:
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """The parsed TOML file. Raises InputError when it is missing, larger than 1 MiB, or not TOML."""
+    """Parse a TOML file.
+
+    Raises: InputError if the file is missing, larger than 1 MiB, or not TOML.
+    """
     try:
         return tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:
@@ -42,15 +48,18 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 def check_names(entries: Mapping[str, Any], known: Iterable[str], where: str) -> None:
-    """Refuse entries that mean nothing, which are mostly misspelt ones."""
+    """Raise InputError if an entry has an unknown name."""
     known = list(known)
     for name in entries:
         if name not in known:
-            raise InputError(f"{where}: there is no '{name}'; use {', '.join(known)}")
+            raise InputError(f"{where}: unknown entry '{name}', use {', '.join(known)}")
 
 
 def numbers(value: Any, count: int, bound: float, where: str) -> Array:
-    """`count` finite numbers of magnitude at most `bound`, or an InputError."""
+    """Return `count` numbers (count,) of magnitude at most `bound`.
+
+    Raises: InputError if `value` is anything else.
+    """
     valid = isinstance(value, list) and len(value) == count and all(_is_number(v) and abs(v) <= bound for v in value)
     if not valid:
         raise InputError(f"{where} must be {count} numbers between {-bound:g} and {bound:g}, found {_short(value)}")
@@ -58,7 +67,10 @@ def numbers(value: Any, count: int, bound: float, where: str) -> Array:
 
 
 def number(entries: Mapping[str, Any], name: str, low: float, high: float, where: str) -> float:
-    """A number of the entries between `low` and `high`, or an InputError."""
+    """Return the entry `name` as a number between `low` and `high`.
+
+    Raises: InputError if the entry is missing or anything else.
+    """
     value = entries.get(name)
     if not (_is_number(value) and low <= value <= high):
         raise InputError(f"{where}: {name} must be a number from {low:g} to {high:g}, found {_short(value)}")
@@ -66,7 +78,10 @@ def number(entries: Mapping[str, Any], name: str, low: float, high: float, where
 
 
 def text(entries: Mapping[str, Any], name: str, where: str) -> str:
-    """A line of text of the entries, or an InputError."""
+    """Return the entry `name` as text.
+
+    Raises: InputError if the entry is missing, empty or not text.
+    """
     value = entries.get(name)
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{where}: {name} must be a line of text, found {_short(value)}")
@@ -74,7 +89,10 @@ def text(entries: Mapping[str, Any], name: str, where: str) -> str:
 
 
 def table(parent: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
-    """A table within the table, or an InputError."""
+    """Return the entry `name` as a table.
+
+    Raises: InputError if the entry is missing or not a table.
+    """
     value = parent.get(name)
     if not isinstance(value, dict):
         raise InputError(f"{where}: [{name}] must be a table, found {_short(value)}")
@@ -82,7 +100,10 @@ def table(parent: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
 
 
 def tables(entries: Mapping[str, Any], name: str, most: int, where: str) -> list[dict[str, Any]]:
-    """A list of 1 to `most` tables, or an InputError."""
+    """Return the entry `name` as a list of 1 to `most` tables.
+
+    Raises: InputError if the entry is missing or anything else.
+    """
     value = entries.get(name)
     if not isinstance(value, list) or not 1 <= len(value) <= most or not all(isinstance(v, dict) for v in value):
         raise InputError(f"{where}: {name} must be a list of 1 to {most} tables, found {_short(value)}")
@@ -90,7 +111,10 @@ def tables(entries: Mapping[str, Any], name: str, most: int, where: str) -> list
 
 
 def posture(entries: Mapping[str, Any], where: str) -> dict[str, Array]:
-    """Finger angles (4,) in radians of each finger among the entries. Raises InputError outside the joint limits."""
+    """Return the angles (4,) in radians of each finger among the entries.
+
+    Raises: InputError if an angle is not a number or outside its joint limits.
+    """
     angles = {}
     for finger in FINGERS:
         if finger in entries:
@@ -100,7 +124,11 @@ def posture(entries: Mapping[str, Any], where: str) -> dict[str, Array]:
 
 
 def shared_postures(motion: Mapping[str, Any], where: str) -> dict[str, Array]:
-    """Angles (20,) by posture name: those of `postures.toml`, and of the motion's own table of them if it has one."""
+    """Return the named postures of `postures.toml` and of the motion's own table, if it has one.
+
+    Result (20,) each: finger angles, radians.
+    Raises: InputError if a posture lacks a finger or violates a joint limit.
+    """
     own = table(motion, "postures", where) if "postures" in motion else {}
     path = resource_folder("sequences") / POSTURES_FILE
     postures = {}
@@ -114,7 +142,12 @@ def shared_postures(motion: Mapping[str, Any], where: str) -> dict[str, Array]:
 
 
 def elbow(entries: Mapping[str, Any], where: str) -> Array:
-    """(3,) metres: where the forearm comes from, of somebody who faces the camera unless the file says otherwise."""
+    """Return the elbow position (3,), metres, scene frame.
+
+    The default is that of a person who faces the camera.
+
+    Raises: InputError if the entry is not three numbers.
+    """
     return numbers(entries.get("elbow", [-50, 260, 110]), 3, 2000, f"{where}: elbow in mm") / 1000
 
 
@@ -129,13 +162,13 @@ def _check_limits(finger: str, angles: Array, where: str) -> None:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    # Comparing, unlike isfinite, also takes whole numbers that are too large for a float.
+    # A comparison, unlike isfinite, accepts integers that are too large for a float.
     return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
 
 
 def _short(value: object) -> str:
     try:
         shown = repr(value)
-    except (ValueError, RecursionError):  # Python refuses to write out whole numbers of thousands of digits
-        return "something too long to show"
+    except (ValueError, RecursionError):  # Python does not print integers of thousands of digits
+        return "a value too long to print"
     return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -1,7 +1,8 @@
-"""What experiments on synthetic data observe: rendered skin and depth maps, as in Sec. 3 of Oikonomidis et al. 2011.
+"""Observations of synthetic recordings without segmentation.
 
-No colour is segmented: the maps are the renderer's, with whatever noise the experiment adds. The region of interest
-lies around the true hand, with the room that a segmentation would leave.
+See Oikonomidis et al. 2011, Sec. 3.
+Skin mask and depth come from the renderer, with the noise that an experiment adds. The region of interest is the true
+hand's bounding box with the margin that segmentation uses.
 """
 
 from dataclasses import replace
@@ -17,12 +18,14 @@ from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
 from depthtrack.types import Array
 
 MOTIONS_KEPT = 1
-"""A motion of 360 frames at half a metre takes 160 MB: experiments go through their conditions one after another, and a
-worker that grows by 300 MB is taken for leaking."""
+"""Motions whose observations a process keeps; 360 frames at 0.5 m take 160 MB.
+
+Experiments evaluate one condition after another, and joblib restarts a worker that grows by 300 MB.
+"""
 
 
 class ObservedMotion:
-    """Observations of a synthetic recording, each made when first asked for and kept; true poses (T, 27)."""
+    """Observations of a synthetic recording, synthesised at first access and cached."""
 
     def __init__(self, recording: Synthesis) -> None:
         self.recording = recording
@@ -31,33 +34,35 @@ class ObservedMotion:
 
     @property
     def hand(self) -> HandShape:
+        """Return the true hand."""
         return self.recording.hand
 
     @property
     def poses(self) -> Array:
-        return self._made.poses
+        """Return the true poses (T, 27), camera frame."""
+        return self._synthesiser.poses
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._synthesiser)
 
     def __getitem__(self, index: int) -> Observation:
         with self._lock:
             if index not in self._observations:
-                self._observations[index] = observe(self._made[index], self._made, index)
+                self._observations[index] = observation_of(self._synthesiser[index], self._synthesiser, index)
             return self._observations[index]
 
-    def again(self, index: int) -> Observation:
-        """As if observed anew: its point cloud is yet to be made, and does not stay in memory."""
+    def uncached(self, index: int) -> Observation:
+        """Return a copy whose point cloud is not computed yet, for timing and to save memory."""
         return replace(self[index])
 
     @cached_property
-    def _made(self) -> Synthesiser:
+    def _synthesiser(self) -> Synthesiser:
         return Synthesiser(self.recording)
 
 
-def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation:
-    """The observation of a frame that shows a hand and nothing behind it."""
-    camera, hand = made.sensor.camera, made.options.hand
+def observation_of(frame: SyntheticFrame, synthesiser: Synthesiser, index: int) -> Observation:
+    """Return the observation of a frame that shows a hand without a background."""
+    camera, hand = synthesiser.sensor.camera, synthesiser.options.hand
     region = bounding_box(frame.mask, round(ROI_MARGIN * camera.fx / float(np.median(frame.exact_depth[frame.mask]))))
     roi = camera.crop(region)
     depth = np.ascontiguousarray(frame.depth[region.slices], dtype=np.float32)
@@ -78,5 +83,5 @@ def observe(frame: SyntheticFrame, made: Synthesiser, index: int) -> Observation
 
 @lru_cache(maxsize=MOTIONS_KEPT)
 def observed_motion(recording: Synthesis) -> ObservedMotion:
-    """Return the observations of a recording, from a cache of the last one."""
+    """Return the observations of a recording; the process keeps those of the last one."""
     return ObservedMotion(recording)

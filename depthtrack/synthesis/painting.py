@@ -1,4 +1,4 @@
-"""Colour frames: skin that varies from person to person and over the hand, light, and the colour camera's noise."""
+"""Colour images: random skin colours and texture, lighting and camera noise."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,19 +14,24 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
 from depthtrack.synthesis.randomness import coarse_normal_noise
-from depthtrack.synthesis.scene import View
+from depthtrack.synthesis.scene import RenderedView
 from depthtrack.types import Array, Image, Mask
 
 
 @dataclass(frozen=True)
 class SkinTone:
-    """Colours of one person's skin, linear RGB (3,): the hand's back and the paler palm.
+    """Skin colours of one person.
 
-    Lightness L* follows the individual typology angle ITA = atan((L* - 50) / b*), which runs from about 55 degrees in
-    light to -35 in dark skin (Chardon, Cretois and Hourseau, "Skin colour typology and suntanning pathways", 1991; Del
-    Bino and Bernerd, "Variations in skin colour and the biological consequences of ultraviolet radiation exposure",
-    2013); a* = 9.6 and b* = 17.1 on average (Han, Choi and Son, "Skin color of Koreans", 2006). The palm has less
-    pigment, whatever the rest (Yamaguchi et al., "Mesenchymal-epithelial interactions in the skin", 2004).
+    back (3,), palm (3,): linear RGB of the hand's back and of the paler palm.
+
+    Lightness L* follows the individual typology angle ITA = atan((L* - 50) / b*). It runs from about 55 degrees in
+    light skin to -35 in dark skin.
+
+    - ITA: Chardon, Cretois and Hourseau, "Skin colour typology and suntanning pathways", 1991.
+    - Its range: Del Bino and Bernerd, "Variations in skin colour and the biological consequences of ultraviolet
+      radiation exposure", 2013.
+    - Means a* = 9.6, b* = 17.1: Han, Choi and Son, "Skin color of Koreans", 2006.
+    - Palms have less pigment: Yamaguchi et al., "Mesenchymal-epithelial interactions in the skin", 2004.
     """
 
     back: Array
@@ -34,7 +39,7 @@ class SkinTone:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
-        """Anybody's."""
+        """Return the skin colours of a random person."""
         angle = np.radians(rng.uniform(-30, 50))
         a, b = rng.normal(9.6, 1.0), rng.normal(17.1, 1.2)
         lightness = 50 + b * np.tan(angle)
@@ -44,7 +49,11 @@ class SkinTone:
 
 @dataclass(frozen=True)
 class Light:
-    """A lamp behind the camera and light from all around; `towards` (3,) unit, from the scene to the lamp."""
+    """A directional lamp behind the camera and ambient light.
+
+    towards (3,): unit vector from the scene to the lamp, camera frame.
+    ambient, lamp, shine: intensities of ambient, diffuse and specular light.
+    """
 
     towards: Array
     ambient: float
@@ -53,12 +62,18 @@ class Light:
 
     @classmethod
     def sample(cls, rng: np.random.Generator) -> Self:
+        """Return random lighting."""
         towards = np.array([rng.uniform(-0.5, 0.5), rng.uniform(-0.8, -0.2), -1.0])
         ambient = rng.uniform(0.35, 0.5)
         return cls(towards / np.linalg.norm(towards), ambient, 1.05 - ambient)
 
-    def on(self, albedo: Array, normal: Array, shine: bool = False) -> Array:
-        """Light (..., 3), linear RGB, that surfaces of `albedo` (..., 3) and `normal` (..., 3) send to the camera."""
+    def reflected(self, albedo: Array, normal: Array, shine: bool = False) -> Array:
+        """Return the reflected light of surfaces: Lambert, plus Blinn-Phong if `shine`.
+
+        albedo (..., 3): linear RGB.
+        normal (..., 3): unit vectors, camera frame.
+        Result (..., 3): linear RGB.
+        """
         facing = np.maximum(normal @ self.towards, 0)
         light = albedo * (self.ambient + self.lamp * facing)[..., None]
         if shine:
@@ -68,7 +83,7 @@ class Light:
 
 
 class Painter:
-    """Paints the views of one recording. The backdrop is painted once."""
+    """Colour images of one recording; the backdrop is painted once."""
 
     def __init__(
         self,
@@ -85,45 +100,52 @@ class Painter:
         self._light = Light.sample(rng)
         self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32)
         self._phases = rng.uniform(0, 2 * np.pi, 6).astype(np.float32)
-        self._T_rest_body = _at_rest(shape)
-        still = backdrop.surface
-        light = self._light.on(backdrop.albedo(rng), still.normal) * (still.depth > 0)[..., None]
+        self._T_palm_body = _neutral_transforms(shape)
+        background = backdrop.surface
+        light = self._light.reflected(backdrop.albedo(rng), background.normal) * (background.depth > 0)[..., None]
         self._background = np.rint(255 * srgb_from_linear(light)).astype(np.uint8)
 
-    def paint(self, view: View, rng: np.random.Generator) -> Image:
-        """RGB (h, w, 3) of a view."""
-        surface = view.surface
+    def paint(self, rendered: RenderedView, rng: np.random.Generator) -> Image:
+        """Return the RGB image (h, w, 3) of a rendered frame."""
+        surface = rendered.surface
         picture = self._background.copy()
         v, u = np.nonzero((surface.label >= 0) & (surface.label <= FOREARM))
         label, normal = surface.label[v, u], surface.normal[v, u]
         points = self._camera.unproject(np.stack([u, v], axis=-1), surface.depth[v, u])
-        albedo = self._skin(points, normal, label, view.transforms)
-        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.on(albedo, normal, shine=True)))
+        albedo = self._skin(points, normal, label, rendered.transforms)
+        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(albedo, normal, shine=True)))
         if self._noise == 0:
             return picture
         noise = self._noise * coarse_normal_noise(rng, picture.shape)
         return np.asarray(cv2.add(picture, np.rint(noise), dtype=cv2.CV_8U), dtype=np.uint8)
 
     def _skin(self, points: Array, normal: Array, label: NDArray[np.int16], transforms: Array) -> Array:
-        """Albedo (N, 3) at camera-frame points (N, 3): it moves with the hand, for it depends on the point at rest."""
-        T = (self._T_rest_body @ np.linalg.inv(transforms))[label]
-        at_rest = np.einsum("nij,nj->ni", T[:, :3, :3], points) + T[:, :3, 3]
+        """Return the skin's albedo (N, 3) at camera-frame points (N, 3).
+
+        The texture moves with the hand, since it is a function of the point in the neutral pose.
+        """
+        T = (self._T_palm_body @ np.linalg.inv(transforms))[label]
+        neutral = np.einsum("nij,nj->ni", T[:, :3, :3], points) + T[:, :3, 3]
         inward = np.einsum("nj,nj->n", transforms[label, :3, 2], normal)
-        # From the back (0) to the palm's side (1), over the fingers' edges.
+        # 0 on the back of the hand, 1 on the palmar side, blended over the fingers' edges.
         palmar = np.clip(0.5 + 1.2 * inward, 0, 1)[:, None]
         albedo = self._tone.back + (palmar**2 * (3 - 2 * palmar)) * (self._tone.palm - self._tone.back)
-        blotches = np.sin(at_rest.astype(np.float32) @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
-        # Blood under the skin takes away green and blue rather than red.
+        blotches = np.sin(neutral.astype(np.float32) @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
+        # Haemoglobin absorbs green and blue more than red.
         return np.asarray(albedo * (1 + blotches[:, None] * np.array([0.02, 0.045, 0.045])))
 
 
 def flip_skin(
     colour: Image, label: NDArray[np.int16], share: float, tone: SkinTone, rng: np.random.Generator
 ) -> tuple[Image, Mask]:
-    """Skin labels (h, w) with a share of all pixels flipped, and RGB (h, w, 3) in which they look flipped.
+    """Flip the skin label of a share of all pixels and recolour them to match.
 
-    Oikonomidis et al. 2011, Fig. 2c: each pixel flips by itself. Flipped skin takes on the colour of something else,
-    anything else that flips takes on skin's.
+    Pixels flip independently. Flipped skin takes a random non-skin colour; all other flipped pixels take skin's.
+
+    colour (h, w, 3): RGB.
+    label (h, w): labels of the rendered surface.
+    Result (h, w, 3) and (h, w): the new image and the new skin labels.
+    Source: Oikonomidis et al. 2011, Fig. 2c.
     """
     skin = (label >= 0) & (label <= FACE)
     if share == 0:
@@ -138,13 +160,13 @@ def flip_skin(
 
 
 _NOT_SKIN = np.array([(40, 90, 200), (30, 140, 60), (20, 160, 170), (90, 60, 190), (60, 60, 70)], dtype=np.uint8)
-"""Blue, green, teal, violet and slate: far from every skin."""
+"""Blue, green, teal, violet and slate: colours far from all skin colours."""
 
 
-def _at_rest(shape: HandShape) -> Array:
-    """T_rest_body (17, 4, 4): the bodies and the forearm of the hand at rest, in the palm frame."""
-    rest = np.zeros(27)
-    rest[3] = 1
+def _neutral_transforms(shape: HandShape) -> Array:
+    """Return T_palm_body (17, 4, 4) of the bodies and the forearm in the neutral pose, metres."""
+    neutral = np.zeros(27)
+    neutral[3] = 1
     transforms = np.tile(np.eye(4), (BODY_COUNT + 1, 1, 1))
-    transforms[:BODY_COUNT] = HandModel(shape).transforms(rest)
+    transforms[:BODY_COUNT] = HandModel(shape).transforms(neutral)
     return transforms

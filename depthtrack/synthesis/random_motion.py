@@ -1,9 +1,14 @@
-"""Natural motion of any length from a seed: the hand wanders and turns while it goes from posture to posture.
+"""Random natural motion from a seed: a random walk of the palm with random postures.
 
-Postures are either known ones, slightly varied, or drawn from the couplings of real fingers: the first synergy
-closes all of them together (Santello, Flanders and Soechting, "Postural hand synergies for tool use", 1998), the last
-joint bends by two thirds of the one before it (Rijpkema and Girard, "Computer animation of knowledge-based human
-grasping", 1991), and fingers close up sideways as they bend. What would pass fingers through each other is not drawn.
+A posture is either a named one with small variation, or sampled with the couplings of real fingers:
+
+- The first synergy closes all fingers together (Santello, Flanders and Soechting, "Postural hand synergies for tool
+  use", 1998).
+- The distal joint bends by two thirds of the one before it (Rijpkema and Girard, "Computer animation of
+  knowledge-based human grasping", 1991).
+- Abduction decreases as the fingers bend.
+
+Transitions with self-collision are rejected.
 """
 
 from dataclasses import dataclass
@@ -32,10 +37,13 @@ _SPREAD = np.radians([0, 13, 1, -9, -20])
 
 @dataclass(frozen=True)
 class RandomMotion:
-    """See the module.
+    """A random motion; see the module.
 
-    `postures` (N, 20) radians; `hold`, `move`, `wander` seconds; `ranges` (6, 2) of position (m) and angles (rad);
-    `elbow` (3,) where the forearm comes from, scene frame, metres.
+    postures (N, 20): named postures, radians.
+    drawn: share of postures that are sampled, 0 to 1.
+    hold, move, wander: shortest and longest duration of a posture, a transition and a step of the palm, seconds.
+    ranges (6, 2): limits of position (metres) and orientation angles (radians), scene frame.
+    elbow (3,): metres, scene frame.
     """
 
     name: str
@@ -51,7 +59,10 @@ class RandomMotion:
 
     @classmethod
     def from_table(cls, name: str, table: dict[str, Any], where: str) -> "RandomMotion":
-        """Build from a parsed motion file; `where` names it in error messages. Raises InputError."""
+        """Return the motion of a parsed file; `where` names it in error messages.
+
+        Raises: InputError if an entry is missing, unknown or out of range.
+        """
         motion_file.check_names(table, ("about", "random", "postures", "elbow"), where)
         postures = motion_file.shared_postures(table, where)
         options = motion_file.table(table, "random", where)
@@ -75,7 +86,7 @@ class RandomMotion:
         )
 
     def poses(self, times: ArrayLike, seed: int) -> Array:
-        """See `Motion`. A longer motion of the same seed begins like a shorter one."""
+        """See `Motion`. A longer motion of the same seed has the shorter one as its prefix."""
         t = np.asarray(times, dtype=np.float64)
         end = float(t.max(initial=0))
         angles = PchipInterpolator(*self._posture_keys(end, seed))(t)
@@ -83,7 +94,7 @@ class RandomMotion:
         return make_pose(np.stack([right, down, away], axis=-1), orientation(tilt, nod, turn), angles)
 
     def _posture_keys(self, end: float, seed: int) -> tuple[Array, Array]:
-        """Times (K,) and angles (K, 20): each posture is reached, held for a moment, and left."""
+        """Return key times (K,), seconds, and angles (K, 20); two keys hold each posture."""
         clearance = Clearance(HandShape())
         times, angles = [0.0], [self.postures[0]]
         while len(times) < 5 or times[-4] <= end:
@@ -95,7 +106,7 @@ class RandomMotion:
         return np.array(times), np.stack(angles)
 
     def _next(self, current: Array, rng: np.random.Generator, clearance: Clearance) -> Array:
-        """A posture that can be reached from the current one without fingers passing through each other."""
+        """Return a posture that a collision-free transition reaches, else the current one."""
         for _ in range(_TRIES):
             candidate = self._draw(rng)
             # Between two held postures the interpolation runs along the straight line.
@@ -111,7 +122,7 @@ class RandomMotion:
         return np.clip(known + rng.normal(0, np.radians(3), 20), LOWER, UPPER)
 
     def _wander(self, channel: int, end: float, seed: int) -> PchipInterpolator:
-        """A smooth random walk within the channel's range: a first-order autoregressive process, squashed."""
+        """Return a smooth random walk within the channel's range: an AR(1) process through tanh."""
         low, high = self.ranges[channel]
         times, values = [0.0], [0.0]
         while len(times) < 5 or times[-3] <= end:
@@ -122,11 +133,11 @@ class RandomMotion:
 
 
 def coupled_posture(rng: np.random.Generator) -> Array:
-    """Angles (20,) of a hand whose joints move together as they do in real ones."""
+    """Return a random posture (20,), radians, with the joint couplings of real fingers."""
     closing = rng.beta(0.8, 0.8)
-    # Neighbours follow each other: a random walk from index to little finger about the common closing.
+    # Neighbouring fingers correlate: a random walk from index to little finger about the common closing.
     own = np.clip(closing + np.cumsum(rng.normal(0, 0.12, 4)), 0, 1)
-    balance = rng.uniform(0.55, 1.0)  # how much of the closing happens at the knuckles
+    balance = rng.uniform(0.55, 1.0)  # share of the closing at the knuckles
     pip = np.radians(100) * own
     fingers = np.stack(
         [
@@ -137,7 +148,7 @@ def coupled_posture(rng: np.random.Generator) -> Array:
         ],
         axis=-1,
     )
-    # The thumb lies beside the palm or comes across as the fingers close.
+    # The thumb opposes as the fingers close.
     opposing = np.clip(closing + rng.normal(0, 0.2), 0, 1)
     thumb = np.radians([rng.uniform(-8, 16), -16 + 30 * opposing, 35 * opposing, 45 * opposing])
     return np.clip(np.concatenate([thumb, fingers.ravel()]), LOWER, UPPER)
@@ -154,6 +165,6 @@ def _range(table: dict[str, Any], name: str, low: float, high: float, where: str
     pair = motion_file.numbers(table.get(name), 2, max(abs(low), abs(high)), f"{where}, [random]: {name}")
     if not low <= pair[0] <= pair[1]:
         raise InputError(
-            f"{where}, [random]: {name} must be a smallest and a largest value from {low:g} on, found {pair}"
+            f"{where}, [random]: {name} must be a smallest and a largest value of at least {low:g}, found {pair}"
         )
     return float(pair[0]), float(pair[1])

@@ -1,4 +1,4 @@
-"""A wall, or a cluttered room with a bystander's face and things whose colours are close to skin, behind the hand."""
+"""Backgrounds: a wall, or a cluttered room with a bystander and skin-coloured objects."""
 
 import numpy as np
 
@@ -6,26 +6,31 @@ from depthtrack.synthesis.backdrop import Backdrop
 from depthtrack.types import Array
 
 
-def put_wall(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> None:
-    """A wall 0.9 to 1.3 m behind the hand, not quite square to the camera."""
+def add_wall(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> None:
+    """Draw a wall 0.9 to 1.3 m behind the hand, slightly slanted.
+
+    distance: metres from the camera to the nominal palm position.
+    """
     turn = rng.uniform(-0.15, 0.15)
     centre = (0, 0, distance + rng.uniform(0.9, 1.3))
     backdrop.plane(centre, (5 * np.cos(turn), 0, 5 * np.sin(turn)), (0, 5, 0), (204, 204, 198))
 
 
-def furnish(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> None:
-    """Walls and floor, furniture and a bystander, 0.9 to 2.5 m behind the hand.
+def add_room(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> None:
+    """Draw walls, floor, furniture and a bystander 0.9 to 2.5 m behind the hand.
 
-    Things are placed by where they appear, (x, y) / z, so that every distance and sensor shows a cluttered picture.
+    Objects are placed by their normalised image coordinates (x, y) / z, so clutter fills the image of every sensor.
+
+    distance: metres from the camera to the nominal palm position.
     """
 
     def at(x: float, y: float, z: float) -> Array:
-        """The point seen in direction (x, y), some centimetres off, at z metres behind the hand."""
+        """Return a point (3,) near the ray through (x, y), about z metres behind the hand."""
         depth = distance + z + rng.uniform(-0.05, 0.05)
         return np.array([(x + rng.uniform(-0.04, 0.04)) * depth, y * depth, depth])
 
-    def beside(place: Array, offset: list[float]) -> Array:
-        return place + np.array(offset)
+    def beside(point: Array, offset: list[float]) -> Array:
+        return point + np.array(offset)
 
     def turn() -> float:
         return float(rng.uniform(-0.5, 0.5))
@@ -37,14 +42,14 @@ def furnish(backdrop: Backdrop, distance: float, rng: np.random.Generator) -> No
     backdrop.plane((0, floor, back - 1), (8, 0, 0), (0, 0, 1), (110, 104, 98))
     backdrop.plane((side * 0.55 * back, 0, back - 0.9), (0, 8, 0), (0, 0, 0.9), (170, 182, 190))
 
-    # A bystander: face and neck of another skin, dark hair, blue shirt.
+    # A bystander: face and neck of another skin colour, dark hair, blue shirt.
     head = at(0.40 * side, -0.14, 1.15)
     backdrop.ellipsoid(head, (0.075, 0.112, 0.095), None)
     backdrop.ellipsoid(beside(head, [0, -0.03, 0.03]), (0.084, 0.105, 0.095), (52, 42, 38))
     backdrop.column(beside(head, [0, 0.08, 0.02]), 0.12, 0.052, None)
     backdrop.ellipsoid(beside(head, [0, 0.58, 0.06]), (0.23, 0.42, 0.13), (60, 84, 128))
 
-    # A table with things of wood and cardboard, whose colours are close to skin.
+    # A table with wooden and cardboard objects, whose colours are close to skin.
     table = at(-0.36 * side, 0.30, 1.2)
     backdrop.box(table, (0.9, 0.035, 0.5), turn(), (150, 116, 86))
     for x in (-0.35, 0.35):

@@ -1,4 +1,4 @@
-"""What stands before the camera in a frame: the hand, its forearm, and whatever is behind them."""
+"""Scene rendering: the hand and its forearm in front of a static backdrop."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,8 +23,12 @@ HandKind = Literal["primitives", "skin"]
 
 
 @dataclass(frozen=True)
-class View:
-    """A rendered frame: the surface, and T_camera_body (17, 4, 4) of the 16 bodies and the forearm."""
+class RenderedView:
+    """A rendered frame.
+
+    surface: depth, normals and labels of the visible surface, camera frame.
+    transforms (17, 4, 4): T_camera_body of the 16 bodies and the forearm, metres.
+    """
 
     surface: RenderedSurface
     transforms: Array
@@ -32,7 +36,7 @@ class View:
 
 @dataclass(frozen=True)
 class Scene:
-    """Renders the hand of given sizes, with or without forearm, before a backdrop that stays."""
+    """A hand of given sizes, with or without a forearm, in front of a static backdrop."""
 
     shape: HandShape
     kind: HandKind
@@ -40,10 +44,14 @@ class Scene:
     camera: Camera
     backdrop: Backdrop
 
-    def view(self, pose: Array, elbow: Array) -> View:
-        """The scene with the hand in `pose` (27,) and its forearm pointing at `elbow` (3,), camera frame."""
-        still = self.backdrop.surface
-        surface = RenderedSurface(still.depth.copy(), still.label.copy(), still.normal.copy())
+    def render(self, pose: Array, elbow: Array) -> RenderedView:
+        """Render the scene.
+
+        pose (27,): hand pose, camera frame.
+        elbow (3,): point that the forearm is directed to, metres, camera frame.
+        """
+        background = self.backdrop.surface
+        surface = RenderedSurface(background.depth.copy(), background.label.copy(), background.normal.copy())
         transforms = np.empty((BODY_COUNT + 1, 4, 4))
         transforms[:BODY_COUNT] = self.model.transforms(pose)
         self._hand.draw(self.camera, transforms[:BODY_COUNT], surface)
@@ -53,20 +61,19 @@ class Scene:
             vertices, normals = self._forearm.mesh(transforms[0], bend)
             faces = self._forearm.faces
             rasterise(self.camera, vertices, faces, normals, np.full(len(faces), FOREARM), surface)
-        return View(surface, transforms)
+        return RenderedView(surface, transforms)
 
-    def hand_mask(self, view: View) -> Mask:
-        """Pixels (h, w) of a view that see the hand, up to the wrist: the plane across the palm through
-        `HandShape.wrist`.
+    def hand_mask(self, rendered: RenderedView) -> Mask:
+        """Return the visible hand (h, w) up to the plane through `HandShape.wrist` across the palm.
 
-        The forearm's tube begins inside the palm, and how much of it shows before the wrist depends on what the hand
-        is drawn with. That stretch is hand too, so that hands of all kinds end at the same place.
+        The forearm's mesh begins inside the palm, and its visible part before the wrist depends on the hand model.
+        That part counts as hand, so that masks of all hand models end at the same plane.
         """
-        label = view.surface.label
+        label = rendered.surface.label
         hand = (label >= 0) & (label < BODY_COUNT)
         v, u = np.nonzero(label == FOREARM)
-        points = self.camera.unproject(np.stack([u, v], axis=-1), view.surface.depth[v, u])
-        T_camera_palm = view.transforms[0]
+        points = self.camera.unproject(np.stack([u, v], axis=-1), rendered.surface.depth[v, u])
+        T_camera_palm = rendered.transforms[0]
         towards_fingers = T_camera_palm[:3, 1]
         wrist = T_camera_palm[:3, :3] @ self.shape.wrist + T_camera_palm[:3, 3]
         hand[v, u] = (points - wrist) @ towards_fingers > 0
@@ -74,7 +81,7 @@ class Scene:
 
     @cached_property
     def model(self) -> HandModel:
-        """Kinematics of the hand."""
+        """Return the kinematics of the hand."""
         return HandModel(self.shape)
 
     @cached_property

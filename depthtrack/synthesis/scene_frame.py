@@ -1,7 +1,7 @@
-"""The frame in which motions are written, and the readable angles that orient the hand in it.
+"""The scene frame, in which motions are defined, and the angles that orient the palm in it.
 
-The scene frame is that of a camera that looks at the hand from the front, its origin at the nominal place of the
-palm: x right, y down, z away from that camera, metres. At rest the palm faces the camera, fingers up.
+The origin is the nominal palm position. The axes are those of a camera in front of the hand: x right, y down, z away
+from that camera, metres. In the neutral orientation the palm faces the camera, fingers up.
 """
 
 import numpy as np
@@ -12,21 +12,25 @@ from depthtrack.types import Array
 
 
 def orientation(tilt: ArrayLike, nod: ArrayLike, turn: ArrayLike) -> Array:
-    """Quaternion (..., 4) of the palm in the scene frame from three angles (...) in radians.
+    """Return the palm's orientation in the scene frame from three angles.
 
-    `turn` about the hand's long axis: 0 shows the palm, pi the back, pi/2 the little finger's edge (a right hand
-    supinates); then `nod` tips the fingers towards the camera; then `tilt` leans them to the right.
+    The rotations are applied in the order turn, nod, tilt.
+
+    turn (...): about the hand's long axis, radians; 0 shows the palm, pi/2 the little finger's edge, pi the back.
+    nod (...): tips the fingers towards the camera, radians.
+    tilt (...): leans the fingers to the right, radians.
+    Result (..., 4): quaternions w x y z.
     """
     about_y, about_x, about_z = np.broadcast_arrays(-np.asarray(turn), nod, tilt)
     euler = np.stack([about_z, about_x, about_y], axis=-1)
-    # The palm at rest: half a turn about x from the axes of the scene.
-    rest = Rotation.from_euler("x", np.pi)
-    xyzw = (Rotation.from_euler("ZXY", euler.reshape(-1, 3)) * rest).as_quat()
+    # The neutral palm is rotated by pi about the scene's x axis.
+    neutral = Rotation.from_euler("x", np.pi)
+    xyzw = (Rotation.from_euler("ZXY", euler.reshape(-1, 3)) * neutral).as_quat()
     return np.asarray(xyzw[:, [3, 0, 1, 2]].reshape(*euler.shape[:-1], 4))
 
 
 def mirrored(poses: Array) -> Array:
-    """Left hand's poses (..., 27) that mirror a right hand's in x, and the other way round."""
+    """Return poses (..., 27) of the other side's hand, mirrored in x."""
     flip = np.ones(27)
     flip[[0, 5, 6]] = -1  # position x; rotations about y and z
     return poses * flip

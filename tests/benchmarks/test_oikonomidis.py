@@ -32,7 +32,7 @@ from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.segmentation.roi_tracking import ROI_MARGIN
 from depthtrack.synthesis import observations
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.synthesis.observations import observe, observed_motion
+from depthtrack.synthesis.observations import observation_of, observed_motion
 from tests.support.workers import InThisProcess
 
 TINY = ExperimentOptions(quick=True, repetitions=1, resolution=32, frames=2)
@@ -85,9 +85,9 @@ def test_each_frame_is_made_once_and_few_motions_are_cached(monkeypatch: pytest.
 
     def counted(frame: Any, source: Synthesiser, index: int) -> Any:
         made.append(index)
-        return observe(frame, source, index)
+        return observation_of(frame, source, index)
 
-    monkeypatch.setattr(observations, "observe", counted)
+    monkeypatch.setattr(observations, "observation_of", counted)
     recording = Synthesis(frames=2, seed=77)
     for _ in range(3):
         assert observed_motion(recording)[1] is observed_motion(recording)[1]

@@ -1,4 +1,4 @@
-"""Synthetic recordings: exact ground truth, the same bytes for the same options, and everything that can be chosen."""
+"""Synthetic recordings: exact ground truth, reproducible bytes and all options."""
 
 import json
 from itertools import combinations
@@ -45,7 +45,7 @@ def test_the_same_options_give_the_same_bytes_for_any_number_of_threads(tmp_path
     assert all(one[name] != other[name] for name in one if name.startswith(("depth/", "rgb/", "hand_poses")))
 
 
-def test_any_frame_can_be_made_by_itself() -> None:
+def test_any_frame_can_be_synthesised_alone() -> None:
     options: dict[str, Any] = {"sensor": "realsense", "background": "wall", "depth_noise": 0.002, "skin_flips": 0.05}
     in_order = list(_made(**options, frames=4).frames(threads=2))
     alone = _made(**options)[3]
@@ -54,7 +54,7 @@ def test_any_frame_can_be_made_by_itself() -> None:
 
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
-def test_ground_truth_is_that_of_the_hand_alone_wherever_nothing_hides_it(model: Any) -> None:
+def test_ground_truth_is_that_of_the_hand_alone_except_for_occlusions(model: Any) -> None:
     made = _made(model=model, background="room", seed=2)
     frame, camera, shape = made[300], made.sensor.camera, HandShape()
     transforms = HandModel(shape).transforms(frame.pose)
@@ -65,11 +65,11 @@ def test_ground_truth_is_that_of_the_hand_alone_wherever_nothing_hides_it(model:
         skin = Skin.of(shape)
         vertices = skin.vertices(transforms)
         alone = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
-    # What the mask leaves out of the hand lies behind something else: the forearm.
+    # The forearm occludes the part of the hand that the mask lacks.
     hidden = (alone.depth > 0) & ~frame.mask
     assert np.all(frame.exact_depth[hidden] < alone.depth[hidden])
     assert hidden.sum() < 0.1 * frame.mask.sum()
-    # What it adds is where the forearm lies over the hand's end, right before the wrist.
+    # The mask adds the part of the forearm that covers the hand's end before the wrist.
     bare = frame.mask & (frame.exact_depth == alone.depth)
     assert bare.sum() > 0.9 * frame.mask.sum()
     beyond, _ = _beyond_wrist(made, frame)
@@ -81,7 +81,7 @@ def test_ground_truth_is_that_of_the_hand_alone_wherever_nothing_hides_it(model:
 
 
 def _beyond_wrist(made: Synthesiser, frame: SyntheticFrame) -> tuple[Any, Any]:
-    """Metres (h, w) from the wrist's plane towards the forearm, and (h, w) where skin lies near the wrist."""
+    """Return distances (h, w) beyond the wrist's plane, metres, and the skin (h, w) near it."""
     v, u = np.mgrid[: made.sensor.camera.height, : made.sensor.camera.width]
     points = made.sensor.camera.unproject(np.stack([u, v], axis=-1), frame.exact_depth) - frame.joints[0]
     towards_fingers = rotation_matrix(frame.pose[ORIENTATION])[:, 1]
@@ -90,12 +90,12 @@ def _beyond_wrist(made: Synthesiser, frame: SyntheticFrame) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
 @pytest.mark.parametrize("index", [0, 100, 258, 340])
-def test_every_kind_of_hand_ends_at_the_plane_of_the_wrist(model: Any, index: int) -> None:
+def test_masks_of_all_hand_models_end_at_the_plane_of_the_wrist(model: Any, index: int) -> None:
     made = _made(model=model, background="room", seed=2)
     frame = made[index]
     beyond, near = _beyond_wrist(made, frame)
     assert frame.mask[near & (beyond < 0)].all()
-    # The skin's end bulges through the plane by a millimetre.
+    # The skin model protrudes through the plane by a millimetre.
     assert not frame.mask[near & (beyond > 0.002)].any()
 
 
@@ -109,7 +109,7 @@ def test_fingers_of_an_open_hand_project_into_its_mask(model: Any) -> None:
         assert near[v, u].all()
 
 
-def test_without_background_the_hand_is_all_there_is() -> None:
+def test_without_a_background_the_image_shows_the_hand_alone() -> None:
     frame = _made()[0]
     np.testing.assert_array_equal(frame.depth > 0, frame.mask)
     np.testing.assert_array_equal(frame.skin, frame.mask)
@@ -122,15 +122,15 @@ def test_a_left_hand_gives_the_mirror_image() -> None:
     left = _made(forearm=True, motion="grasp", hand=HandShape(side="left"))[50]
     np.testing.assert_allclose(left.joints, right.joints * [-1, 1, 1], atol=1e-9)
     same = left.mask == right.mask[:, ::-1]
-    assert np.sum(~same) <= 5  # pixels on an edge between two surfaces may fall either way
+    assert np.sum(~same) <= 5  # pixels on an edge may show either surface
     both = same & left.mask
     apart = np.abs(left.exact_depth - right.exact_depth[:, ::-1])[both]
     assert np.quantile(apart, 0.9) < 1e-6
-    # The mask's last stretch is the forearm's, whose facets are cut the same way on both sides.
+    # The mask ends with facets of the forearm, which are not mirrored.
     assert np.quantile(apart, 0.999) < 5e-4
 
 
-def test_viewpoints_lie_apart_on_a_hemisphere_and_look_at_the_hand() -> None:
+def test_viewpoints_are_distinct_on_a_hemisphere_and_directed_at_the_hand() -> None:
     views = [Viewpoint(n, 0.8) for n in range(VIEWPOINT_COUNT)]
     assert len(views) == 8
     positions = []
@@ -138,9 +138,9 @@ def test_viewpoints_lie_apart_on_a_hemisphere_and_look_at_the_hand() -> None:
         T = view.transform
         np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
-        np.testing.assert_allclose(view.see_points(np.zeros(3)), [0, 0, 0.8], atol=1e-12)
+        np.testing.assert_allclose(view.transform_points(np.zeros(3)), [0, 0, 0.8], atol=1e-12)
         positions.append(-T[:3, :3].T @ T[:3, 3])
-    assert np.all(np.array(positions)[:, 2] < 0)  # all on the front's side
+    assert np.all(np.array(positions)[:, 2] < 0)  # all are on the frontal hemisphere
     assert min(np.linalg.norm(a - b) for a, b in combinations(positions, 2)) > 2 * 0.8 * np.sin(np.radians(15))
     np.testing.assert_allclose(views[0].transform[:3, :3], np.eye(3), atol=1e-12)
 
@@ -154,7 +154,7 @@ def test_every_viewpoint_sees_the_same_hand_at_the_same_distance() -> None:
         assert frame.mask.sum() > 2000
 
 
-def test_distance_and_scale_change_the_size_of_the_hand_in_the_picture() -> None:
+def test_distance_and_scale_change_the_size_of_the_hand_in_the_image() -> None:
     area = {d: _made(distance=d)[0].mask.sum() for d in (0.5, 1.0, 2.5)}
     assert area[0.5] / area[1.0] == pytest.approx(4, rel=0.1)
     assert area[0.5] / area[2.5] == pytest.approx(25, rel=0.1)
@@ -163,7 +163,7 @@ def test_distance_and_scale_change_the_size_of_the_hand_in_the_picture() -> None
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
 @pytest.mark.parametrize("motion", ["everyday", "grasp", "random"])
-def test_the_forearm_is_skin_but_not_hand_and_holds_on_to_it(model: Any, motion: str) -> None:
+def test_the_forearm_is_skin_outside_the_mask_and_connected_to_the_hand(model: Any, motion: str) -> None:
     made = _made(motion=motion, model=model, forearm=True, seed=1)
     for index in range(0, len(made), 75):
         frame = made[index]
@@ -171,12 +171,12 @@ def test_the_forearm_is_skin_but_not_hand_and_holds_on_to_it(model: Any, motion:
         assert forearm.sum() > 0.2 * frame.mask.sum()
         pieces, _ = cv2.connectedComponents(frame.skin.astype(np.uint8))
         assert pieces == 2  # background and one arm
-        # Where the hand ends and the forearm begins, there is no step in depth to speak of.
+        # The forearm begins where the hand ends.
         beside = forearm & (cv2.dilate(frame.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
         assert beside.any()
 
 
-def test_the_wrist_bends_towards_the_elbow_but_not_beyond_its_range() -> None:
+def test_the_wrist_bends_towards_the_elbow_within_its_limit() -> None:
     arm, palm = Forearm(HandShape()), np.eye(4)
     straight, slightly, far = ([0, -0.3, 0.0], [0, -0.3, 0.05], [0, 0.0, 0.3])
     assert np.linalg.norm(arm.bend(palm, np.array(straight))) == pytest.approx(0, abs=1e-9)
@@ -187,19 +187,21 @@ def test_the_wrist_bends_towards_the_elbow_but_not_beyond_its_range() -> None:
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_the_forearm_is_a_closed_tube_with_its_normals_outward(side: Any) -> None:
+def test_the_forearm_is_a_closed_mesh_with_outward_normals(side: Any) -> None:
     arm = Forearm(HandShape(side=side, scale=1.1))
     vertices, normals = arm.mesh(np.eye(4), np.array([0.4, 0.1, -0.2]))
     faces = np.sort(arm.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert np.all(np.unique(faces, axis=0, return_counts=True)[1] == 2)
     a, b, c = (vertices[arm.faces[:, k]] for k in range(3))
     of_faces = np.cross(b - a, c - a)
-    assert np.einsum("ij,ij->", a, of_faces) / 6 > 5e-4  # its volume, half a litre and more: faces look outward
+    assert (
+        np.einsum("ij,ij->", a, of_faces) / 6 > 5e-4
+    )  # its volume exceeds half a litre, so faces are oriented outward
     agree = np.einsum("fkj,fj->fk", normals[arm.faces], of_faces)
     assert np.mean(agree > 0) > 0.99
 
 
-def test_a_room_is_cluttered_and_lies_well_behind_the_hand() -> None:
+def test_a_room_is_cluttered_and_clearly_behind_the_hand() -> None:
     frame = _made(background="room", distance=0.5, seed=6)[10]
     arm = frame.skin & (frame.exact_depth < 1)
     face = frame.skin & ~arm
@@ -207,7 +209,7 @@ def test_a_room_is_cluttered_and_lies_well_behind_the_hand() -> None:
     assert behind.min() > 0.5 + 0.8
     assert behind.max() == pytest.approx(3.0)
     assert len(np.unique(np.round(behind, 1))) > 8
-    # The bystander's skin looks like skin, and is smaller than the hand.
+    # The bystander's face has a skin colour and is smaller than the hand.
     assert 500 < face.sum() < frame.mask.sum()
     hue = cv2.cvtColor(frame.colour, cv2.COLOR_RGB2HSV)[..., 0]
     assert abs(float(np.median(hue[face])) - float(np.median(hue[frame.mask]))) < 8
@@ -238,7 +240,7 @@ def test_skin_flips_change_that_share_of_labels_and_their_colours(share: float) 
     assert np.mean(redness[~flipped.skin & changed] < 10) > 0.99
 
 
-def test_depth_noise_is_added_to_what_the_sensor_reads() -> None:
+def test_depth_noise_is_added_to_the_sensor_reading() -> None:
     clean, noisy = _made()[40], _made(depth_noise=0.01)[40]
     error = (noisy.depth - clean.depth)[clean.mask]
     assert error.std() == pytest.approx(0.01, rel=0.05)
@@ -246,7 +248,7 @@ def test_depth_noise_is_added_to_what_the_sensor_reads() -> None:
 
 
 @pytest.mark.parametrize("sensor", ["ideal", "kinect1", "kinect2", "realsense"])
-def test_every_sensor_sees_the_hand_at_its_usual_distance(sensor: Any) -> None:
+def test_every_sensor_reads_the_hand_at_its_default_distance(sensor: Any) -> None:
     made = _made(sensor=sensor, background="wall")
     for index in range(0, 360, 90):
         frame = made[index]
@@ -255,7 +257,7 @@ def test_every_sensor_sees_the_hand_at_its_usual_distance(sensor: Any) -> None:
         assert np.median(error) < 0.002
 
 
-def test_frames_and_rate_choose_how_much_of_the_motion_is_sampled() -> None:
+def test_frames_and_rate_set_the_sampling_of_the_motion() -> None:
     assert len(_made()) == 360
     assert len(_made(rate=60)) == 720
     assert len(_made(frames=7)) == 7
@@ -265,7 +267,7 @@ def test_frames_and_rate_choose_how_much_of_the_motion_is_sampled() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "complaint"),
+    ("options", "message"),
     [
         ({"frames": 361}, "1 to 360 frames"),
         ({"frames": 0}, "1 to 360 frames"),
@@ -281,12 +283,12 @@ def test_frames_and_rate_choose_how_much_of_the_motion_is_sampled() -> None:
         ({"seed": -1}, "seed"),
     ],
 )
-def test_options_that_cannot_be_are_refused(options: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(InputError, match=complaint):
+def test_invalid_options_raise_an_input_error(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
         _made(**options)
 
 
-def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
+def test_the_command_writes_a_readable_recording_with_its_ground_truth(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "grasped"
@@ -315,9 +317,9 @@ def test_the_command_writes_a_recording_that_reads_back_with_its_ground_truth(
         assert row == index
         np.testing.assert_allclose(truth.poses[index], expected.pose, atol=1e-12)
         np.testing.assert_allclose(truth.joints[index], expected.joints, atol=1e-12)
-    told = json.loads((out / "sequence.json").read_text())
-    assert (told["motion"], told["sensor"], told["seed"], told["distance"]) == ("grasp", "kinect2", 8, 0.65)
-    assert told["forearm"] is True
+    stored = json.loads((out / "sequence.json").read_text())
+    assert (stored["motion"], stored["sensor"], stored["seed"], stored["distance"]) == ("grasp", "kinect2", 8, 0.65)
+    assert stored["forearm"] is True
     assert main(["synth", "grasp", str(out), "--frames", "1"]) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["synth", "grasp", str(out), "--frames", "1", "--overwrite"]) == 0
@@ -331,10 +333,11 @@ def test_colours_of_flipped_pixels_are_stored_without_loss(tmp_path: Path) -> No
     colour = sequence[0].colour
     assert colour is not None
     np.testing.assert_array_equal(colour, made[0].colour)
+
     np.testing.assert_array_equal(sequence.hand_mask(0), made[0].mask)
 
 
-def test_the_command_says_what_it_needs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_missing_and_unknown_arguments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synth", "list"]) == 0
     assert "everyday" in capsys.readouterr().out
     assert main(["synth", "everyday"]) == 2

@@ -1,4 +1,4 @@
-"""Motions: natural, within anatomy, and what their files say."""
+"""Motions: joint limits, self-collision, speeds and the validation of motion files."""
 
 import contextlib
 from pathlib import Path
@@ -34,12 +34,12 @@ def _sampled(name: str, rate: float = 30.0, seed: int = 0, seconds: float = 10.0
     return motion.poses(np.arange(count) / rate, seed)
 
 
-def test_the_motions_that_are_promised_are_there() -> None:
+def test_the_documented_motions_exist() -> None:
     assert {"everyday", "grasp", "signs", "fast", "random"} <= set(motion_names())
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_motions_stay_within_the_joint_limits_and_no_finger_passes_through_another(name: str) -> None:
+def test_motions_respect_joint_limits_and_have_no_self_collision(name: str) -> None:
     poses = _sampled(name)
     assert np.all(poses[:, ANGLES] >= LOWER - 1e-9)
     assert np.all(poses[:, ANGLES] <= UPPER + 1e-9)
@@ -54,12 +54,12 @@ def test_motions_have_natural_speeds_and_no_jumps(name: str) -> None:
     assert palm.max() < 0.6
     assert np.degrees(turning.max()) < 500
     assert np.degrees(np.abs(joints).max()) < 700
-    # Between two samples, 1/120 s, a velocity changes by a small part of its range: nothing jerks.
+    # Between two samples, 1/120 s, a velocity changes by a small part of its range.
     assert np.abs(np.diff(palm)).max() < 0.1
     assert np.degrees(np.abs(np.diff(joints, axis=0)).max()) < 150
 
 
-def test_everyday_is_the_papers_360_frames_at_30_hertz_and_moves_all_of_the_hand() -> None:
+def test_everyday_has_360_frames_at_30_hertz_and_moves_every_joint() -> None:
     poses = _sampled("everyday")
     assert len(poses) == 360
     ranges = np.degrees(np.ptp(poses[:, ANGLES].reshape(360, 5, 4), axis=0))
@@ -87,20 +87,20 @@ def test_signs_holds_more_than_twenty_distinct_postures() -> None:
     assert len(held) > 20
 
 
-def test_grasp_hides_most_fingertips_behind_the_hand_for_most_of_the_time() -> None:
+def test_grasp_occludes_most_fingertips_in_most_frames() -> None:
     camera = PRESETS["kinect1"].resized(0.5)
     shape = HandShape()
     model, primitives = HandModel(shape), Primitives.of(shape)
-    poses = Viewpoint(0, 0.5).see(_sampled("grasp", rate=5))
-    hidden = []
+    poses = Viewpoint(0, 0.5).transform_poses(_sampled("grasp", rate=5))
+    occluded = []
     for pose in poses:
         surface = raycast(camera, primitives.kinds, primitives.placed(model.transforms(pose)), primitives.bodies)
         tips = model.keypoints(pose)[8::4]
         u, v = np.rint(camera.project(tips)).astype(int).T
-        # A fingertip is hidden where something else is seen a centimetre or more in front of it.
-        seen = surface.depth[v, u]
-        hidden.append(np.mean((seen > 0) & (seen < tips[:, 2] - 0.01)))
-    assert np.mean(np.array(hidden) >= 0.75) > 0.6
+        # A fingertip is occluded if the visible surface is 1 cm or more in front of it.
+        visible = surface.depth[v, u]
+        occluded.append(np.mean((visible > 0) & (visible < tips[:, 2] - 0.01)))
+    assert np.mean(np.array(occluded) >= 0.75) > 0.6
 
 
 @settings(max_examples=25, deadline=None)
@@ -113,14 +113,14 @@ def test_random_motion_is_natural_for_every_seed(seed: int) -> None:
     assert np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).max() * 30 < 0.8
 
 
-def test_random_motion_of_one_seed_is_one_motion_however_long_it_is_asked_for() -> None:
+def test_random_motions_of_one_seed_have_a_common_prefix() -> None:
     motion = load_motion("random")
     long, short = np.arange(900) / 30, np.arange(200) / 30
     np.testing.assert_array_equal(motion.poses(long, 7)[:200], motion.poses(short, 7))
     assert np.abs(motion.poses(short, 7) - motion.poses(short, 8)).max() > 0.1
 
 
-def test_readable_angles_turn_the_hand_as_they_say() -> None:
+def test_turn_nod_and_tilt_rotate_the_palm_as_documented() -> None:
     palm, thumb, fingers = np.eye(3)[2], np.eye(3)[0], np.eye(3)[1]
 
     def pointing(axis: np.ndarray, tilt: float = 0, nod: float = 0, turn: float = 0) -> np.ndarray:
@@ -141,7 +141,7 @@ def test_a_left_hand_mirrors_a_right_one() -> None:
     np.testing.assert_allclose(left, right * [-1, 1, 1], atol=1e-12)
 
 
-def test_clearance_sees_a_finger_that_passes_through_another() -> None:
+def test_clearance_detects_self_collision() -> None:
     postures = shared_postures({}, "test")
     clearance = Clearance(HandShape())
 
@@ -150,7 +150,7 @@ def test_clearance_sees_a_finger_that_passes_through_another() -> None:
 
     crossed = postures["open"].copy()
     crossed[4], crossed[8] = np.radians([-10, 15])
-    # No joint goes this far: fingertips pressed right through the palm.
+    # Beyond all joint limits: fingertips pass through the palm.
     into_palm = postures["open"].copy()
     into_palm[8:12] = np.radians([0, 90, 150, 0])
     assert overlap(postures["open"]) == 0
@@ -161,7 +161,7 @@ def test_clearance_sees_a_finger_that_passes_through_another() -> None:
 
 @settings(max_examples=50)
 @given(seed=st.integers(0, 2**32))
-def test_distance_of_segments_is_the_smallest_between_their_points(seed: int) -> None:
+def test_distance_of_segments_matches_a_dense_sampling(seed: int) -> None:
     p0, p1, q0, q1 = np.random.default_rng(seed).normal(size=(4, 3))
     distance, s, t = closest_points_of_segments(p0, p1, q0, q1)
     shares = np.linspace(0, 1, 201)[:, None]
@@ -171,7 +171,7 @@ def test_distance_of_segments_is_the_smallest_between_their_points(seed: int) ->
     assert np.linalg.norm(p0 + s * (p1 - p0) - q0 - t * (q1 - q0)) == pytest.approx(float(distance))
 
 
-def test_a_motion_file_of_ones_own_is_interpolated_smoothly_between_its_keys(tmp_path: Path) -> None:
+def test_a_motion_file_is_interpolated_between_its_keys(tmp_path: Path) -> None:
     path = tmp_path / "nodding.toml"
     path.write_text(
         'about = "nods"\nelbow = [0, 300, 0]\n'
@@ -185,7 +185,7 @@ def test_a_motion_file_of_ones_own_is_interpolated_smoothly_between_its_keys(tmp
     assert motion.duration == 2.0
     poses = motion.poses([0.0, 1.0, 1.5, 2.0], 0)
     np.testing.assert_allclose(np.degrees(poses[0, ANGLES]), [0, 10, 10, 5] * 5, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(poses[1:, 11:15]), [[0, 50, 60, 30]] * 3, atol=1e-9)  # rests after its key
+    np.testing.assert_allclose(np.degrees(poses[1:, 11:15]), [[0, 50, 60, 30]] * 3, atol=1e-9)  # constant after its key
     assert poses[1, 0] == pytest.approx(0.05)
     np.testing.assert_allclose(poses[3, :3], [0.1, 0, -0.02], atol=1e-12)
 
@@ -194,10 +194,10 @@ _GOOD_KEY = '{ at = 1, posture = "open" }'
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "message"),
     [
-        ('about = "x"\nkeys = [ { at = 1, posture = "opne" } ]', "no posture 'opne'"),
-        ('about = "x"\nkeys = [ { at = 1, posture = "open", positoin = [1, 2, 3] } ]', "no 'positoin'"),
+        ('about = "x"\nkeys = [ { at = 1, posture = "opne" } ]', "posture 'opne'"),
+        ('about = "x"\nkeys = [ { at = 1, posture = "open", positoin = [1, 2, 3] } ]', "unknown entry 'positoin'"),
         (f'about = "x"\nkeys = [ {_GOOD_KEY}, {_GOOD_KEY} ]', "in order of time"),
         ('about = "x"\nkeys = [ { at = 1, posture = "open", index = [0, 120, 0, 0] } ]', "within its range"),
         ('about = "x"\nkeys = [ { at = 1, posture = "open", position = [1, 2, nan] } ]', "3 numbers"),
@@ -206,13 +206,13 @@ _GOOD_KEY = '{ at = 1, posture = "open" }'
         ('about = "x"\nkeys = [ { at = 0, posture = "open" } ]', "after 0 s"),
         ('about = "x"\nkeys = []', "a list of 1 to"),
         (f"keys = [ {_GOOD_KEY} ]", "about must be a line of text"),
-        ('about = "x"\nlike = "random"\nspeed = 2', "no 'random'"),
+        ('about = "x"\nlike = "random"\nspeed = 2', "unknown entry 'random'"),
         ('about = "x"\nlike = "everyday"\nspeed = 0', "speed must be a number from"),
         ('about = "x"\n[random]\npostures = ["nothing"]', "must be a list of some of"),
         ('about = "x"\n[postures.p]\nthumb = [0, 0, 0, 0]', "posture 'p' must give"),
         ('about = "x"\nkeys = [ { at = 1, posture = "open" }, { at = 1.0000001, tilt = 5 } ]', "1 ms apart"),
         (f'about = "x"\nkeys = [ {{ at = 1, posture = "open", tilt = {"9" * 400} }} ]', "from -720 to 720"),
-        (f'about = "x"\nkeys = [ {{ at = 1, posture = "open", tilt = 0x{"f" * 9999} }} ]', "too long to show"),
+        (f'about = "x"\nkeys = [ {{ at = 1, posture = "open", tilt = 0x{"f" * 9999} }} ]', "too long to print"),
         (f"keys = {'9' * 9999}", "cannot read the motion file"),
         ('about = "x"\n[random]\npostures = [["open"]]', "must be a list of some of"),
         ('about = "x"\npostures = 3\nkeys = []', "must be a table"),
@@ -221,14 +221,14 @@ _GOOD_KEY = '{ at = 1, posture = "open" }'
         ("#" * 1_100_000, "at most 1,048,576 bytes"),
     ],
 )
-def test_what_is_wrong_with_a_motion_file_is_said(tmp_path: Path, text: str, complaint: str) -> None:
+def test_invalid_motion_files_raise_an_input_error(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "motion.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=complaint):
+    with pytest.raises(InputError, match=message):
         load_motion(str(path))
 
 
-def test_an_unknown_motion_is_answered_with_the_known_ones() -> None:
+def test_the_error_for_an_unknown_motion_lists_the_known_ones() -> None:
     with pytest.raises(InputError, match="everyday, fast, grasp, other-grasps, random, signs"):
         load_motion("evryday")
 
@@ -240,7 +240,7 @@ _ODD = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(m
 
 @settings(max_examples=100, deadline=None)
 @given(name=st.sampled_from(["grasp", "random"]), data=st.data())
-def test_a_motion_file_with_any_entry_replaced_is_read_or_refused(name: str, data: st.DataObject) -> None:
+def test_a_motion_file_with_any_entry_replaced_is_read_or_rejected(name: str, data: st.DataObject) -> None:
     table = read_table(find_motion(name))
     place: Any = table
     while True:
@@ -261,7 +261,7 @@ def test_a_motion_file_with_any_entry_replaced_is_read_or_refused(name: str, dat
     values=st.lists(st.floats(0, 110), min_size=2, max_size=6),
     gaps=st.lists(st.floats(0.01, 2), min_size=6, max_size=6),
 )
-def test_interpolation_never_leaves_the_range_of_its_keys(values: list[float], gaps: list[float]) -> None:
+def test_interpolation_stays_within_the_range_of_its_keys(values: list[float], gaps: list[float]) -> None:
     times = np.cumsum([0, *gaps])[: len(values)]
     channels = {
         finger: (times, np.radians(np.outer(values, [0, 0, 1, 0])))

@@ -1,4 +1,4 @@
-"""Depth sensors: their errors are those of the published measurements, and fall where they should."""
+"""Sensor models: errors match the published measurements in size and place."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def _facing(camera: Camera, depth: float | Array) -> RenderedSurface:
 
 
 def _tilted(camera: Camera, depth: float, degrees: float) -> RenderedSurface:
-    """A plane through (0, 0, depth), turned about the vertical."""
+    """Return a plane through (0, 0, depth), rotated about the vertical axis."""
     normal = np.array([np.sin(np.radians(degrees)), 0, -np.cos(np.radians(degrees))])
     u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     rays = camera.unproject(np.stack([u, v], axis=-1), np.ones(camera.shape))
@@ -46,7 +46,7 @@ def _rng(frame: int = 0) -> np.random.Generator:
 
 
 @pytest.mark.parametrize("name", SENSOR_NAMES)
-def test_sensors_read_the_same_for_the_same_seed_and_leave_the_surface_as_it_is(name: str) -> None:
+def test_sensors_are_deterministic_and_do_not_modify_the_surface(name: str) -> None:
     sensor = make_sensor(name)
     surface = _tilted(sensor.camera, 1.0, 20)
     before = surface.depth.copy()
@@ -58,19 +58,19 @@ def test_sensors_read_the_same_for_the_same_seed_and_leave_the_surface_as_it_is(
     assert np.all(sensor.read(RenderedSurface.empty(sensor.camera), _rng()) == 0)
 
 
-def test_an_unknown_sensor_is_answered_with_the_known_ones() -> None:
+def test_the_error_for_an_unknown_sensor_lists_the_known_ones() -> None:
     with pytest.raises(InputError, match="ideal, kinect1, kinect2, realsense"):
         make_sensor("kinect3")
 
 
-def test_the_ideal_sensor_reads_the_truth_and_stores_it_finely() -> None:
+def test_the_ideal_sensor_reads_exact_depth_with_a_fine_scale() -> None:
     sensor = make_sensor("ideal")
     surface = _tilted(sensor.camera, 0.7, 30)
     np.testing.assert_array_equal(sensor.read(surface, _rng()), surface.depth)
     assert sensor.camera.depth_scale <= 0.0001
 
 
-def test_gaussian_noise_has_the_asked_deviation_and_invents_no_readings() -> None:
+def test_gaussian_noise_has_the_given_deviation_and_adds_no_readings() -> None:
     depth = np.full((200, 300), 0.5)
     depth[:20] = 0
     noisy = with_gaussian_noise(depth, 0.005, _rng())
@@ -79,7 +79,7 @@ def test_gaussian_noise_has_the_asked_deviation_and_invents_no_readings() -> Non
     assert noisy[20:].mean() == pytest.approx(0.5, abs=1e-4)
 
 
-def test_fast_normal_numbers_are_normal() -> None:
+def test_quantile_noise_is_normal() -> None:
     values = normal_noise(_rng(), (400, 500))
     assert values.mean() == pytest.approx(0, abs=0.01)
     assert values.std() == pytest.approx(1, abs=0.01)
@@ -88,7 +88,7 @@ def test_fast_normal_numbers_are_normal() -> None:
 
 
 @pytest.mark.parametrize("depth", [0.45, 0.6, 1.0, 2.0, 4.0])
-def test_kinect1_noise_along_the_axis_is_the_measured_one(depth: float) -> None:
+def test_kinect1_axial_noise_matches_the_measurements(depth: float) -> None:
     read = kinect1.Kinect1(camera=SMALL).read(_facing(SMALL, depth), _rng())
     inner = read[5:-5, 5:-5]
     expected = 0.0012 + 0.0019 * (depth - 0.4) ** 2
@@ -100,11 +100,11 @@ def test_kinect1_depth_comes_in_steps_of_an_eighth_of_a_pixel_of_disparity() -> 
     read = kinect1.Kinect1(camera=SMALL).read(_tilted(SMALL, 1.5, 30), _rng())
     steps = 8 * 580 * 0.075 / read[read > 0]
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
-    # 1.5 m: steps of z^2 / (8 f b) = 6.5 mm, of which there are few in view.
+    # At 1.5 m a step is z^2 / (8 f b) = 6.5 mm, so the plane spans few steps.
     assert len(np.unique(np.round(steps))) < 60
 
 
-def test_kinect1_is_noisier_at_grazing_angles_and_blind_beyond() -> None:
+def test_kinect1_noise_and_dropout_rise_at_grazing_incidence() -> None:
     assert kinect1.axial_noise(1.0, np.radians(80)) > 2 * kinect1.axial_noise(1.0, np.radians(50))
     sensor = kinect1.Kinect1(camera=SMALL)
     share = [np.mean(sensor.read(_tilted(SMALL, 1.0, angle), _rng()) > 0) for angle in (60, 76, 85)]
@@ -113,17 +113,17 @@ def test_kinect1_is_noisier_at_grazing_angles_and_blind_beyond() -> None:
     assert share[2] < 0.2
 
 
-def test_kinect1_sees_from_40_centimetres_to_5_metres() -> None:
+def test_kinect1_reads_from_40_centimetres_to_5_metres() -> None:
     sensor = kinect1.Kinect1(camera=SMALL)
     assert [bool(np.any(sensor.read(_facing(SMALL, z), _rng()))) for z in (0.3, 0.5, 4.5, 6.0)] == [0, 1, 1, 0]
 
 
-def test_kinect1_silhouettes_waver_by_about_a_pixel() -> None:
+def test_kinect1_lateral_noise_is_about_a_pixel() -> None:
     surface = _box_before_wall(SMALL, 0.8, 0.83, slice(60, 120))
     borders = []
     for frame in range(20):
         read = kinect1.Kinect1(camera=SMALL).read(surface, _rng(frame))[35:85]
-        # The right border, away from the shadow: the last pixel of each row that reads the box.
+        # The right border has no shadow: the last pixel of each row that reads the box.
         near = (read > 0) & (read < 0.815)
         borders.append(SMALL.width - 1 - np.argmax(near[:, ::-1], axis=1))
     assert 0.4 < np.std(borders) < 1.6
@@ -131,7 +131,7 @@ def test_kinect1_silhouettes_waver_by_about_a_pixel() -> None:
 
 
 @pytest.mark.parametrize("baseline", [0.05, 0.075])
-def test_shadows_lie_to_the_left_and_are_as_wide_as_the_disparities_differ(baseline: float) -> None:
+def test_shadows_are_on_the_left_with_the_width_of_the_disparity_difference(baseline: float) -> None:
     near, far = 0.8, 1.1
     surface = _box_before_wall(SMALL, near, far, slice(80, 120))
     dark = shadow(surface.depth, SMALL, baseline)
@@ -142,7 +142,7 @@ def test_shadows_lie_to_the_left_and_are_as_wide_as_the_disparities_differ(basel
     np.testing.assert_array_equal(np.flatnonzero(dark[60])[-1], 79)
 
 
-def test_the_shadow_of_a_thin_finger_stands_apart_from_it() -> None:
+def test_the_shadow_of_a_thin_object_is_separate_from_it() -> None:
     surface = _box_before_wall(SMALL, 0.5, 1.5, slice(120, 130))
     dark = np.flatnonzero(shadow(surface.depth, SMALL, 0.075)[60])
     offset = SMALL.fx * 0.075 * (1 / 0.5 - 1 / 1.5)
@@ -156,26 +156,26 @@ def test_a_slanted_surface_casts_no_shadow_on_itself() -> None:
 
 
 @pytest.mark.parametrize("depth", [0.6, 1.0, 2.0, 4.0])
-def test_kinect2_noise_is_the_measured_one(depth: float) -> None:
+def test_kinect2_axial_noise_matches_the_measurements(depth: float) -> None:
     read = kinect2.Kinect2(camera=SMALL).read(_facing(SMALL, depth), _rng())
     inner = read[5:-5, 5:-5]
     assert inner[inner > 0].std() == pytest.approx((1.5 - 0.5 * depth + 0.3 * depth**2) / 1000, rel=0.05)
     assert inner[inner > 0].mean() == pytest.approx(depth, abs=2e-4)
 
 
-def test_kinect2_has_flying_pixels_at_silhouettes_and_nowhere_else() -> None:
+def test_kinect2_has_flying_pixels_only_at_silhouettes() -> None:
     surface = _box_before_wall(SMALL, 0.8, 1.6, slice(60, 120))
     read = kinect2.Kinect2(camera=SMALL).read(surface, _rng())
     flying = (read > 0.85) & (read < 1.55)
     assert flying.sum() > 30
     assert not np.any(flying & ~edges(surface.depth))
-    # Half of the edge's pixels are noticed and dropped.
+    # Half of the edge's pixels drop out.
     assert np.mean(read[edges(surface.depth)] == 0) == pytest.approx(0.5, abs=0.1)
 
 
-def test_kinect2_sees_nothing_nearer_than_half_a_metre() -> None:
+def test_kinect2_has_no_readings_below_half_a_metre() -> None:
     assert not np.any(kinect2.Kinect2(camera=SMALL).read(_facing(SMALL, 0.45), _rng()))
-    assert make_sensor("kinect2").usual_distance > 0.6
+    assert make_sensor("kinect2").default_distance > 0.6
 
 
 @pytest.mark.parametrize("depth", [0.4, 0.8, 1.6])
@@ -187,7 +187,7 @@ def test_realsense_error_grows_with_the_square_of_the_distance(depth: float) -> 
     assert inner[inner > 0].std() == pytest.approx(expected, rel=0.1)
 
 
-def test_realsense_noise_is_alike_within_a_matching_window_and_independent_beyond() -> None:
+def test_realsense_noise_is_correlated_within_a_matching_window_only() -> None:
     sensor = realsense.RealSense()
     error = sensor.read(_facing(sensor.camera, 1.0), _rng())[10:-10, 60:-10] - 1.0
 
@@ -198,7 +198,7 @@ def test_realsense_noise_is_alike_within_a_matching_window_and_independent_beyon
     assert abs(correlation(12)) < 0.1
 
 
-def test_realsense_fattens_the_foreground_and_is_blind_to_its_left() -> None:
+def test_realsense_fattens_the_foreground_and_has_a_shadow_on_its_left() -> None:
     sensor = realsense.RealSense()
     camera = sensor.camera
     depth = np.full(camera.shape, 1.5)
@@ -221,20 +221,20 @@ def test_realsense_is_limited_by_its_disparity_search() -> None:
     assert not np.any(sensor.read(_facing(sensor.camera, 0.17), _rng()))
 
 
-def test_incidence_is_the_angle_between_normal_and_line_of_sight() -> None:
+def test_incidence_is_the_angle_between_normal_and_viewing_ray() -> None:
     centre, radius = np.array([0.02, -0.01, 0.6]), 0.08
     sphere = raycast(SMALL, np.array([SPHERE]), ellipsoid(tuple(centre), (radius,) * 3)[None], np.array([0]))
     theta = incidence(sphere, SMALL)
     assert np.all(theta[sphere.depth == 0] == np.pi / 2)
     v, u = np.nonzero(sphere.depth)
     points = SMALL.unproject(np.stack([u, v], axis=-1), sphere.depth[v, u])
-    # A ray that misses the sphere's centre by d meets its surface under asin(d / r).
+    # A ray at distance d from the sphere's centre has an incidence of asin(d / r).
     along = points / np.linalg.norm(points, axis=-1, keepdims=True)
     miss = np.linalg.norm(np.cross(along, centre), axis=-1)
     np.testing.assert_allclose(theta[v, u], np.arcsin(np.minimum(miss / radius, 1)), atol=1e-6)
 
 
-def test_edges_are_where_a_neighbour_is_another_surface() -> None:
+def test_edges_are_pixels_with_a_neighbour_on_another_surface() -> None:
     rng = np.random.default_rng(5)
     depth = np.where(rng.random((30, 40)) < 0.2, 0.0, 1.0 + 0.05 * (rng.random((30, 40)) < 0.3))
     padded = np.pad(depth, 1, mode="edge")

@@ -77,7 +77,7 @@ def follow(
     points, seconds, estimates = [], [], list[Estimate]()
     with closing(create_tracker(config, seen.hand, synergies=known)) as tracker:
         for index in range(len(seen)):
-            observation, begun = seen.again(index), process_time()
+            observation, begun = seen.uncached(index), process_time()
             if index == 0:
                 estimates.append(tracker.start(observation, seen.poses[0]))
             else:

@@ -73,7 +73,7 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
     fit = SurfaceFitOptions(subsample=1, icp=PAPER_ICP if variant == "paper" else IcpOptions())
     _compile()
     with closing(Toolkit(seen.hand, ScoringOptions(), synergies=known)) as tools:
-        observation, begun = seen.again(frame), process_time()
+        observation, begun = seen.uncached(frame), process_time()
         pose = estimate_single_frame(tools, observation, seen.poses[frame], coarse_to_fine, fit, repetition).pose
         seconds = process_time() - begun
     hand, pose, true = HandModel(seen.hand), pose[None], seen.poses[[frame]]
@@ -118,7 +118,7 @@ def _compile() -> None:
     for coarse_to_fine, icp in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
         fit = SurfaceFitOptions(subsample=50, icp=icp)
         with closing(Toolkit(seen.hand, ScoringOptions(), synergies=load_source(MOTION).synergies)) as tools:
-            estimate_single_frame(tools, seen.again(0), seen.poses[0], coarse_to_fine, fit)
+            estimate_single_frame(tools, seen.uncached(0), seen.poses[0], coarse_to_fine, fit)
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:

@@ -202,7 +202,7 @@ def _time_frame(tracker: StageTracker, motion: ObservedMotion, index: int, secon
 
     def track() -> None:
         tracker.restore(before)
-        made.append(tracker.track(motion.again(index)))
+        made.append(tracker.track(motion.uncached(index)))
 
     track()
     durations = time_calls(track, seconds)

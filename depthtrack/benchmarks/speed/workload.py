@@ -51,7 +51,7 @@ class Workload:
 def make_workloads(rois: Iterable[Roi] = ROIS, seed: int = 0) -> list[Workload]:
     """The benchmark's workloads: ideal observations of frames of the motion, seen by a Kinect; the same every time."""
     shape, oracle = HandShape(), OracleScorer(HandShape())
-    truth = Viewpoint(distance=DISTANCE).see(load_motion("everyday").poses(np.array(FRAME_TIMES), seed))
+    truth = Viewpoint(distance=DISTANCE).transform_poses(load_motion("everyday").poses(np.array(FRAME_TIMES), seed))
     random = np.random.Generator(np.random.Philox(key=seed))
     steps = random.normal(size=(len(truth), HYPOTHESES, TANGENT_SIZE)) * _SPREAD
     poses = within_limits(retract(truth[:, None], steps))

@@ -1,4 +1,4 @@
-"""Depth cameras: from the true surface to what each of them would read. One file a sensor, one protocol for all."""
+"""Sensor models of depth cameras: readings with realistic errors from the exact surface."""
 
 from typing import Protocol
 
@@ -13,30 +13,36 @@ SENSOR_NAMES = ("ideal", "kinect1", "kinect2", "realsense")
 
 
 class Sensor(Protocol):
-    """A depth camera with its colour camera, both in one image."""
+    """A depth camera whose depth is registered to its colour image."""
 
     @property
     def camera(self) -> Camera:
-        """Intrinsics, and what a unit of its stored depth is worth."""
+        """Return the intrinsics and the depth scale."""
         ...
 
     @property
-    def usual_distance(self) -> float:
-        """Where people hold their hands before it, metres."""
+    def default_distance(self) -> float:
+        """Return the default distance of the hand, metres."""
         ...
 
     @property
     def colour_noise(self) -> float:
-        """Standard deviation of a pixel's colour, of 255 levels."""
+        """Return the standard deviation of a pixel's colour, in levels of 255."""
         ...
 
     def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
-        """Depth (h, w) in metres that the sensor reads, 0 where it has no reading. The surface is left as it is."""
+        """Return the depth reading of a rendered surface, which is not modified.
+
+        Result (h, w): metres; 0 without a reading.
+        """
         ...
 
 
 def make_sensor(name: str) -> Sensor:
-    """The sensor of that name, with its usual camera. Raises InputError listing the names."""
+    """Return the sensor of that name with its default camera.
+
+    Raises: InputError if there is none.
+    """
     if name == "ideal":
         from depthtrack.synthesis.sensors.ideal import Ideal
 

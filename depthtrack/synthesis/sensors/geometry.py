@@ -1,4 +1,4 @@
-"""What depth sensors share: the angle at which they see a surface, its edges, and where a second viewpoint is blind."""
+"""Shared parts of the sensor models: incidence, depth edges, occlusion shadows, dropout."""
 
 import math
 
@@ -10,32 +10,57 @@ from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Mask
 
 JUMP = 0.02
-"""Neighbouring depths that differ by more than this share of themselves are two surfaces, not one."""
+"""Relative depth difference of neighbouring pixels from which they belong to two surfaces."""
 
 
 def incidence(surface: RenderedSurface, camera: Camera) -> Array:
-    """Angle (h, w) in radians between the surface's normal and the line of sight; pi / 2 where there is no surface."""
+    """Return the angle between the surface's normal and the viewing ray.
+
+    Result (h, w): radians; pi / 2 without a surface.
+    """
     out = np.empty(surface.depth.shape)
     _incidence(surface.depth, surface.normal, (camera.fx, camera.fy, camera.cx, camera.cy), out)
     return out
 
 
 def edges(depth: Array, radius: int = 1) -> Mask:
-    """Pixels (h, w) of a surface that ends, or jumps in depth, within `radius` pixels in a row or column."""
+    """Return the depth edges: surface pixels with a discontinuity nearby.
+
+    radius: how far a discontinuity may be in the pixel's row or column, pixels.
+    depth (h, w): metres.
+    Result (h, w): mask.
+    """
     out = np.zeros(depth.shape, dtype=np.bool_)
     _edges(depth, radius, JUMP, out)
     return out
 
 
 def shadow(depth: Array, camera: Camera, baseline: float) -> Mask:
-    """Pixels (h, w) of the surface that a second viewpoint, `baseline` metres to the right (+x), does not see.
+    """Return the surface pixels that are occluded from a second viewpoint at the right (+x).
 
-    A row of the image is a row of the second one too. There, the surface is drawn into a buffer of inverse depth,
-    segment by segment between neighbouring pixels; a pixel is blind where something nearer was drawn over it.
+    The image pair is rectified. In the second image, each row of the surface is rasterised into an inverse-depth
+    buffer, segment by segment. A pixel is occluded if the buffer holds something nearer.
+
+    depth (h, w): metres.
+    baseline: distance of the viewpoints, metres.
+    Result (h, w): mask.
     """
     out = np.zeros(depth.shape, dtype=np.bool_)
     _shadow(depth, camera.fx * baseline, JUMP, out)
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def dropout_probability(
+    is_edge: bool, incidence: float, at_edges: float, grazing_start: float, grazing_end: float
+) -> float:
+    """Return the probability that a pixel has no reading.
+
+    incidence: radians; the probability rises linearly from 0 at `grazing_start` to 1 at `grazing_end`.
+    at_edges: probability at depth edges.
+    """
+    grazing = min(max((incidence - grazing_start) / (grazing_end - grazing_start), 0.0), 1.0)
+    return max(grazing, at_edges if is_edge else 0.0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -78,7 +103,7 @@ def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None
             if z <= 0.0:
                 continue
             here = u - focal_baseline / z
-            # The surface reaches on to its right neighbour; an isolated pixel covers its own width.
+            # The segment ends at the right neighbour; an isolated pixel covers its own width.
             z_next = depth[v, u + 1] if u + 1 < width else 0.0
             if not abs(z_next - z) <= jump * z:
                 z_next = z
@@ -92,6 +117,6 @@ def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None
             if z <= 0.0:
                 continue
             k = round(u - focal_baseline / z)
-            # What lies outside the second image is taken as seen: real ones reach beyond ours on that side.
+            # Pixels outside the second image count as visible, since real second cameras cover a wider field.
             if 0 <= k < width and inverse[k] > (1.0 + jump) / z:
                 out[v, u] = True
