@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.types import Array
+from depthtrack.types import Array, Depth
 
 MAX_SIDE = 8192
 """Largest image side accepted, in pixels: bounds the memory an absurd header can ask for."""
@@ -70,6 +70,10 @@ class Camera:
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth, dtype=np.float64)
         return np.stack([(uv[..., 0] - self.cx) / self.fx * z, (uv[..., 1] - self.cy) / self.fy * z, z], axis=-1)
+
+    def metres(self, stored: NDArray[np.uint16]) -> Depth:
+        """Return the depth (h, w) in metres of an image of stored units (h, w); 0 stays 0."""
+        return stored.astype(np.float32) * np.float32(self.depth_scale)
 
     @property
     def rect(self) -> Rect:

@@ -89,8 +89,16 @@ class Segmenter:
         Raises:
             InputError: the file of skin colours cannot be read.
         """
-        options = options or SegmentationOptions()
-        if not options.use_colour or not sequence.has_colour:
+        return cls.from_options(options or SegmentationOptions(), sequence.has_colour)
+
+    @classmethod
+    def from_options(cls, options: SegmentationOptions, has_colour: bool) -> Self:
+        """Return a segmenter that uses skin colour if the frames have colour and the options allow it.
+
+        Raises:
+            InputError: the file of skin colours cannot be read.
+        """
+        if not options.use_colour or not has_colour:
             return cls(None, options.wrist_margin)
         file = options.skin_model
         colours = SkinColourModel.default() if file is None else SkinColourModel.load(Path(file))

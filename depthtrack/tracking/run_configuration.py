@@ -45,6 +45,10 @@ class RunConfiguration:
     on_damage: OnDamage = "refuse"
     context: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """Check the choices. Raises InputError if one is out of range."""
+        _check_choices({"start": self.start, "frames": self.frames, "on_damage": self.on_damage}, "the run")
+
     @property
     def surface(self) -> Literal["skin", "cylinders"]:
         """Surface whose distance to the observation the tracker minimises; spheres and cylinders for a swarm."""

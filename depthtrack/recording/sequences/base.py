@@ -35,7 +35,7 @@ class BaseSequence(ABC):
         """
         self.path = path
         self.description: Mapping[str, Any] = {}
-        self._on_damage = on_damage
+        self.on_damage = on_damage
         self._damaged: dict[int, DamagedFrame] = {}
 
     @classmethod
@@ -111,7 +111,7 @@ class BaseSequence(ABC):
             try:
                 frame = self[index]
             except DamagedFrameError as error:
-                if self._on_damage == "refuse":
+                if self.on_damage == "refuse":
                     raise DamagedFrameError(
                         f"frame {index}: {error} (--on-damage skip leaves such frames out)"
                     ) from error

@@ -11,11 +11,11 @@ A synthetic hand_mask/ shows the hand up to the plane of its wrist, also where t
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_json
@@ -48,7 +48,7 @@ class TumSequence(BaseSequence):
         self.has_colour = bool(self._partner)
         self.hand = read_hand(path)
         self.ground_truth = read_ground_truth(path, self.hand)
-        self._exact_scale = _exact_depth_scale(self.description, path)
+        self._exact_camera = replace(self.camera, depth_scale=_exact_depth_scale(self.description, path))
 
     @classmethod
     def matches(cls, path: Path) -> bool:
@@ -71,7 +71,7 @@ class TumSequence(BaseSequence):
     def read_depth(self, index: int) -> Depth:
         """See `BaseSequence`."""
         stored = read_depth(self.path / self._depth[index].name, self.camera.shape)
-        return _metres(stored, self.camera.depth_scale)
+        return self.camera.metres(stored)
 
     def read_colour(self, index: int) -> Image | None:
         """See `BaseSequence`."""
@@ -93,7 +93,7 @@ class TumSequence(BaseSequence):
         Raises: DamagedFrameError if the image exists and cannot be read.
         """
         path = self._beside(index, "exact_depth")
-        return None if path is None else _metres(read_depth(path, self.camera.shape), self._exact_scale)
+        return None if path is None else self._exact_camera.metres(read_depth(path, self.camera.shape))
 
     def _beside(self, index: int, kind: str) -> Path | None:
         """Return the path of the image of another kind with the name of a depth image, or None without one."""
@@ -104,10 +104,6 @@ class TumSequence(BaseSequence):
         if not is_inside(self.path, name):
             raise DamagedFrameError(f"{path} must lie within the folder of the recording")
         return path
-
-
-def _metres(stored: NDArray[np.uint16], scale: float) -> Depth:
-    return stored.astype(np.float32) * np.float32(scale)
 
 
 def _read_camera(folder: Path) -> Camera:
