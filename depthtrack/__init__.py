@@ -1,3 +1,96 @@
-"""Full 26-degree-of-freedom hand tracking from RGB-D video on an ordinary CPU."""
+"""Full 26-degree-of-freedom hand tracking from RGB-D video on an ordinary CPU.
+
+All names below are loaded at first use, so that `import depthtrack` takes no time.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from depthtrack.api.choices import open_recording as open_recording
+    from depthtrack.api.comparing import compare as compare
+    from depthtrack.api.comparing import comparison_table as comparison_table
+    from depthtrack.api.comparing import evaluate as evaluate
+    from depthtrack.api.live import HandTracker as HandTracker
+    from depthtrack.api.measuring import calibrate as calibrate
+    from depthtrack.api.measuring import calibrate_rig as calibrate_rig
+    from depthtrack.api.runs import export_run as export_run
+    from depthtrack.api.runs import joint_track as joint_track
+    from depthtrack.api.runs import read_run as read_run
+    from depthtrack.api.runs import track as track
+    from depthtrack.api.synthetic import synthesise as synthesise
+    from depthtrack.calibration.calibrate import Calibration as Calibration
+    from depthtrack.calibration.rig_calibration import RigCalibration as RigCalibration
+    from depthtrack.errors import DepthtrackError as DepthtrackError
+    from depthtrack.errors import InputError as InputError
+    from depthtrack.evaluation.evaluate import Evaluation as Evaluation
+    from depthtrack.evaluation.metrics.metric import Metric as Metric
+    from depthtrack.export.joint_track import JointTrack as JointTrack
+    from depthtrack.export.registry import EXPORTERS as EXPORTERS
+    from depthtrack.geometry.camera import Camera as Camera
+    from depthtrack.hand.hand_file import load_hand as load_hand
+    from depthtrack.hand.kinematics import KEYPOINT_NAMES as KEYPOINT_NAMES
+    from depthtrack.hand.kinematics import HandModel as HandModel
+    from depthtrack.hand.shape import HandShape as HandShape
+    from depthtrack.hand.synergies import Synergies as Synergies
+    from depthtrack.recording.run_folder import Run as Run
+    from depthtrack.recording.sequence import Frame as Frame
+    from depthtrack.recording.sequence import Sequence as Sequence
+    from depthtrack.recording.status import Status as Status
+    from depthtrack.rendering.backends import create_scorer as create_scorer
+    from depthtrack.segmentation.observation import Observation as Observation
+    from depthtrack.segmentation.options import SegmentationOptions as SegmentationOptions
+    from depthtrack.synthesis.generate import Synthesis as Synthesis
+    from depthtrack.tracking.pipeline import TrackedFrame as TrackedFrame
+    from depthtrack.tracking.registry import tracker_config as tracker_config
+    from depthtrack.tracking.tracker import Estimate as Estimate
+
+_MODULES = {
+    "api.choices": ("open_recording",),
+    "api.comparing": ("compare", "comparison_table", "evaluate"),
+    "api.live": ("HandTracker",),
+    "api.measuring": ("calibrate", "calibrate_rig"),
+    "api.runs": ("export_run", "joint_track", "read_run", "track"),
+    "api.synthetic": ("synthesise",),
+    "calibration.calibrate": ("Calibration",),
+    "calibration.rig_calibration": ("RigCalibration",),
+    "errors": ("DepthtrackError", "InputError"),
+    "evaluation.evaluate": ("Evaluation",),
+    "evaluation.metrics.metric": ("Metric",),
+    "export.joint_track": ("JointTrack",),
+    "export.registry": ("EXPORTERS",),
+    "geometry.camera": ("Camera",),
+    "hand.hand_file": ("load_hand",),
+    "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
+    "hand.shape": ("HandShape",),
+    "hand.synergies": ("Synergies",),
+    "recording.run_folder": ("Run",),
+    "recording.sequence": ("Frame", "Sequence"),
+    "recording.status": ("Status",),
+    "rendering.backends": ("create_scorer",),
+    "segmentation.observation": ("Observation",),
+    "segmentation.options": ("SegmentationOptions",),
+    "synthesis.generate": ("Synthesis",),
+    "tracking.pipeline": ("TrackedFrame",),
+    "tracking.registry": ("tracker_config",),
+    "tracking.tracker": ("Estimate",),
+}
+"""Module of each public name, as the imports for type checkers above state them too."""
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name at its first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

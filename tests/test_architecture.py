@@ -31,6 +31,7 @@ LAYERS = (
     ("benchmarks",),
     ("viewing",),
     ("report",),
+    ("api",),
     ("cli",),
 )
 """Packages and modules in import order. A layer imports from layers before it, never from its own or later ones."""

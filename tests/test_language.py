@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 REWRITTEN = (
     "depthtrack/__init__.py",
+    "depthtrack/api",
     "depthtrack/simd",
     "depthtrack/synthesis",
     "depthtrack/types.py",
@@ -25,6 +26,7 @@ REWRITTEN = (
     "docs/metrics.md",
     "docs/parameters.md",
     "docs/rigs.md",
+    "tests/api",
     "tests/support",
     "tests/synthesis",
     "tools",

@@ -53,7 +53,6 @@ class Command:
 
         from depthtrack.calibration.calibrate import summary
         from depthtrack.hand.hand_file import load_hand
-        from depthtrack.segmentation.observation import Segmenter
         from depthtrack.segmentation.options import SegmentationOptions
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
@@ -68,14 +67,13 @@ class Command:
         rig = None if self.hand is None else load_hand(self.hand, side)
         sequence = self.recording.open()
         skin_model = None if self.skin_model is None else str(self.skin_model)
-        segmenter = Segmenter.for_sequence(sequence, SegmentationOptions(skin_model=skin_model))
+        segmentation = SegmentationOptions(skin_model=skin_model)
         if rig is not None:
-            scaled = calibrate_rig_on_sequence(sequence, segmenter, rig, self.seed, self.threads)
+            scaled = calibrate_rig_on_sequence(sequence, segmentation, rig, self.seed, self.threads)
             content, page = scaled.to_json(), calibration_picture(scaled, rig)
             report, text = scaled.summary(), _rig_text(scaled, self.out, picture)
         else:
-            source = f"calibrated on {sequence.name}"
-            measured = calibrate_sequence(sequence, segmenter, side, self.seed, self.threads, source)
+            measured = calibrate_sequence(sequence, segmentation, side, self.seed, self.threads)
             content, page = measured.to_json(), calibration_picture(measured)
             report, text = summary(measured), _text(measured, self.out, picture)
         write_atomic(self.out, content)

@@ -101,8 +101,7 @@ def _measure_hand(source: "Source", file: Path) -> bool:
     sequence = source.open()
     print(f"measuring the hand: {file}", flush=True)
     try:
-        named = f"measured on {sequence.name}"
-        found = calibrate_sequence(sequence, source.segmenter(sequence), side=source.side, source=named)
+        found = calibrate_sequence(sequence, source.segmentation, source.side)
     except InputError as error:
         print(f"the hand cannot be measured, so the average adult's sizes are used: {error}")
         return False

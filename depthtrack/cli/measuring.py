@@ -6,38 +6,33 @@ from depthtrack.cli.progress import percent_bar
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
-    from depthtrack.calibration.pose_search import ScorerFactory
     from depthtrack.calibration.rig_calibration import RigCalibration
     from depthtrack.hand.shape import HandShape, Side
     from depthtrack.recording import Sequence
-    from depthtrack.segmentation.observation import Segmenter
+    from depthtrack.segmentation.options import SegmentationOptions
 
 
 def calibrate_sequence(
     sequence: "Sequence",
-    segmenter: "Segmenter",
+    segmentation: "SegmentationOptions",
     side: "Side | None" = None,
     seed: int = 0,
     threads: int | None = None,
-    source: str = "",
 ) -> "Calibration":
     """Return the calibration of a recording's hand; both sides are tried if `side` is None.
 
     Raises:
-        InputError: if the recording does not show the hand well enough.
+        InputError: the recording does not show the hand well enough.
     """
-    from depthtrack.calibration.calibrate import calibrate
-    from depthtrack.calibration.views import choose_views
+    from depthtrack.api.measuring import calibrate
 
     with percent_bar() as show:
-        show("choosing frames", 0.0)
-        views = choose_views(sequence, segmenter)
-        return calibrate(views, _scorers(threads), side, seed, source, show)
+        return calibrate(sequence, side, segmentation=segmentation, seed=seed, threads=threads, progress=show)
 
 
 def calibrate_rig_on_sequence(
     sequence: "Sequence",
-    segmenter: "Segmenter",
+    segmentation: "SegmentationOptions",
     rig: "HandShape",
     seed: int = 0,
     threads: int | None = None,
@@ -45,22 +40,9 @@ def calibrate_rig_on_sequence(
     """Return a rigged hand at the scale of the recording's hand.
 
     Raises:
-        InputError: if the recording does not show such a hand.
+        InputError: the recording does not show such a hand.
     """
-    from depthtrack.calibration.rig_calibration import calibrate_rig
-    from depthtrack.calibration.views import choose_views
+    from depthtrack.api.measuring import calibrate_rig
 
     with percent_bar() as show:
-        show("choosing frames", 0.0)
-        views = choose_views(sequence, segmenter)
-        return calibrate_rig(views, rig, _scorers(threads), seed, f"scaled on {sequence.name}", show)
-
-
-def _scorers(threads: int | None) -> "ScorerFactory":
-    """Return the factory of raster scorers, which use all cores by default."""
-    from functools import partial
-
-    from depthtrack.machine import usable_cores
-    from depthtrack.rendering.raster import RasterScorer
-
-    return partial(RasterScorer, threads=threads or usable_cores())
+        return calibrate_rig(sequence, rig, segmentation=segmentation, seed=seed, threads=threads, progress=show)

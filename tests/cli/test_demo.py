@@ -68,8 +68,8 @@ def test_the_hand_of_ones_own_recording_is_measured_first(
         hand = HandShape(scale=1.07)
         return SimpleNamespace(hand=hand, to_json=hand.to_json)
 
-    monkeypatch.setattr("depthtrack.calibration.calibrate.calibrate", measured)
-    monkeypatch.setattr("depthtrack.calibration.views.choose_views", lambda *_: [None] * 5)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_views", measured)
+    monkeypatch.setattr("depthtrack.api.measuring.choose_views", lambda *_: [None] * 5)
     for _ in range(2):
         assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
     assert asked == [5]
@@ -83,7 +83,7 @@ def test_a_hand_that_cannot_be_measured_is_taken_for_the_average(
     def refused(*_: Any) -> None:
         raise InputError("this recording shows no open hand")
 
-    monkeypatch.setattr("depthtrack.calibration.views.choose_views", refused)
+    monkeypatch.setattr("depthtrack.api.measuring.choose_views", refused)
     assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
     assert "shows no open hand" in capsys.readouterr().out
     for run in (tmp_path / "demo" / "runs").iterdir():

@@ -1,0 +1,77 @@
+"""Accept a path, a name or the object itself for a recording, a hand or a tracker."""
+
+from pathlib import Path
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import PRESETS, Camera
+from depthtrack.hand.hand_file import load_hand
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.hand_choice import chosen_hand
+from depthtrack.recording.registry import open_sequence
+from depthtrack.recording.sequence import OnDamage, Sequence
+from depthtrack.recording.sequences.base import BaseSequence
+from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.registry import tracker_config
+
+Recording = Sequence | Path | str
+"""A recording, or its path."""
+Hand = HandShape | Path | str | None
+"""A hand, the path of a hand file or rigged mesh, or None for the average adult's right hand."""
+
+
+def open_recording(
+    path: Path | str, camera: Camera | Path | str | None = None, on_damage: OnDamage = "refuse"
+) -> Sequence:
+    """Open a recording; frames are read one at a time.
+
+    camera: camera to use instead of the recording's own: a `Camera`, a preset such as "tum", or a `camera.json`.
+    on_damage: "refuse" raises an error at a frame that cannot be read, "skip" leaves it out.
+
+    Raises:
+        InputError: `path` holds no recording, or its camera is unknown.
+
+    Example:
+        recording = depthtrack.open_recording("my-hand")
+        print(len(recording), recording.camera, recording[0].depth.max())
+    """
+    if isinstance(camera, str) and camera in PRESETS:
+        camera = PRESETS[camera]
+    elif isinstance(camera, str | Path):
+        camera = Camera.from_json(Path(camera))
+    return open_sequence(path, camera, on_damage)
+
+
+def as_recording(recording: Recording) -> Sequence:
+    """Return the recording itself, opened if it is a path. Raises InputError."""
+    return open_sequence(recording) if isinstance(recording, str | Path) else recording
+
+
+def path_of(recording: Sequence) -> Path:
+    """Return the path of an opened recording.
+
+    Raises:
+        InputError: the recording was not read from a path.
+    """
+    if not isinstance(recording, BaseSequence):
+        raise InputError(f"the recording {recording.name} must have a path, found {type(recording).__name__}: open one")
+    return recording.path
+
+
+def as_hand(hand: Hand, recording: Sequence | None = None) -> HandShape:
+    """Return the hand itself, or the one that a path names.
+
+    "truth" stands for the recording's own sizes.
+
+    Raises:
+        InputError: the file holds no hand, or the recording has no sizes.
+    """
+    if isinstance(hand, HandShape):
+        return hand
+    if recording is not None:
+        return chosen_hand(recording, None if hand is None else str(hand))
+    return HandShape() if hand is None else load_hand(Path(hand))
+
+
+def as_config(tracker: str | TrackerConfig) -> TrackerConfig:
+    """Return the configuration itself, or the default one of a name. Raises InputError."""
+    return tracker_config(tracker) if isinstance(tracker, str) else tracker

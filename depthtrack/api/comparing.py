@@ -1,0 +1,97 @@
+"""Evaluate runs, and compare trackers on the same recordings."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from depthtrack.api.choices import Recording, as_recording, path_of
+from depthtrack.evaluation.compare.comparison import Comparison
+from depthtrack.evaluation.compare.comparison import compare as compare_runs
+from depthtrack.evaluation.compare.results import as_table, evaluate_runs, tracker_results, write_results
+from depthtrack.evaluation.compare.running import Source
+from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
+from depthtrack.evaluation.evaluate import Evaluation
+from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
+from depthtrack.evaluation.replay import Replay
+from depthtrack.evaluation.sweep.workers import chosen_workers
+from depthtrack.recording.run_folder import Run
+from depthtrack.report.build import write_report
+from depthtrack.tracking.configuration import TrackerConfig
+
+
+def evaluate(run: Run | Path | str, recording: Path | str | None = None, *, residuals: bool = True) -> Evaluation:
+    """Compare a run with its recording.
+
+    The figures are errors against ground truth, residuals, losses, jitter and time.
+
+    recording: where the recording is, if it was moved since.
+    residuals: segment each frame again, for the metrics that need no ground truth.
+
+    Raises:
+        InputError: the run or its recording cannot be read, or they do not belong together.
+
+    Example:
+        evaluation = depthtrack.evaluate("my-run")
+        for metric in evaluation.metrics:
+            print(metric.name, metric.statistics())
+    """
+    run = run if isinstance(run, Run) else Run.load(Path(run))
+    return evaluate_replay(Replay.open(run, None if recording is None else Path(recording)), residuals)
+
+
+def compare(
+    recordings: Sequence[Recording],
+    out: Path | str,
+    trackers: Sequence[str] | Mapping[str, TrackerConfig] = ("pso", "ik"),
+    *,
+    hand: Path | str | None = None,
+    frames: int | None = None,
+    repeats: int = 1,
+    seed: int = 0,
+    equal_ms: float | None = None,
+    jobs: int | None = None,
+) -> list[Evaluation]:
+    """Compare trackers on recordings, and write results and a report to `out`.
+
+    The runs are in `out`/runs; complete ones are kept if the same comparison is made again.
+
+    trackers: names with options, such as "ik:icp_iterations=3", or configurations by label.
+    hand: path of a hand file or rigged mesh, or "truth"; the average adult's right hand if absent.
+    frames: number of frames to track of each recording; all if absent.
+    repeats: runs per tracker and recording, with seeds from `seed` on.
+    equal_ms: CPU milliseconds a frame that each tracker may take; its work is chosen to fit.
+    jobs: processes, one per core if absent.
+
+    Returns:
+        One evaluation per run, recording by recording; `comparison_table` prints them.
+
+    Raises:
+        InputError: a recording or tracker cannot be used, or `out` holds another comparison.
+
+    Example:
+        evaluations = depthtrack.compare(["my-hand"], "my-comparison", ["pso", "ik"])
+        print(depthtrack.comparison_table(evaluations))
+    """
+    folder, workers = Path(out), chosen_workers(jobs)
+    if isinstance(trackers, Mapping):
+        specs = [TrackerSpec(label, config) for label, config in trackers.items()]
+    else:
+        specs = read_specs(trackers)
+    name = None if hand is None else str(hand)
+    sources = tuple(Source(str(_path(each)), hand=name, frames=frames) for each in recordings)
+    runs = compare_runs(Comparison(sources, tuple(specs), repeats, seed, equal_ms), folder, workers)
+    evaluations = list(evaluate_runs([Path(run.folder) for run in runs], workers))
+    write_results(evaluations, folder)
+    write_report(evaluations, folder / "report.html")
+    return evaluations
+
+
+def comparison_table(evaluations: Sequence[Evaluation]) -> str:
+    """Return a table for a terminal, one line per tracker and recording.
+
+    Figures are medians over the repeats.
+    """
+    return as_table(tracker_results(evaluations))
+
+
+def _path(recording: Recording) -> Path:
+    return Path(recording) if isinstance(recording, Path | str) else path_of(as_recording(recording))

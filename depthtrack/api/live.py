@@ -1,0 +1,162 @@
+"""Track frames that come from any source, one call per frame."""
+
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from depthtrack.api.choices import Hand, as_config, as_hand
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.machine import usable_cores
+from depthtrack.recording.sequence import Frame
+from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
+from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
+from depthtrack.tracking.random import checked_pose
+from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.tracker import Estimate, Tracker
+from depthtrack.types import Array, Depth, Image
+
+
+class HandTracker:
+    """Tracks a hand in frames that come from any source: a sensor, a network, a program.
+
+    Equal frames give equal bits. All frames of a recording give the poses that `depthtrack track` writes.
+    The segmentation uses colour if the first frame has colour.
+
+    Example:
+        with depthtrack.HandTracker(camera, tracker="ik") as tracker:
+            for depth, colour, seconds in sensor:
+                estimate = tracker.update(depth, colour, timestamp=seconds)
+                if estimate.status.is_trusted:
+                    print(tracker.keypoints(estimate))
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        hand: Hand = None,
+        tracker: str | TrackerConfig | Tracker = DEFAULT_TRACKER,
+        *,
+        segmentation: SegmentationOptions | None = None,
+        start_pose: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> None:
+        """Make a tracker for the frames of one camera.
+
+        hand: a hand, or the path of a hand file or rigged mesh; the average adult's right hand if absent.
+        tracker: name or configuration of a tracker, or a tracker of your own, made for the same hand.
+        segmentation: how the hand is found in a frame.
+        start_pose: (27,) pose in the first frame, metres, quaternion and radians, camera frame; searched if absent.
+        threads: threads of the renderer, one per core if absent; poses do not depend on it.
+
+        Raises:
+            InputError: there is no such tracker, or a file cannot be read.
+        """
+        self.camera, self.hand = camera, as_hand(hand)
+        if isinstance(tracker, str | TrackerConfig):
+            tracker = create_tracker(as_config(tracker), self.hand, threads or usable_cores())
+        self._tracker, self._model = tracker, HandModel(self.hand)
+        self._segmentation = segmentation or SegmentationOptions()
+        self._start_pose = None if start_pose is None else checked_pose(start_pose)
+        self._pipeline: Pipeline | None = None
+        self._last: TrackedFrame | None = None
+        self._closed = False
+
+    def update(self, depth: NDArray[Any], colour: Image | None = None, *, timestamp: float) -> Estimate:
+        """Track the hand into the next frame. An array that needs no conversion is not copied.
+
+        depth: (h, w) along the optical axis; floats in metres, or uint16 in units of `camera.depth_scale`; 0 = none.
+        colour: (h, w, 3) uint8 RGB registered to the depth.
+        timestamp: seconds on any clock, later than that of the frame before.
+
+        Returns:
+            The estimate; its `pose` (27,) is None if no hand was observed.
+
+        Raises:
+            InputError: an array has the wrong shape or type, depth is negative or not finite, or time stands still.
+        """
+        if self._closed:
+            raise InputError("the tracker must be open to track a frame, found it closed: make a new one")
+        last = self._last
+        frame = Frame(
+            0 if last is None else last.frame.index + 1,
+            _checked_time(timestamp, None if last is None else last.frame.timestamp),
+            _checked_depth(depth, self.camera),
+            None if colour is None else _checked_colour(colour, self.camera),
+            self.camera,
+        )
+        if self._pipeline is None:
+            segmenter = Segmenter.from_options(self._segmentation, has_colour=colour is not None)
+            self._pipeline = Pipeline(self._tracker, segmenter, self.hand, self._start_pose)
+        self._last = self._pipeline.step(frame)
+        return self._last.estimate
+
+    def keypoints(self, estimate: Estimate) -> Array:
+        """Return the keypoints (21, 3) of an estimate, metres, camera frame, in MediaPipe's order.
+
+        They are NaN if the estimate has no pose.
+        """
+        return np.full((21, 3), np.nan) if estimate.pose is None else self._model.keypoints(estimate.pose)
+
+    @property
+    def last(self) -> TrackedFrame | None:
+        """The last frame with its observation and estimate; None before the first one."""
+        return self._last
+
+    @property
+    def observation(self) -> Observation | None:
+        """The hand that was segmented in the last frame; None if none was found."""
+        return None if self._last is None else self._last.observation
+
+    def close(self) -> None:
+        """Free the tracker."""
+        if not self._closed:
+            self._closed = True
+            self._tracker.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _checked_time(timestamp: float, last: float | None) -> float:
+    """Return the time, seconds. Raises InputError unless it is finite and after `last`."""
+    time = float(timestamp)
+    if not np.isfinite(time):
+        raise InputError(f"the timestamp must be finite seconds, found {time}")
+    if last is not None and time <= last:
+        raise InputError(f"timestamps must increase: expected more than {last:g} s, found {time:g} s")
+    return time
+
+
+def _checked_depth(depth: NDArray[Any], camera: Camera) -> Depth:
+    """Return the depth (h, w) in metres. Raises InputError for a wrong shape, type or value."""
+    depth = np.asarray(depth)
+    if depth.shape != camera.shape:
+        raise InputError(f"depth must have the camera's shape {camera.shape} (height, width), found {depth.shape}")
+    if depth.dtype == np.uint16:
+        return camera.metres(depth)
+    if not np.issubdtype(depth.dtype, np.floating):
+        raise InputError(f"depth must be floats in metres or uint16 in units of depth_scale, found {depth.dtype}")
+    metres: Depth = np.ascontiguousarray(depth, dtype=np.float32)
+    if not (metres.min() >= 0 and metres.max() < np.inf):  # false for NaN
+        raise InputError("depth must be finite and not negative, found other values: set missing readings to 0")
+    return metres
+
+
+def _checked_colour(colour: Image, camera: Camera) -> Image:
+    """Return the colour image (h, w, 3). Raises InputError if its shape or type is wrong."""
+    colour = np.asarray(colour)
+    if colour.shape != (*camera.shape, 3) or colour.dtype != np.uint8:
+        expected = (*camera.shape, 3)
+        raise InputError(f"colour must be uint8 RGB of shape {expected}, found {colour.dtype} of {colour.shape}")
+    return np.ascontiguousarray(colour)

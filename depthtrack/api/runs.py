@@ -1,0 +1,151 @@
+"""Track recordings into run folders, and read and export runs."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import overload
+
+from depthtrack.api.choices import Hand, Recording, as_config, as_hand, as_recording, path_of
+from depthtrack.evaluation.replay import run_hand
+from depthtrack.export.joint_track import JointTrack
+from depthtrack.export.registry import export_joints
+from depthtrack.machine import usable_cores
+from depthtrack.recording.run_folder import Run
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
+from depthtrack.tracking.pipeline import TrackedFrame
+from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run_configuration import Start
+
+
+@overload
+def track(
+    recording: Recording,
+    hand: Hand = None,
+    tracker: str | TrackerConfig = DEFAULT_TRACKER,
+    *,
+    out: None = None,
+    resume: bool = False,
+    start: Start = "auto",
+    frames: int | None = None,
+    segmentation: SegmentationOptions | None = None,
+    threads: int | None = None,
+) -> Iterator[TrackedFrame]: ...
+
+
+@overload
+def track(
+    recording: Recording,
+    hand: Hand = None,
+    tracker: str | TrackerConfig = DEFAULT_TRACKER,
+    *,
+    out: Path | str,
+    resume: bool = False,
+    start: Start = "auto",
+    frames: int | None = None,
+    segmentation: SegmentationOptions | None = None,
+    threads: int | None = None,
+) -> Run: ...
+
+
+def track(
+    recording: Recording,
+    hand: Hand = None,
+    tracker: str | TrackerConfig = DEFAULT_TRACKER,
+    *,
+    out: Path | str | None = None,
+    resume: bool = False,
+    start: Start = "auto",
+    frames: int | None = None,
+    segmentation: SegmentationOptions | None = None,
+    threads: int | None = None,
+) -> Iterator[TrackedFrame] | Run:
+    """Track the hand of a recording; the poses are those of `depthtrack track`.
+
+    hand: a hand, the path of a hand file or rigged mesh, or "truth"; the average adult's right hand if absent.
+    tracker: name or configuration of a tracker: see `tracker_config`.
+    out: run folder to write; without it, frames are yielded as they are tracked.
+    resume: continue the run that `out` holds.
+    start: "auto" searches the hand, "truth" starts from the recording's true pose of its first frame.
+    frames: number of frames to track; all if absent.
+    segmentation: how the hand is found in a frame.
+    threads: threads of the renderer, one per core if absent; poses do not depend on it.
+
+    Returns:
+        The run if `out` is given, else an iterator over tracked frames. Poses (27,) are metres, quaternion and radians
+        in the camera frame.
+
+    Raises:
+        InputError: the recording, the hand, an option or the run folder cannot be used.
+
+    Example:
+        for each in depthtrack.track("my-hand", tracker="ik"):
+            print(each.frame.timestamp, each.estimate.status, each.estimate.pose)
+        run = depthtrack.track("my-hand", "hand.json", out="my-run")
+    """
+    sequence = as_recording(recording)
+    configuration = configure(
+        path_of(sequence),
+        sequence,
+        as_config(tracker),
+        as_hand(hand, sequence),
+        segmentation,
+        start=start,
+        frames=frames,
+        on_damage=getattr(sequence, "on_damage", "refuse"),
+    )
+    run = TrackingRun(configuration, sequence, threads or usable_cores())
+    if out is None:
+        return _tracked(run)
+    with run:
+        for _ in run.write(Path(out), resume):
+            pass
+    return Run.load(Path(out))
+
+
+def _tracked(run: TrackingRun) -> Iterator[TrackedFrame]:
+    with run:
+        yield from run.track()
+
+
+def read_run(folder: Path | str) -> Run:
+    """Read a run folder, whole or cut short.
+
+    Raises:
+        InputError: the folder holds no run, or a damaged one.
+
+    Example:
+        run = depthtrack.read_run("my-run")
+        print(run.timestamps.shape, run.poses.shape, run.status.count("lost"))
+    """
+    return Run.load(Path(folder))
+
+
+def joint_track(run: Run | Path | str) -> JointTrack:
+    """Return the poses (T, 27) and keypoints (T, 21, 3) of a run.
+
+    Both are in metres in the camera frame, and NaN without a pose.
+
+    Raises:
+        InputError: the folder holds no run, or its hand is malformed.
+
+    Example:
+        index_tip = depthtrack.joint_track("my-run").keypoints[:, 8]
+    """
+    run = run if isinstance(run, Run) else read_run(run)
+    return JointTrack.of(run, run_hand(run))
+
+
+def export_run(run: Run | Path | str, out: Path | str, format: str | None = None) -> JointTrack:
+    """Write the poses and keypoints of a run to a file, and return them.
+
+    format: one of `EXPORTERS`; by default the only one with the suffix of `out`.
+
+    Raises:
+        InputError: the format does not exist or does not fit `out`, or the file cannot be written.
+
+    Example:
+        depthtrack.export_run("my-run", "joints.csv")
+    """
+    track = joint_track(run)
+    export_joints(Path(out), track, format)
+    return track

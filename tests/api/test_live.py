@@ -1,0 +1,116 @@
+"""Pushed frames: the same bits as the command, and checks of what is pushed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import depthtrack as dt
+from depthtrack.cli import main
+from depthtrack.tracking.configuration import CONFIGURATIONS
+from depthtrack.tracking.pipeline import NoTracker
+
+CAMERA = dt.Camera(32, 24, 30.0, 30.0, 15.5, 11.5, 0.0002)
+DEPTH = np.full(CAMERA.shape, 0.5, np.float32)
+COLOUR = np.zeros((*CAMERA.shape, 3), np.uint8)
+
+
+def blind(**options: Any) -> dt.HandTracker:
+    """Return a tracker that finds nothing."""
+    return dt.HandTracker(CAMERA, tracker=NoTracker(), **options)
+
+
+@pytest.mark.parametrize("name", CONFIGURATIONS)
+def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, name: str) -> None:
+    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1"]) == 0
+    run = dt.read_run(tmp_path / "run")
+    recording = dt.open_recording(path)
+    with dt.HandTracker(recording.camera, tracker=name) as tracker:
+        for frame, pose, energy, status in zip(recording, run.poses, run.energy, run.status, strict=True):
+            estimate = tracker.update(frame.depth, frame.colour, timestamp=frame.timestamp)
+            assert estimate.status is status
+            assert estimate.pose is not None
+            assert estimate.pose.tobytes() == pose.tobytes()
+            assert estimate.energy == energy
+
+
+def test_stored_units_and_doubles_mean_the_same_as_metres(path: Path) -> None:
+    recording = dt.open_recording(path)
+    camera, frame = recording.camera, recording[0]
+    units = np.rint(frame.depth / camera.depth_scale).astype(np.uint16)
+    assert camera.metres(units).tobytes() == frame.depth.tobytes()
+    poses = []
+    for depth in (frame.depth, units, frame.depth.astype(np.float64)):
+        with dt.HandTracker(camera, tracker=dt.tracker_config("ik", resolution=64)) as tracker:
+            poses.append(tracker.update(depth, timestamp=0.0).pose)
+    assert poses[0] is not None
+    assert all(pose is not None and pose.tobytes() == poses[0].tobytes() for pose in poses)
+
+
+def test_keypoints_and_observation_of_the_last_frame(path: Path) -> None:
+    recording = dt.open_recording(path)
+    frame, truth = recording[0], recording.ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    options = {"hand": dt.HandShape(), "start_pose": truth.poses[0]}
+    with dt.HandTracker(recording.camera, tracker=dt.tracker_config("ik", resolution=64), **options) as tracker:
+        estimate = tracker.update(frame.depth, frame.colour, timestamp=12.5)
+        assert estimate.status is dt.Status.STARTED
+        assert tracker.observation is not None
+        assert tracker.observation.timestamp == 12.5
+        true_keypoints = dt.HandModel(dt.HandShape()).keypoints(truth.poses[0])
+        assert np.linalg.norm(tracker.keypoints(estimate) - true_keypoints, axis=1).mean() < 0.005
+
+
+def test_a_frame_without_a_hand_has_no_pose() -> None:
+    with blind() as tracker:
+        estimate = tracker.update(np.zeros_like(DEPTH), timestamp=0)
+        assert (estimate.pose, estimate.status) == (None, dt.Status.ABSENT)
+        assert np.isnan(tracker.keypoints(estimate)).all()
+        assert tracker.observation is None
+
+
+@pytest.mark.parametrize(
+    ("depth", "colour", "timestamp", "expected"),
+    [
+        (DEPTH.T, None, 2, "camera's shape"),
+        (DEPTH.astype(np.int32), None, 2, "uint16"),
+        (np.where(DEPTH > 0, np.nan, DEPTH), None, 2, "finite"),
+        (np.where(DEPTH > 0, np.inf, DEPTH), None, 2, "finite"),
+        (-DEPTH, None, 2, "not negative"),
+        (DEPTH, COLOUR[..., :1], 2, "uint8 RGB"),
+        (DEPTH, COLOUR.astype(np.float32), 2, "uint8 RGB"),
+        (DEPTH, None, 1, "must increase"),
+        (DEPTH, None, float("nan"), "finite seconds"),
+    ],
+)
+def test_unusable_frames_are_refused_and_leave_the_tracker_as_it_was(
+    depth: Any, colour: Any, timestamp: float, expected: str
+) -> None:
+    with blind() as tracker:
+        tracker.update(DEPTH, timestamp=1)
+        with pytest.raises(dt.InputError, match=expected):
+            tracker.update(depth, colour, timestamp=timestamp)
+        tracker.update(DEPTH, timestamp=1.5)
+
+
+def test_a_closed_tracker_and_unknown_choices_are_refused(tmp_path: Path) -> None:
+    tracker = blind()
+    tracker.close()
+    tracker.close()
+    with pytest.raises(dt.InputError, match="closed"):
+        tracker.update(DEPTH, timestamp=0)
+    with pytest.raises(dt.InputError, match="no tracker 'magic'"):
+        dt.HandTracker(CAMERA, tracker="magic")
+    with pytest.raises(dt.InputError, match=r"hand\.json"):
+        dt.HandTracker(CAMERA, tmp_path / "hand.json")
+    with pytest.raises(dt.InputError, match="start pose"):
+        blind(start_pose=np.zeros(3))
+
+
+def test_metres_in_single_precision_are_not_copied() -> None:
+    with blind() as tracker:
+        tracker.update(depth := np.zeros_like(DEPTH), timestamp=0)
+        assert tracker.last is not None
+        assert tracker.last.frame.depth is depth

@@ -1,0 +1,36 @@
+"""Calibration from Python. Its accuracy is tested in tests/calibration."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import depthtrack as dt
+from depthtrack.api import measuring
+from depthtrack.api.choices import Recording
+
+
+@pytest.mark.parametrize("as_object", [False, True])
+def test_the_arguments_reach_the_calibration(path: Path, monkeypatch: pytest.MonkeyPatch, as_object: bool) -> None:
+    seen: list[Any] = []
+    stages: list[str] = []
+
+    def calibrate(views: Any, scorer: Any, side: Any, seed: Any, source: Any, progress: Any) -> str:
+        seen.extend((len(views), side, seed, source))
+        with scorer(dt.HandShape()):
+            progress("measuring", 1.0)
+        return "a calibration"
+
+    monkeypatch.setattr(measuring, "choose_views", lambda sequence, segmenter: list(sequence))
+    monkeypatch.setattr(measuring, "calibrate_views", calibrate)
+    recording: Recording = dt.open_recording(path) if as_object else str(path)
+    found: Any = dt.calibrate(recording, "left", seed=3, progress=lambda stage, share: stages.append(stage))
+    assert found == "a calibration"
+    assert seen == [4, "left", 3, "calibrated on everyday"]
+    assert stages == ["choosing frames", "measuring"]
+
+
+def test_only_rigs_are_scaled(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measuring, "choose_views", lambda sequence, segmenter: [])
+    with pytest.raises(dt.InputError, match="rigged mesh"):
+        dt.calibrate_rig(path, dt.HandShape())
