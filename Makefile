@@ -30,10 +30,10 @@ lint: .venv/.ready-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-# Broken links and references between pages are errors.
+# Broken links and references between pages are errors. With --quiet, mkdocs would not count them.
 docs: .venv/.ready-docs
 	$(BIN)/python tools/generate_parameters.py
-	$(BIN)/mkdocs build --quiet
+	$(BIN)/mkdocs build
 	@echo "pages: out/docs/index.html"
 
 clean:

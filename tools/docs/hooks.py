@@ -27,6 +27,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, "examples.md", content=examples_page()))
     packages = list(package_pages())
     files.append(File.generated(config, "api/index.md", content=api_page([name for name, _ in packages])))
+    pages = [{"Public names": "api/index.md"}, *({f"depthtrack.{name}": f"api/{name}.md"} for name, _ in packages)]
+    config.nav = [{"API": pages} if "API" in entry else entry for entry in config.nav or []]
     for name, text in packages:
         files.append(File.generated(config, f"api/{name}.md", content=text))
     return files
