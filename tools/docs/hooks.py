@@ -27,7 +27,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, "examples.md", content=examples_page()))
     packages = list(package_pages())
     files.append(File.generated(config, "api/index.md", content=api_page([name for name, _ in packages])))
-    pages = [{"Public names": "api/index.md"}, *({f"depthtrack.{name}": f"api/{name}.md"} for name, _ in packages)]
+    pages = [{"Public names": "api/index.md"}, *({name: f"api/{name}.md"} for name, _ in packages)]
     config.nav = [{"API": pages} if "API" in entry else entry for entry in config.nav or []]
     for name, text in packages:
         files.append(File.generated(config, f"api/{name}.md", content=text))
@@ -68,7 +68,7 @@ def api_page(packages: list[str]) -> str:
             *rows,
             "\n## Packages\n",
             "All modules. Names outside the table above may change in a minor version.\n",
-            *(f"- [depthtrack.{name}]({name}.md)" for name in packages),
+            *(f"- [{name}]({name}.md)" for name in packages),
         ]
     )
 
@@ -95,9 +95,16 @@ def summary(place: str) -> str:
 
 
 def package_pages() -> Iterator[tuple[str, str]]:
-    """Yield name and page of each package, without the command line."""
+    """Yield title and page of each package, without the command line, and of the single modules."""
+    modules = [path for path in sorted(PACKAGE.glob("*.py")) if not path.name.startswith("__")]
+    yield "depthtrack", reference("depthtrack: single modules", modules)
     for folder in sorted(path for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()):
         modules = [path for path in sorted(folder.rglob("*.py")) if path.name != "__init__.py"]
         if folder.name != "cli" and modules:
-            names = (path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for path in modules)
-            yield folder.name, "\n".join([f"# depthtrack.{folder.name}\n", *(f"::: {name}\n" for name in names)])
+            yield f"depthtrack.{folder.name}", reference(f"depthtrack.{folder.name}", modules)
+
+
+def reference(title: str, modules: list[Path]) -> str:
+    """Return a page of modules, for mkdocstrings to fill."""
+    names = (path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for path in modules)
+    return "\n".join([f"# {title}\n", *(f"::: {name}\n" for name in names)])
