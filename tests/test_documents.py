@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from depthtrack import __version__
 from depthtrack.options import parameters
 from depthtrack.tracking.configuration import CONFIGURATIONS
 from tests.test_architecture import LAYERS
@@ -84,6 +85,23 @@ def test_architecture_lists_the_packages_in_import_order() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|", text, re.MULTILINE)
     assert [tuple(re.findall(r"`(\w+)`", row)) for row in rows] == list(LAYERS)
+
+
+def test_citation_and_changelog_state_the_version() -> None:
+    citation, changelog = ((ROOT / name).read_text(encoding="utf-8") for name in ("CITATION.cff", "CHANGELOG.md"))
+    assert f"\nversion: {__version__}\n" in citation
+    assert f"\n## [{__version__}] - " in changelog
+
+
+def test_figures_of_readme_are_those_of_the_benchmarks() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| what \| the papers .*\n((?:\|.*\n)+)", text, re.MULTILINE)
+    named, known = (
+        set(re.findall(r"\d+(?:\.\d+)?", part))
+        for part in (table, (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"))
+    )
+    assert len(table.splitlines()) == 1 + 5
+    assert named - known == set()
 
 
 @PAGES
