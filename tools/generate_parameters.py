@@ -58,7 +58,7 @@ def _table(options: list[Parameter], flag: bool) -> str:
     """Return a table with one row per option; names as on the command line if `flag`."""
     rows = [("option", "unit", "default", "meaning", "source"), ("---",) * 5]
     for each in options:
-        name = f"`--{each.name.replace('_', '-')}`" if flag else f"`{each.name}`"
+        name = f"`--{each.name.replace('_', '-')}`" if flag else f"`{each.path}`"
         star = r" \*" if flag and each.advanced else ""
         rows.append((name + star, each.unit, _text(each.default), each.meaning, each.source))
     return "".join("| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |\n" for row in rows)
