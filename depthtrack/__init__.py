@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from depthtrack.api.choices import open_hand as open_hand
     from depthtrack.api.choices import open_recording as open_recording
     from depthtrack.api.comparing import compare as compare
     from depthtrack.api.comparing import comparison_table as comparison_table
@@ -30,13 +31,13 @@ if TYPE_CHECKING:
     from depthtrack.export.joint_track import JointTrack as JointTrack
     from depthtrack.export.registry import EXPORTERS as EXPORTERS
     from depthtrack.geometry.camera import Camera as Camera
-    from depthtrack.hand.hand_file import load_hand as load_hand
     from depthtrack.hand.kinematics import KEYPOINT_NAMES as KEYPOINT_NAMES
     from depthtrack.hand.kinematics import HandModel as HandModel
     from depthtrack.hand.shape import HandShape as HandShape
     from depthtrack.hand.synergies import Synergies as Synergies
     from depthtrack.recording.run_folder import Run as Run
     from depthtrack.recording.sequence import Frame as Frame
+    from depthtrack.recording.sequence import GroundTruth as GroundTruth
     from depthtrack.recording.sequence import Sequence as Sequence
     from depthtrack.recording.status import Status as Status
     from depthtrack.rendering.backends import create_scorer as create_scorer
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
     from depthtrack.tracking.tracker import Estimate as Estimate
 
 _MODULES = {
-    "api.choices": ("open_recording",),
+    "api.choices": ("open_hand", "open_recording"),
     "api.comparing": ("compare", "comparison_table", "evaluate"),
     "api.live": ("HandTracker",),
     "api.measuring": ("calibrate", "calibrate_rig"),
@@ -62,12 +63,11 @@ _MODULES = {
     "export.joint_track": ("JointTrack",),
     "export.registry": ("EXPORTERS",),
     "geometry.camera": ("Camera",),
-    "hand.hand_file": ("load_hand",),
     "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),
     "recording.run_folder": ("Run",),
-    "recording.sequence": ("Frame", "Sequence"),
+    "recording.sequence": ("Frame", "GroundTruth", "Sequence"),
     "recording.status": ("Status",),
     "rendering.backends": ("create_scorer",),
     "segmentation.observation": ("Observation",),

@@ -1,22 +1,39 @@
-"""The examples run, and come to what they claim."""
+"""The examples run, and their results are as stated."""
 
 import re
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+import depthtrack as dt
+from depthtrack.calibration.calibrate import Measured
 from depthtrack.hand.synergies import load_synergies
-from tests.support.runs import synthesise
 
 FOLDER = Path(__file__).parent.parent / "examples"
-MOST_LINES = 40
+FILES = sorted(FOLDER.glob("*.py"))
+MOST_LINES = 60
+FRAMES = 4
 
 
-def example(name: str) -> ModuleType:
-    spec = spec_from_file_location(name, FOLDER / f"{name}.py")
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("examples") / "everyday"
+    dt.synthesise("everyday", folder, model="skin", frames=FRAMES)
+    return str(folder)
+
+
+@pytest.fixture(scope="module")
+def run(recording: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(dt.track(recording, tracker="ik", out=tmp_path_factory.mktemp("examples") / "run").folder)
+
+
+def example(number: int) -> ModuleType:
+    (path,) = FOLDER.glob(f"{number:02}_*.py")
+    spec = spec_from_file_location(f"example_{path.stem}", path)
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
@@ -24,38 +41,85 @@ def example(name: str) -> ModuleType:
     return module
 
 
-def test_examples_are_short_and_all_of_them_are_tested() -> None:
-    tested = set(re.findall(r'example\("(\w+)"\)', Path(__file__).read_text()))
-    files = list(FOLDER.glob("*.py"))
-    assert {file.stem for file in files} == tested
-    assert all(len(file.read_text().splitlines()) <= MOST_LINES for file in files)
+def test_examples_are_numbered_short_listed_and_tested() -> None:
+    assert [int(file.stem[:2]) for file in FILES] == list(range(1, len(FILES) + 1))
+    assert len(FILES) >= 10
+    assert all(len(file.read_text().splitlines()) < MOST_LINES for file in FILES)
+    listed = re.findall(r"^\| \[(\w+\.py)\]\(\1\) \| .+ \|$", (FOLDER / "README.md").read_text(), re.MULTILINE)
+    assert listed == [file.name for file in FILES]
+    tested = set(re.findall(r"example\((\d+)\)", Path(__file__).read_text()))
+    assert tested == {str(number) for number in range(1, len(FILES) + 1)}
 
 
-def test_tracking_follows_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = synthesise(tmp_path / "everyday", 4, "--model", "skin")
-    assert example("track_recording").main(str(recording)) == 4
-    lines = capsys.readouterr().out.splitlines()[-4:]
-    depths = [float(line.split()[-2]) for line in lines]
-    assert all(400 < depth < 600 for depth in depths)
+def test_01_a_replay_prints_each_frame(recording: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert example(1).main(recording) == FRAMES
+    lines = capsys.readouterr().out.splitlines()
+    assert all(400 < float(line.split()[-2]) < 600 for line in lines)
 
 
-def test_a_benchmark_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    report = example("synthetic_benchmark").main(str(tmp_path), frames=2, distances=(0.5,), jobs=1)
+def test_02_pushed_frames_are_tracked(recording: str) -> None:
+    openings = example(2).main(recording)
+    assert openings.shape == (FRAMES,)
+    assert np.all((openings > 0.01) & (openings < 0.2))
+
+
+def test_03_a_measured_hand_is_tracked(
+    recording: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The measurement itself takes a minute, and is tested in tests/calibration."""
+    hand, nothing = dt.HandShape(scale=1.05), np.zeros((0, 27))
+    calibration = dt.Calibration(hand, {"palm width": Measured(82.0, 1.5, 0.9)}, None, 3.0, 2.0, (), nothing, nothing)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_views", lambda *_: calibration)
+    run = example(3).main(recording, str(tmp_path / "hand.json"), str(tmp_path / "run"))
+    assert "palm width         82.0 mm" in capsys.readouterr().out
+    assert run.configuration["hand"] == hand.to_fields()
+
+
+def test_04_a_benchmark_measures_each_distance(tmp_path: Path) -> None:
+    errors = example(4).main(str(tmp_path), frames=2, distances=(0.5, 0.8))
+    assert list(errors) == [0.5, 0.8]
+    assert all(error < 20 for error in errors.values())
+
+
+def test_05_a_comparison_makes_a_report(recording: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report = example(5).main(str(tmp_path), recording, frames=2, jobs=1)
     assert report.exists()
-    assert "at-0.5-m" in capsys.readouterr().out
+    assert "ik, 2 iterations" in capsys.readouterr().out
 
 
-def test_the_truth_has_the_lowest_energy() -> None:
-    energies = example("score_hypotheses").main(count=60)
-    assert energies.argmin() == 0
-    assert np.median(energies[:20]) < np.median(energies[40:])
+def test_06_energies_grow_with_the_distance_from_the_truth(tmp_path: Path) -> None:
+    energies = example(6).main(str(tmp_path), count=60)
+    assert energies[0] < 1.05 * energies.min()
+    medians = [float(np.median(part)) for part in np.array_split(energies, 3)]
+    assert all(near < far for near, far in pairwise(medians))
 
 
-def test_synergies_are_fitted_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    synergies = example("fit_synergies").main(None, str(tmp_path / "synergies.json"))
+def test_07_synergies_are_fitted_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    synergies = example(7).main(str(tmp_path / "synergies.json"))
     shares = [float(share) for share in re.findall(r"([\d.]+)% of the variance", capsys.readouterr().out)]
     assert shares == sorted(shares)
     assert shares[-1] > 90
-    np.testing.assert_allclose(
-        load_synergies(tmp_path / "synergies.json").variances, synergies.variances, rtol=1e-3, atol=1e-9
-    )
+    written = load_synergies(tmp_path / "synergies.json")
+    np.testing.assert_allclose(written.variances, synergies.variances, rtol=1e-3, atol=1e-9)
+
+
+def test_08_an_own_stage_follows_the_hand(recording: str) -> None:
+    estimates = example(8).main(recording)
+    assert [estimate.status for estimate in estimates] == [dt.Status.STARTED] + [dt.Status.TRACKED] * (FRAMES - 1)
+    assert "random_steps" in estimates[-1].stage_ms
+
+
+def test_09_an_own_metric_is_computed(run: str) -> None:
+    metric = example(9).main(run)
+    assert metric.values.shape == (FRAMES,)
+    assert np.all(metric.values < 10)
+
+
+def test_10_an_own_rig_is_recorded_and_tracked(own_glb: Path, tmp_path: Path) -> None:
+    assert example(10).main(str(own_glb), str(tmp_path), frames=2) < 5
+
+
+def test_11_a_run_is_exported(run: str, tmp_path: Path) -> None:
+    track = example(11).main(run, str(tmp_path / "joints.csv"))
+    assert len((tmp_path / "joints.csv").read_text().splitlines()) == FRAMES + 1
+    assert track.keypoints.shape == (FRAMES, 21, 3)

@@ -57,18 +57,23 @@ def path_of(recording: Sequence) -> Path:
     return recording.path
 
 
-def as_hand(hand: Hand, recording: Sequence | None = None) -> HandShape:
-    """Return the hand itself, or the one that a path names.
+def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShape:
+    """Return the hand that a path or name stands for.
 
-    "truth" stands for the recording's own sizes.
+    hand: path of a hand file (hand.json) or rigged mesh (.glb, .gltf), or "truth" for the recording's own sizes.
+        A hand is returned as it is. The average adult's right hand is returned if it is absent.
 
     Raises:
         InputError: the file holds no hand, or the recording has no sizes.
+
+    Example:
+        hand = depthtrack.open_hand("hand.json")
+        tips = depthtrack.HandModel(hand).keypoints(pose)[4::4]
     """
     if isinstance(hand, HandShape):
         return hand
     if recording is not None:
-        return chosen_hand(recording, None if hand is None else str(hand))
+        return chosen_hand(as_recording(recording), None if hand is None else str(hand))
     return HandShape() if hand is None else load_hand(Path(hand))
 
 

@@ -6,7 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.api.choices import Hand, as_config, as_hand
+from depthtrack.api.choices import Hand, as_config, open_hand
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
@@ -57,7 +57,7 @@ class HandTracker:
         Raises:
             InputError: there is no such tracker, or a file cannot be read.
         """
-        self.camera, self.hand = camera, as_hand(hand)
+        self.camera, self.hand = camera, open_hand(hand)
         if isinstance(tracker, str | TrackerConfig):
             tracker = create_tracker(as_config(tracker), self.hand, threads or usable_cores())
         self._tracker, self._model = tracker, HandModel(self.hand)

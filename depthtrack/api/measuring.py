@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from depthtrack.api.choices import Hand, Recording, as_hand, as_recording
+from depthtrack.api.choices import Hand, Recording, as_recording, open_hand
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.calibrate import calibrate as calibrate_views
 from depthtrack.calibration.pose_search import Progress, ScorerFactory
@@ -71,7 +71,7 @@ def calibrate_rig(
         calibration = depthtrack.calibrate_rig("my-hand", "hand.glb")
         print(calibration.hand.scale)
     """
-    sequence, hand = as_recording(recording), as_hand(rig)
+    sequence, hand = as_recording(recording), open_hand(rig)
     views = _views(sequence, segmentation, progress)
     return calibrate_rig_on_views(views, hand, _scorers(threads), seed, f"scaled on {sequence.name}", progress)
 

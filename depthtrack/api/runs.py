@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import overload
 
-from depthtrack.api.choices import Hand, Recording, as_config, as_hand, as_recording, path_of
+from depthtrack.api.choices import Hand, Recording, as_config, as_recording, open_hand, path_of
 from depthtrack.evaluation.replay import run_hand
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.export.registry import export_joints
@@ -87,7 +87,7 @@ def track(
         path_of(sequence),
         sequence,
         as_config(tracker),
-        as_hand(hand, sequence),
+        open_hand(hand, sequence),
         segmentation,
         start=start,
         frames=frames,
