@@ -12,8 +12,9 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.machine import usable_cores
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
 from depthtrack.tracking.random import checked_pose

@@ -13,8 +13,9 @@ from depthtrack.hand.shape import Side
 from depthtrack.machine import usable_cores
 from depthtrack.recording.sequence import Sequence
 from depthtrack.rendering.raster import RasterScorer
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.segmenter import Segmenter
 
 
 def calibrate(

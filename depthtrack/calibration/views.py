@@ -8,8 +8,9 @@ import numpy as np
 from depthtrack.calibration.options import ViewChoiceOptions
 from depthtrack.errors import InputError
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.observation import Observation, Segmenter
-from depthtrack.segmentation.surface_grid import disc
+from depthtrack.segmentation.morphology import disc
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.selection import distinct
 
 

@@ -50,8 +50,8 @@ class Command:
 
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
-        from depthtrack.segmentation.observation import Segmenter
         from depthtrack.segmentation.options import SegmentationOptions
+        from depthtrack.segmentation.segmenter import Segmenter
 
         if self.hands != HandOptions() and self.tracker is None:
             raise InputError("--hand and --side are for a tracker: give one with --tracker ik or --tracker pso")

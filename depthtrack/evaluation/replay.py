@@ -12,7 +12,8 @@ from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.hand_surface import HandSurface
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import replay_frames
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.state import TrackState

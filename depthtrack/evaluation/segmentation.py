@@ -10,7 +10,8 @@ import numpy as np
 from depthtrack.evaluation.metrics import silhouette_iou
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import NoTracker, Pipeline, track_frames
 from depthtrack.tracking.tracker import Tracker
 from depthtrack.types import Mask

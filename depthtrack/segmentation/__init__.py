@@ -1,1 +1,1 @@
-"""From an RGB-D frame to what a tracker sees."""
+"""Segmentation: from an RGB-D frame to the observation of its hand."""

@@ -1,30 +1,39 @@
-"""Flying pixels: readings between a surface and what is behind it, where a pixel saw both.
+"""Flying pixels: readings between a surface and its background, at pixels that receive light from both.
 
-Time-of-flight sensors mix what a pixel sees into one depth (Foix, Alenya and Torras, "Lock-in time-of-flight (ToF)
-cameras: a survey", IEEE Sensors Journal 2011): fingers get rims, and wisps reach from their tips into nothing.
+Time-of-flight sensors mix both distances into one (Foix, Alenya and Torras, "Lock-in time-of-flight (ToF) cameras: a
+survey", IEEE Sensors Journal 2011). Fingers get rims, and streaks extend from their tips.
 """
 
 import numba
 import numpy as np
 
+from depthtrack.segmentation.options import FlyingPixelOptions
 from depthtrack.types import Depth, Mask
 
-STEEPEST = 6.0
-"""Tangent of the angle to the image plane beyond which no surface returns enough light: 80 degrees."""
 
+def flying_pixels(depth: Depth, focal: float, options: FlyingPixelOptions | None = None) -> Mask:
+    """Return the mask (h, w) of flying pixels.
 
-def flying_pixels(depth: Depth, focal: float) -> Mask:
-    """Which readings of a depth image (h, w; metres) of `focal` pixels hang in the air: along a row or a column, behind
-    a neighbour by more than a surface of STEEPEST slope would be, and not within that of the one on the other side."""
+    A flying pixel is behind a neighbour in its row or column by more than the steepest surface. No neighbour in that
+    row or column is within the steepest surface.
+
+    depth: (h, w), metres.
+    focal: focal length, pixels.
+    """
+    options = options or FlyingPixelOptions()
     out = np.zeros(depth.shape, dtype=np.bool_)
-    mark_flying(np.ascontiguousarray(depth), STEEPEST / focal, out)
+    mark_flying_pixels(np.ascontiguousarray(depth), options.steepest / focal, out)
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def mark_flying(depth: Depth, slope: float, out: Mask) -> None:
-    """True into `out` (h, w) where a reading is farther than `slope` times its depth from all readings beside it in its
-    row, or in its column, and behind one of them."""
+def mark_flying_pixels(depth: Depth, slope: float, out: Mask) -> None:
+    """Set the flying pixels of a depth image in `out`.
+
+    depth: (h, w), metres.
+    slope: largest depth step to the next pixel on a surface, as a share of the depth.
+    out: (h, w).
+    """
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
@@ -33,12 +42,12 @@ def mark_flying(depth: Depth, slope: float, out: Mask) -> None:
                 continue
             most = slope * z
             for dv, du in ((0, 1), (1, 0)):
-                held, behind = False, False
+                supported, behind = False, False
                 for side in (-1, 1):
                     i, j = v + side * dv, u + side * du
                     if 0 <= i < height and 0 <= j < width and depth[i, j] > 0.0:
                         step = z - depth[i, j]
-                        held |= abs(step) <= most
+                        supported |= abs(step) <= most
                         behind |= step > most
-                if behind and not held:
+                if behind and not supported:
                     out[v, u] = True

@@ -1,85 +1,87 @@
-"""Which of the palms that are seen is the hand's: anywhere in the view at first, then near where it was."""
+"""Detection of the hand among palm candidates: anywhere in the image at first, then near its last position."""
 
 import numpy as np
 
 from depthtrack.segmentation.forearm import find_arm
 from depthtrack.segmentation.grid import Grid
-from depthtrack.segmentation.palm import SMALLEST_AREA, Palm, find_palms, finger_area
-from depthtrack.segmentation.wrist import narrowest_place
+from depthtrack.segmentation.hand_size import HandSize
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.palm import Palm, find_palms, visible_finger_area
+from depthtrack.segmentation.wrist import narrowest_distance
 from depthtrack.segmentation.wrist_filter import anatomical_guess
 from depthtrack.types import Array
 
-SLICE, SLICE_STEP = 0.35, 0.2
-"""Metres: a start looks at the nearest things first, in slices this thick: a hand and a forearm that points away."""
 
-LARGEST_STEP = 0.12
-"""Metres that a palm moves between frames, at most: 3.6 m/s at 30 Hz. What is farther is something else."""
+class HandDetector:
+    """Chooses the palm of the hand by its cost, in metres of distance.
 
-SAME_PALM = 0.05
-"""Metres within which of its last position a broad palm needs no comparison with others."""
-
-# What speaks for a palm, in metres of distance that it makes up for. The weights are ours, chosen on 425 frames, 90 of
-# them real, each taken alone: in 423 the hand cost least of all that looked like a palm.
-DISTANCE_WEIGHT = 0.25
-START_BREADTH_BONUS, BROAD_ENOUGH = 5.0, 0.028
-FOLLOWED_BREADTH_COST, BROAD_PALM = 3.0, 0.042
-FINGER_BONUS, FINGERS_AREA = 0.2, 40e-4
-WRIST_COST, USUAL_WRIST, FARTHEST_WRIST = 1.5, 0.06, 0.21
-NO_ARM_COST = 0.1
-
-
-def find_start(grid: Grid, surface: Grid, lost: Array | None = None) -> Array | None:
-    """Where a hand is (3,), metres, among the nodes of `surface` that may be hand; nearest things first.
-
-    `lost` (3,) is where it was a moment ago, if it was seen.
+    hand: sizes of the hand; they may be replaced at any time.
     """
-    depths = np.sort(surface.depth[surface.depth > 0])
-    area = np.cumsum(depths**2) / (grid.focal[0] * grid.focal[1])
-    if area.size == 0 or area[-1] < SMALLEST_AREA:
+
+    def __init__(self, options: SegmentationOptions, hand: HandSize) -> None:
+        self._options, self.hand = options, hand
+
+    def detect(self, grid: Grid, candidates: Grid, lost: Array | None = None) -> Array | None:
+        """Return the palm's centre (3,) of a hand anywhere on a grid, or None; nearest surfaces first.
+
+        candidates: the grid with only the nodes that may be hand.
+        lost: (3,) last position of the hand, if it is recent, metres, camera frame.
+        """
+        options, least_area = self._options.detection, self._options.palm.least_area
+        depths = np.sort(candidates.depth[candidates.depth > 0])
+        area = np.cumsum(depths**2) / (grid.focal[0] * grid.focal[1])
+        if area.size == 0 or area[-1] < least_area:
+            return None
+        # Up to here, all visible surfaces together are smaller than a hand.
+        start = float(depths[np.searchsorted(area, least_area)])
+        while start < depths[-1]:
+            part = (grid.depth > start - options.slice_step) & (grid.depth < start + options.slice_depth)
+            near, hands = grid.within(part), candidates.within(part)
+            palms = list(find_palms(near, hands, self._options.palm))
+            if palms:
+                return min(palms, key=lambda palm: self.start_cost(near, hands, palm, lost)).centre
+            start += options.slice_step
         return None
-    # Up to here, everything visible together is too small to be a hand.
-    start = float(depths[np.searchsorted(area, SMALLEST_AREA)])
-    while start < depths[-1]:
-        part = (grid.depth > start - SLICE_STEP) & (grid.depth < start + SLICE)
-        near, hands = grid.within(part), surface.within(part)
-        palms = list(find_palms(near, hands))
-        if palms:
-            return min(palms, key=lambda palm: start_cost(near, hands, palm, lost)).centre
-        start += SLICE_STEP
-    return None
 
+    def start_cost(self, grid: Grid, candidates: Grid, palm: Palm, lost: Array | None) -> float:
+        """Return the distance of a palm less the bonuses for breadth, fingers and a wrist right behind it, metres."""
+        options = self._options.detection
+        finger_area = visible_finger_area(candidates, palm, self._options.palm)
+        fingers = options.finger_bonus * min(finger_area / options.all_fingers_area, 1)
+        distance = options.distance_weight * float(palm.centre[2])
+        if lost is not None:
+            distance += float(np.linalg.norm(palm.centre - lost))
+        breadth = options.start_radius_bonus * min(palm.radius, options.rewarded_palm_radius)
+        return distance + self._wrist_cost(grid, palm) - breadth - fingers
 
-def start_cost(grid: Grid, surface: Grid, palm: Palm, lost: Array | None) -> float:
-    """Metres: how far a palm is, less what speaks for it: breadth, fingers, and a wrist right behind it."""
-    fingers = FINGER_BONUS * min(finger_area(surface, palm) / FINGERS_AREA, 1)
-    distance = DISTANCE_WEIGHT * float(palm.centre[2])
-    if lost is not None:
-        distance += float(np.linalg.norm(palm.centre - lost))
-    breadth = START_BREADTH_BONUS * min(palm.radius, BROAD_ENOUGH)
-    return distance + _wrist_cost(grid, palm) - breadth - fingers
+    def nearest_palm(self, grid: Grid, candidates: Grid, last: Array) -> Palm | None:
+        """Return the palm of lowest cost near its last position, or None.
 
+        candidates: the grid with only the nodes that may be hand.
+        last: (3,), metres, camera frame.
+        """
+        options = self._options.detection
+        nearest, lowest = None, np.inf
+        for palm in find_palms(grid, candidates, self._options.palm):
+            distance = float(np.linalg.norm(palm.centre - last))
+            if distance > options.largest_step:
+                continue
+            # Narrow places are fingers, or edges of objects.
+            cost = distance + options.narrow_cost * max(options.full_palm_radius - palm.radius, 0)
+            if cost < options.accepted_cost:
+                return palm
+            cost += self._wrist_cost(grid, palm)
+            if cost < lowest:
+                nearest, lowest = palm, cost
+        return nearest
 
-def nearest_palm(grid: Grid, surface: Grid, last: Array) -> Palm | None:
-    """The palm nearest to its last position (3,), if there is any."""
-    nearest, lowest = None, np.inf
-    for palm in find_palms(grid, surface):
-        distance = float(np.linalg.norm(palm.centre - last))
-        if distance > LARGEST_STEP:
-            continue
-        # Narrow places are fingers, or edges of things.
-        cost = distance + FOLLOWED_BREADTH_COST * max(BROAD_PALM - palm.radius, 0)
-        if cost < SAME_PALM:
-            return palm
-        cost += _wrist_cost(grid, palm)
-        if cost < lowest:
-            nearest, lowest = palm, cost
-    return nearest
-
-
-def _wrist_cost(grid: Grid, palm: Palm) -> float:
-    """A hand has a wrist right behind it; an elbow or a stump of an arm has not."""
-    arm = find_arm(grid, palm, anatomical_guess(palm))
-    if arm is None:
-        return NO_ARM_COST
-    place = min(max(narrowest_place(grid, palm, arm), USUAL_WRIST), FARTHEST_WRIST)
-    return WRIST_COST * (place - USUAL_WRIST)
+    def _wrist_cost(self, grid: Grid, palm: Palm) -> float:
+        """Return the cost of a distant narrowest place, metres: an elbow has no wrist right behind it."""
+        options = self._options
+        guess = anatomical_guess(palm, options.wrist_filter, self.hand)
+        arm = find_arm(grid, palm, guess, options.forearm)
+        if arm is None:
+            return options.detection.no_arm_cost
+        usual, farthest = options.detection.usual_wrist, options.detection.farthest_wrist
+        place = min(max(narrowest_distance(grid, palm, arm, options.wrist), usual), farthest)
+        return options.detection.wrist_cost * (place - usual)

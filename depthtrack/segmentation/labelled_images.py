@@ -1,4 +1,4 @@
-"""Images with skin labels, to train a skin colour model on: two folders of files, or a recording that knows masks."""
+"""Images with skin labels, to train a skin colour model: two folders of files, or a recording with true masks."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +15,12 @@ _PICTURES = (".png", ".jpg", ".jpeg")
 
 
 def from_folders(images: Path, masks: Path) -> Iterator[Labelled]:
-    """Pairs of an RGB image (h, w, 3) and its mask (h, w), true on skin, whose files have the same name but ending.
+    """Yield pairs of an RGB image (h, w, 3) and its mask (h, w), true on skin.
 
-    Raises InputError where a folder or a file's partner is missing, a file is damaged, or sizes differ.
+    Image and mask have the same file name except for its extension.
+
+    Raises:
+        InputError: a folder or a mask is missing, a file is damaged, or sizes differ.
     """
     pictures, partners = _pictures(images), _pictures(masks)
     for stem, path in sorted(pictures.items()):
@@ -25,21 +28,25 @@ def from_folders(images: Path, masks: Path) -> Iterator[Labelled]:
             raise InputError(f"{path.name} has no mask of the same name in {masks}")
         width, height = read_size(path)
         if max(width, height) > MAX_SIDE:
-            raise InputError(f"{path} is {width}x{height} pixels: at most {MAX_SIDE} a side are read")
+            raise InputError(f"{path} is {width}x{height} pixels: use images of at most {MAX_SIDE} pixels a side")
         shape = (height, width)
         yield read_colour(path, shape), read_mask(partners[stem], shape)
 
 
 def from_recording(path: Path) -> Iterator[Labelled]:
-    """Every frame of a recording with colour and a true silhouette. Raises InputError where there is none."""
+    """Yield the RGB image (h, w, 3) and true silhouette (h, w) of each frame of a recording that has both.
+
+    Raises:
+        InputError: no frame has both.
+    """
     sequence = open_sequence(path, on_damage="skip")
-    none_yet = True
+    is_empty = True
     for frame in sequence:
         mask = sequence.hand_mask(frame.index)
         if frame.colour is not None and mask is not None:
-            none_yet = False
+            is_empty = False
             yield frame.colour, mask
-    if none_yet:
+    if is_empty:
         raise InputError(f"{path} has no frame with colour and a true mask: give a folder of images and one of masks")
 
 

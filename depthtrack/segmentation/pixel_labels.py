@@ -1,143 +1,161 @@
-"""From nodes back to pixels: which pixels of a frame belong to the hand that was found on the grid."""
+"""Labels of pixels: the pixels of a frame that belong to the hand on its grid."""
 
 import cv2
 import numba
 import numpy as np
 
-from depthtrack.geometry.rectangle import Rect
-from depthtrack.segmentation.grid import MAX_JUMP
-from depthtrack.segmentation.palm import HAND_REACH, TIP_TO_WRIST, Palm
-from depthtrack.segmentation.roi_tracking import DILATION, ROI_MARGIN, bounding_box
-from depthtrack.segmentation.surface_grid import SurfaceGrid, dilated, disc, eroded
+from depthtrack.segmentation.masks import HandMasks, dilation_radius
+from depthtrack.segmentation.morphology import bounding_box, dilated, disc, eroded
+from depthtrack.segmentation.options import OutlineOptions, SegmentationOptions
+from depthtrack.segmentation.palm import Palm
+from depthtrack.segmentation.surface_grid import SurfaceGrid
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Depth, Labels, Mask
 
-ELSEWHERE, HAND, ARM, BESIDE = 0, 1, 2, 4
-"""Labels of nodes, one bit each; BESIDE is what hangs together with the hand and is neither hand nor arm."""
+BACKGROUND, HAND, ARM, ATTACHED = 0, 1, 2, 4
+"""Labels of nodes, one bit each; ATTACHED is connected to the hand but neither hand nor arm."""
 
 NOTHING, MISSING, OTHER, READING = 0, 1, 2, 3
-"""Kinds of pixels: far from the hand; without a reading, beside the hand; a reading of what hangs together with the
-hand; a reading of the hand."""
-
-MARGIN = 2
-"""Nodes around the hand's into which its pixels may reach."""
+"""Kinds of pixels: far from the hand; no reading, beside the hand; a reading of a surface connected to the hand; a
+reading of the hand."""
 
 
-def label_hand(view: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlane | None) -> Labels:
-    """ELSEWHERE, HAND, ARM or BESIDE (rows, columns) for every node; `arm` (rows, columns) are the arm's."""
-    surface = view.surface
-    hand = (surface.depth > 0) & palm.paths.reached(TIP_TO_WRIST)
-    # Fingertips cut off by what the hand holds, or by fingers in front, are pieces of surface within its reach.
-    pieces, _ = surface.within(~hand).surfaces()
-    nodes = np.flatnonzero(pieces >= 0)
-    points, piece = surface.points[nodes], pieces.ravel()[nodes]
-    inside = np.linalg.norm(points - palm.centre, axis=1) < HAND_REACH
+def label_hand(
+    surface: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlane | None, options: SegmentationOptions
+) -> Labels:
+    """Return BACKGROUND, HAND, ARM or ATTACHED (rows, columns) for each node.
+
+    arm: (rows, columns) nodes of the arm.
+    """
+    candidates = surface.candidates
+    hand = (candidates.depth > 0) & palm.paths.reached(options.palm.tip_to_wrist)
+    # Fingertips behind a held object or behind other fingers are detached components within the hand's reach.
+    components, _ = candidates.within(~hand).surfaces()
+    nodes = np.flatnonzero(components >= 0)
+    points, component = candidates.points[nodes], components.ravel()[nodes]
+    inside = np.linalg.norm(points - palm.centre, axis=1) < options.palm.hand_reach
     if wrist is not None:
         inside &= (points - wrist.point) @ wrist.normal < 0
-    sizes = np.bincount(piece)
-    whole = np.bincount(piece, inside, sizes.size) > 0.9 * sizes
-    hand.flat[nodes[whole[piece]]] = True
-    labels = np.where(palm.paths.reached(), np.uint8(BESIDE), np.uint8(ELSEWHERE))
+    sizes = np.bincount(component)
+    whole = np.bincount(component, inside, sizes.size) > options.outline.whole_share * sizes
+    hand.flat[nodes[whole[component]]] = True
+    labels = np.where(palm.paths.reached(), np.uint8(ATTACHED), np.uint8(BACKGROUND))
     labels[hand] = HAND
     if arm is not None:
         labels[arm] = ARM
     return labels
 
 
-def hand_masks(view: SurfaceGrid, labels: Labels, wrist: WristPlane | None) -> tuple[Rect, Mask, Mask]:
-    """The region of interest in the frame, with the hand's silhouette and its readings (h, w) in it.
+def hand_masks(
+    surface: SurfaceGrid, labels: Labels, wrist: WristPlane | None, options: SegmentationOptions
+) -> HandMasks:
+    """Return the masks of the hand from the labels (rows, columns) of nodes.
 
-    Within r of the outline of its readings, where depth is least sure, only what has the colour of skin is hand;
-    farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
-    are filled where they are skin, and the outline is smoothed. Readings count up to r outside the silhouette.
+    Near the outline, depth is least reliable: within the dilation radius of it, only skin-coloured pixels are hand.
+    Farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
+    are filled if they are skin, and the outline is smoothed. Readings extend up to the radius outside the silhouette.
     """
-    blocks = bounding_box(labels == HAND, MARGIN)
-    stride, region, frame = view.grid.stride, view.region, view.frame
+    margin, outline = options.outline.node_margin, options.outline
+    blocks = bounding_box(labels == HAND, margin)
+    stride, region, frame = surface.grid.stride, surface.region, surface.frame
     tight = blocks.scaled(stride).shifted(region.left, region.top).clipped(region)
     plane = (0.0, 0.0, 0.0, 0.0) if wrist is None else (*wrist.normal.tolist(), float(wrist.normal @ wrist.point))
     lens = (frame.camera.fx, frame.camera.fy, frame.camera.cx, frame.camera.cy)
-    kinds = np.empty(tight.shape, dtype=np.uint8)
-    sort_pixels(frame.depth, tuple(tight), view.grid.depth, labels, tuple(blocks), stride, lens, plane, kinds)
+    kinds, jump = np.empty(tight.shape, dtype=np.uint8), options.grid.max_jump
+    nodes, roi, on_grid = surface.grid.depth, tuple(tight), tuple(blocks)
+    classify_pixels(frame.depth, roi, nodes, labels, on_grid, stride, jump, lens, plane, kinds)
     silhouette = readings = kinds == READING
-    if view.skin is not None:
-        coloured = view.skin[tight.relative_to(region).slices] > 0
-        r = max(1, round(DILATION * frame.camera.width))
-        silhouette = _silhouette(kinds, coloured, frame.depth[tight.slices] == 0, r)
-        readings = readings & dilated(silhouette, r)
-    room = round(ROI_MARGIN * frame.camera.fx / float(view.grid.depth[labels == HAND].mean()))
-    roi = tight.grown(max(room - MARGIN * stride, 0)).clipped(frame.camera.rect)
-    return roi, tight.paste(silhouette, roi), tight.paste(readings, roi)
+    if surface.skin is not None:
+        coloured = surface.skin[tight.relative_to(region).slices] > 0
+        radius = dilation_radius(frame.camera, outline)
+        silhouette = _silhouette(kinds, coloured, frame.depth[tight.slices] == 0, radius, outline)
+        readings = readings & dilated(silhouette, radius)
+    room = round(options.roi.margin * frame.camera.fx / float(surface.grid.depth[labels == HAND].mean()))
+    region = tight.grown(max(room - margin * stride, 0)).clipped(frame.camera.rect)
+    return HandMasks(region, tight.paste(silhouette, region), tight.paste(readings, region))
 
 
-def _silhouette(kinds: Labels, coloured: Mask, missing: Mask, r: int) -> Mask:
-    """The hand's silhouette (h, w) from the kinds of its pixels, where they are `coloured` like skin, and where
-    readings are `missing`."""
+def _silhouette(kinds: Labels, coloured: Mask, missing: Mask, radius: int, options: OutlineOptions) -> Mask:
+    """Return the hand's silhouette (h, w).
+
+    kinds: (h, w) of pixels.
+    coloured, missing: (h, w) pixels of skin, and without readings.
+    radius: of the dilation, pixels.
+    """
     readings = kinds == READING
-    inside = readings & eroded(kinds >= OTHER, r)
-    closed = cv2.morphologyEx(readings.view(np.uint8), cv2.MORPH_CLOSE, disc(max(1, r // 4))).view(np.bool_)
-    # Through a ring of fingers one sees what is behind: what is read there is not filled.
+    inside = readings & eroded(kinds >= OTHER, radius)
+    element = disc(max(1, radius // options.closing_divisor))
+    closed = cv2.morphologyEx(readings.view(np.uint8), cv2.MORPH_CLOSE, element).view(np.bool_)
+    # A ring of fingers shows the background: its readings are not filled.
     filled = closed | (missing & _enclosed(closed))
-    return inside | (coloured & _smoothed(inside | (coloured & filled & (kinds != OTHER)), r))
+    candidates = inside | (coloured & filled & (kinds != OTHER))
+    return inside | (coloured & _majority(candidates, radius // options.smoothing_divisor, options.majority))
 
 
 def _enclosed(mask: Mask) -> Mask:
-    """What cannot be reached from outside without crossing `mask` (h, w), and the mask itself."""
+    """Return `mask` (h, w) and the pixels that it separates from the border."""
     framed = np.zeros((mask.shape[0] + 2, mask.shape[1] + 2), dtype=np.uint8)
     framed[1:-1, 1:-1] = mask
     cv2.floodFill(framed, None, (0, 0), 2)
     return framed[1:-1, 1:-1] != 2
 
 
-def _smoothed(mask: Mask, r: int) -> Mask:
-    """The majority of the pixels about each: sensors' outlines waver by a pixel.
-
-    A little less than half suffices, for readings are lost at outlines and never won.
-    """
-    side = 2 * (r // 2) + 1
+def _majority(mask: Mask, radius: int, least: int) -> Mask:
+    """Return the pixels (h, w) around which more than `least` of 200 are set: sensors' outlines waver by a pixel."""
+    side = 2 * radius + 1
     share = cv2.boxFilter(mask.view(np.uint8) * np.uint8(200), -1, (side, side), borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(share > 85)
+    return np.asarray(share > least)
 
 
 @numba.njit(cache=True)
-def sort_pixels(
+def classify_pixels(
     depth: Depth,
     roi: tuple[int, int, int, int],
     nodes: Depth,
     labels: Labels,
     blocks: tuple[int, int, int, int],
     stride: int,
+    max_jump: float,
     lens: tuple[float, float, float, float],
     plane: tuple[float, float, float, float],
     out: Labels,
 ) -> None:
-    """Kind of every pixel in the region `roi` of a depth image (h, w; metres), into `out`.
+    """Classify the pixels of a region of a depth image.
 
-    `nodes` and `labels` (rows, columns) are the grid's, whose `blocks` are in the region. A reading belongs to the
-    node, of its own block and those around it, whose depth is nearest to its own, if that is within MAX_JUMP: to hand
-    or arm if there are any. A pixel without a reading belongs to the nearest block. Where arm and hand meet, the plane
-    (a, b, c, d) decides instead: the hand is where a x + b y + c z <= d.
+    depth: (h, w), metres.
+    roi: left, top, right, bottom of the region, pixels.
+    nodes, labels: (rows, columns) depths, metres, and labels of the grid.
+    blocks: left, top, right, bottom of the region on the grid, nodes.
+    stride: side of a block, pixels.
+    max_jump: largest difference of a pixel's depth from its node's, metres.
+    lens: fx, fy, cx, cy of the image, pixels.
+    plane: a, b, c, d of the wrist; the hand is at a x + b y + c z <= d.
+    out: output over the region: NOTHING, MISSING, OTHER or READING.
+
+    A reading belongs to the node nearest in depth among its own block and the eight around it. Hand and arm take
+    precedence. A pixel without a reading belongs to the nearest block. If hand and arm meet, the plane decides.
     """
     rows, columns = nodes.shape
     left, top, right, bottom = roi
     j0, i0, j1, i1 = blocks
     fx, fy, cx, cy = lens
     a, b, c, d = plane
-    jump = np.float32(MAX_JUMP)
+    jump = np.float32(max_jump)
     near, kind = np.empty(9, dtype=np.float32), np.empty(9, dtype=np.uint8)
     out[:] = NOTHING
     for i in range(i0, i1):
         for j in range(j0, j1):
-            # The nodes around that are somewhere, and what a pixel without a reading belongs to.
-            count, around, blank, blank_depth, least = 0, ELSEWHERE, ELSEWHERE, np.float32(0), 9
+            # The labelled nodes around, and the node of a pixel without a reading.
+            count, around, blank, blank_depth, least = 0, BACKGROUND, BACKGROUND, np.float32(0), 9
             for k in range(max(i - 1, 0), min(i + 2, rows)):
                 for m in range(max(j - 1, 0), min(j + 2, columns)):
                     label = labels[k, m]
-                    if label == ELSEWHERE:
+                    if label == BACKGROUND:
                         continue
                     near[count], kind[count] = nodes[k, m], label
                     count, around = count + 1, around | label
                     away = (k - i) ** 2 + (m - j) ** 2
-                    if label != BESIDE and away < least:
+                    if label != ATTACHED and away < least:
                         least, blank, blank_depth = away, label, nodes[k, m]
             if count == 0:
                 continue
@@ -151,18 +169,18 @@ def sort_pixels(
                         continue
                     mine, close, met = blank, blank_depth, around
                     if z > 0:
-                        mine, close, met, nearest = ELSEWHERE, z, ELSEWHERE, jump
+                        mine, close, met, nearest = BACKGROUND, z, BACKGROUND, jump
                         for n in range(count):
                             difference = abs(near[n] - z)
                             if difference < jump:
                                 met |= kind[n]
-                                if difference < nearest and kind[n] != BESIDE:
+                                if difference < nearest and kind[n] != ATTACHED:
                                     nearest, mine = difference, kind[n]
                     hand = bool(mine == HAND)
                     if met & (HAND | ARM) == HAND | ARM:
                         hand = bool((a * (u - cx) / fx + b * (v - cy) / fy + c) * close <= d)
                     if z > 0:
-                        if met != ELSEWHERE:
+                        if met != BACKGROUND:
                             out[v - top, u - left] = READING if hand else OTHER
                     elif hand:
                         out[v - top, u - left] = MISSING

@@ -1,4 +1,4 @@
-"""The point cloud of a depth map, with normals, made once a frame for everyone who needs it."""
+"""The point cloud of a depth map with normals."""
 
 import math
 
@@ -6,25 +6,26 @@ import numba
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.segmentation.options import PointCloudOptions
 from depthtrack.types import Array, Depth, Index
 
-SPACING = 2
-"""Pixels between the nine samples that a normal is fitted to."""
 
-SAME_SURFACE = 0.015
-"""Metres in depth beyond which a neighbour belongs to another surface: a finger's breadth."""
+def point_cloud(camera: Camera, depth: Depth, options: PointCloudOptions | None = None) -> tuple[Array, Array]:
+    """Return the points and unit normals of a depth map, row by row.
 
+    depth: (h, w), metres; 0 without a reading.
+    points: (N, 3), metres, camera frame.
+    normals: (N, 3), towards the camera.
 
-def point_cloud(camera: Camera, depth: Depth) -> tuple[Array, Array]:
-    """Points (N, 3) in metres and unit normals (N, 3) towards the camera, row by row, of a depth map (h, w).
-
-    A plane's inverse depth is linear in the pixel, so each normal comes from a linear fit of the inverse depth to a
-    3x3 grid of samples about its pixel; samples on another surface or without a reading are left out, and where too
-    few remain, the normal is the line of sight's.
+    A plane's inverse depth is linear in the pixel. So each normal comes from a linear fit of the inverse depth to 3x3
+    samples around its pixel. Samples on another surface or without a reading are left out. If fewer than four remain,
+    the normal is the line of sight.
     """
+    options = options or PointCloudOptions()
     rows, columns = np.nonzero(depth)
     points, normals = np.empty((len(rows), 3)), np.empty((len(rows), 3))
-    _fit(depth, rows, columns, (camera.fx, camera.fy, camera.cx, camera.cy), points, normals)
+    intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
+    _fit(depth, rows, columns, intrinsics, options.sample_spacing, options.same_surface, points, normals)
     return points, normals
 
 
@@ -34,9 +35,12 @@ def _fit(
     rows: Index,
     columns: Index,
     intrinsics: tuple[float, float, float, float],
+    spacing: int,
+    same_surface: float,
     points: Array,
     normals: Array,
 ) -> None:
+    """Write points and normals of the pixels at `rows` and `columns` (N,)."""
     fx, fy, cx, cy = intrinsics
     height, width = depth.shape
     for n in range(rows.shape[0]):
@@ -45,19 +49,19 @@ def _fit(
         x, y = (u - cx) / fx, (v - cy) / fy
         points[n, 0], points[n, 1], points[n, 2] = x * z, y * z, z
         count, su, sv, suu, suv, svv, sw, suw, svw = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(-SPACING, SPACING + 1, SPACING):
-            for i in range(-SPACING, SPACING + 1, SPACING):
+        for j in range(-spacing, spacing + 1, spacing):
+            for i in range(-spacing, spacing + 1, spacing):
                 if not (0 <= v + j < height and 0 <= u + i < width):
                     continue
                 there = np.float64(depth[v + j, u + i])
-                if there == 0.0 or abs(there - z) > SAME_SURFACE:
+                if there == 0.0 or abs(there - z) > same_surface:
                     continue
                 w = 1.0 / there
                 count += 1
                 su, sv, sw = su + i, sv + j, sw + w
                 suu, suv, svv = suu + i * i, suv + i * j, svv + j * j
                 suw, svw = suw + i * w, svw + j * w
-        # Slopes of w about the samples' mean.
+        # Slopes of w about the mean of the samples.
         nx, ny, nz = x, y, 1.0
         if count >= 4:
             a, b, c = suu - su * su / count, suv - su * sv / count, svv - sv * sv / count

@@ -13,55 +13,57 @@ from numpy.typing import NDArray
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.chroma import BINS, bins_of_colours, colour_index, count_chroma
+from depthtrack.segmentation.options import SkinColourOptions
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.types import Array, Image, Labels, Mask
 
-T_MAX, T_MIN = 0.5, 0.15
-"""Skin starts where P(skin | colour) exceeds T_MAX and grows through neighbours above T_MIN (ibid., Sec. 2.1)."""
-
-WINDOW, OFFLINE_WEIGHT = 5, 0.8
-"""Frames that adapt the model (w), and the weight of the offline model (gamma; ibid., Sec. 2.1)."""
-
 NOT_SKIN, MAYBE_SKIN, SURELY_SKIN = 0, 1, 2
+"""Classes of colours: below both thresholds of the hysteresis, between them, and above both."""
 
 
 class AdaptiveSkin:
     """P(skin | colour) adapted to the light: the offline model blended with the statistics of the last frames."""
 
-    def __init__(self, model: SkinColourModel) -> None:
+    def __init__(self, model: SkinColourModel, options: SkinColourOptions | None = None) -> None:
+        self._options = options or SkinColourOptions()
         self._offline = model.posterior()
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Return to the offline model."""
         self._recent: deque[Array] = deque()
         self._total = np.zeros((2, BINS, BINS))
-        self._classes = classes_of_colours(self._offline)
+        self._classes = classes_of_colours(self._offline, self._options)
 
-    def learn(self, image: Image, region: Rect, skin: Labels, hand: Mask) -> None:
-        """Add the pixels of a region of an RGB image (H, W, 3) on which `skin` and `hand` (h, w) agree.
+    def adapt(self, image: Image, region: Rect, skin: Labels, hand: Mask) -> None:
+        """Add the pixels of a region on which two masks agree.
 
         Skin outside the hand (face, arm) and pixels of the hand that are no skin are left out.
+
+        image: (H, W, 3), RGB.
+        skin, hand: (h, w) over the region.
         """
-        self._recent.append(count_chroma(image, region, skin, hand, step=3))
+        bins = bins_of_colours(self._options.darkest, self._options.brightest)
+        self._recent.append(count_chroma(image, region, skin, hand, self._options.adaptation_step, bins))
         self._total += self._recent[-1]
-        if len(self._recent) > WINDOW:
+        if len(self._recent) > self._options.adaptation_frames:
             self._total -= self._recent.popleft()
-        self._classes = classes_of_colours(self.posterior())
+        self._classes = classes_of_colours(self.posterior(), self._options)
 
     def posterior(self) -> Array:
-        """Return P = gamma P_model + (1 - gamma) P_recent (64, 64); P_model for colours not seen recently."""
+        """Return P = gamma P_model + (1 - gamma) P_recent (64, 64); P_model for colours without recent pixels."""
         other, skin = self._total
-        seen = other + skin
-        known = seen > 0
-        blended = self._offline.copy()
-        blended[known] = OFFLINE_WEIGHT * blended[known] + (1 - OFFLINE_WEIGHT) * skin[known] / seen[known]
+        count = other + skin
+        known = count > 0
+        blended, weight = self._offline.copy(), self._options.offline_weight
+        blended[known] = weight * blended[known] + (1 - weight) * skin[known] / count[known]
         return blended
 
     def find(self, image: Image, region: Rect, blocks: Labels, stride: int) -> Labels:
-        """Return a mask (h, w), 1 on skin, of a region of an RGB image (H, W, 3), by hysteresis thresholding.
+        """Return a mask (h, w), 1 on skin, of a region of an image by hysteresis thresholding.
 
-        Only blocks of `stride` x `stride` pixels where `blocks` (rows, columns) is not 0 are classified.
+        image: (H, W, 3), RGB.
+        blocks: (rows, columns), 0 for blocks of `stride` x `stride` pixels that are not classified.
         """
         skin = np.zeros((region.height, region.width), dtype=np.uint8)
         rows, columns = np.flatnonzero(blocks.any(axis=1)), np.flatnonzero(blocks.any(axis=0))
@@ -75,16 +77,20 @@ class AdaptiveSkin:
         return skin
 
 
-def classes_of_colours(posterior: Array) -> Labels:
-    """Return NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of each quantised colour for P(skin | colour) (64, 64)."""
-    classes = np.append((posterior > T_MIN).astype(np.uint8) + (posterior > T_MAX), np.uint8(NOT_SKIN))
-    return classes.take(_places_of_colours())
+def classes_of_colours(posterior: Array, options: SkinColourOptions) -> Labels:
+    """Return NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of each quantised colour.
+
+    posterior: (64, 64), P(skin | colour).
+    """
+    grows, starts = posterior > options.growth_threshold, posterior > options.seed_threshold
+    classes = np.append(grows.astype(np.uint8) + starts, np.uint8(NOT_SKIN))
+    return classes.take(_class_indices(options.darkest, options.brightest))
 
 
 @cache
-def _places_of_colours() -> NDArray[np.intp]:
+def _class_indices(darkest: float, brightest: float) -> NDArray[np.intp]:
     """Return `bins_of_colours` (32768,) with the index after the last bin if the luminance is out of range."""
-    bins = bins_of_colours().astype(np.intp)
+    bins = bins_of_colours(darkest, brightest).astype(np.intp)
     return np.where(bins < 0, BINS * BINS, bins)
 
 
@@ -98,9 +104,13 @@ def classify(
     stride: int,
     out: Labels,
 ) -> None:
-    """Write to `out` (h, w) the classes, from the table `classes` (32768,), of pixels from (left, top) of an RGB image.
+    """Classify the pixels of a part of an image.
 
-    `out` is NOT_SKIN where `blocks` (rows, columns) of `stride` x `stride` pixels is 0.
+    image: (H, W, 3), RGB.
+    left, top: first pixel of the part.
+    classes: (32768,) by quantised colour.
+    blocks: (rows, columns), 0 for blocks of `stride` x `stride` pixels that are NOT_SKIN.
+    out: (h, w) output.
     """
     height, width = out.shape
     for v in range(height):

@@ -1,4 +1,4 @@
-"""Colour statistics of skin and of everything else: Bayes' rule on chroma.
+"""Colour statistics of skin and of other surfaces: Bayes' rule on chroma.
 
 Argyros and Lourakis, "Real-time tracking of multiple skin-colored objects with a possibly moving camera", ECCV 2004.
 """
@@ -15,13 +15,10 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.files import read_json, write_atomic
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.segmentation.chroma import BINS, CHROMA, count_chroma
+from depthtrack.segmentation.chroma import BINS, CHROMA, bins_of_colours, count_chroma
+from depthtrack.segmentation.options import SkinColourOptions
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.types import Array, Labels, Mask
-
-DEFAULT_PRIOR = 0.4
-"""P(skin) of the built-in model. Web pictures hold about 9 % skin, but here colour is asked about things at the hand's
-distance, of which hand and forearm make up a large share."""
 
 _LARGEST_FILE = 4 << 20
 
@@ -30,9 +27,11 @@ _LARGEST_FILE = 4 << 20
 class SkinColourModel:
     """Offline colour statistics of skin.
 
-    `skin` and `other` (64, 64) are P(colour | skin) and P(colour | not skin) by U and V bin, scaled to sum to 1.
-    `prior` is P(skin).
-    Raises: InputError if a table or the prior is no probability.
+    skin, other: (64, 64), P(colour | skin) and P(colour | not skin) by U and V bin, scaled to sum to 1.
+    prior: P(skin).
+
+    Raises:
+        InputError: a table or the prior is no probability.
     """
 
     skin: Array
@@ -49,27 +48,31 @@ class SkinColourModel:
             raise InputError(f"a skin model's 'prior' must be a probability between 0 and 1, found {self.prior!r}")
 
     @classmethod
-    def default(cls) -> "SkinColourModel":
-        """Return the model of the statistics of Jones and Rehg."""
-        return _default_model()
+    def default(cls, prior: float = SkinColourOptions().prior) -> "SkinColourModel":
+        """Return the model of the statistics of Jones and Rehg with a prior P(skin)."""
+        return _default_model(prior)
 
     @classmethod
     def train(cls, labelled: Iterable[tuple[Labels, Mask]]) -> Self:
-        """Return the model of pairs of an RGB image (h, w, 3) and a mask (h, w) that is true on skin.
+        """Return the model of labelled images; its prior is the share of skin among all pixels.
 
-        The prior is the share of skin among all pixels.
-        Raises: InputError if the shapes differ, or there are no pixels of skin or no others.
+        labelled: pairs of an RGB image (h, w, 3) and a mask (h, w) that is true on skin.
+
+        Raises:
+            InputError: the shapes differ, or there are no pixels of skin or no others.
         """
+        options = SkinColourOptions()
+        bins = bins_of_colours(options.darkest, options.brightest)
         counts = np.zeros((2, BINS, BINS))
         for image, mask in labelled:
             if image.shape != (*mask.shape, 3):
                 raise InputError(f"an image of shape {image.shape} cannot have a mask of shape {mask.shape}")
             whole = Rect.of_image(image.shape)
-            counts += count_chroma(np.ascontiguousarray(image), whole, mask.astype(np.uint8), mask, step=1)
+            counts += count_chroma(np.ascontiguousarray(image), whole, mask.astype(np.uint8), mask, 1, bins)
         other, skin = counts
         if skin.sum() == 0 or other.sum() == 0:
             raise InputError(
-                f"training needs pixels of skin and of other things, found {skin.sum():.0f} and {other.sum():.0f}:"
+                f"training needs pixels of skin and of other surfaces, found {skin.sum():.0f} and {other.sum():.0f}:"
                 " check that the masks are white on skin and black elsewhere"
             )
         return cls(skin, other, float(skin.sum() / counts.sum()))
@@ -78,13 +81,14 @@ class SkinColourModel:
         """Return P(skin | colour) (64, 64) by U and V bin, from Bayes' rule; 0 for colours in neither table."""
         joint = self.skin * self.prior
         evidence = joint + self.other * (1 - self.prior)
-        # Rarer colours than this are the tails of a fitted curve, not knowledge.
+        # Rarer colours than this are the tails of a fitted curve.
         return np.where(evidence > 1e-9, joint / np.maximum(evidence, 1e-9), 0.0)
 
     def save(self, path: Path) -> None:
         """Write the model as JSON.
 
-        Raises: InputError if the file cannot be written.
+        Raises:
+            InputError: the file cannot be written.
         """
         text = json.dumps({"prior": self.prior, "skin": self.skin.tolist(), "other": self.other.tolist()})
         write_atomic(path, text + "\n")
@@ -93,7 +97,8 @@ class SkinColourModel:
     def load(cls, path: Path) -> Self:
         """Return the model that `save` wrote.
 
-        Raises: InputError if the file is missing, malformed, or its tables are no probabilities.
+        Raises:
+            InputError: the file is missing or malformed, or its tables are no probabilities.
         """
         return read_json(path, "the skin model", cls._from_fields, _LARGEST_FILE, made_by="depthtrack train-skin")
 
@@ -103,8 +108,8 @@ class SkinColourModel:
 
 
 @cache
-def _default_model() -> SkinColourModel:
-    return SkinColourModel(chroma_distribution(SKIN), chroma_distribution(OTHER), DEFAULT_PRIOR)
+def _default_model(prior: float) -> SkinColourModel:
+    return SkinColourModel(chroma_distribution(SKIN), chroma_distribution(OTHER), prior)
 
 
 def chroma_distribution(mixture: Mixture) -> Array:
@@ -117,7 +122,7 @@ def chroma_distribution(mixture: Mixture) -> Array:
     u, v = np.meshgrid(centres, centres, indexing="ij")
     total = np.zeros((BINS, BINS))
     for mean, variance, weight in zip(*mixture, strict=True):
-        # A bin's own width blurs what falls into it.
+        # The width of a bin adds its own variance.
         covariance = CHROMA @ np.diag(variance) @ CHROMA.T + np.eye(2) * width**2 / 12
         offset = np.stack([u, v], axis=-1) - CHROMA @ mean
         distance = np.einsum("...i,ij,...j", offset, np.linalg.inv(covariance), offset)

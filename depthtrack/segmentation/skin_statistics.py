@@ -1,4 +1,4 @@
-"""The published colours of skin and of everything else, as two mixtures of 16 Gaussians in RGB.
+"""Published colour statistics of skin and of other surfaces: two mixtures of 16 Gaussians in RGB.
 
 Jones and Rehg, "Statistical color models with application to skin detection", Cambridge Research Laboratory
 CRL 98/11, 1998 (IJCV 46, 2002): fitted to about 80 million skin and 850 million other pixels of 13,640 web pictures.
@@ -12,7 +12,11 @@ from depthtrack.types import Array
 
 
 class Mixture(NamedTuple):
-    """Gaussians with diagonal covariance: `means` and `variances` (K, 3) in RGB units of 0..255, `weights` (K,)."""
+    """A mixture of K Gaussians with diagonal covariance.
+
+    means, variances: (K, 3), RGB from 0 to 255.
+    weights: (K,), with sum 1.
+    """
 
     means: Array
     variances: Array

@@ -12,8 +12,10 @@ from threading import Lock
 import numpy as np
 
 from depthtrack.hand.shape import HandShape
+from depthtrack.segmentation.hand_size import HandSize
+from depthtrack.segmentation.morphology import bounding_box
 from depthtrack.segmentation.observation import Observation
-from depthtrack.segmentation.roi_tracking import ROI_MARGIN, bounding_box
+from depthtrack.segmentation.options import RoiOptions
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame
 from depthtrack.types import Array
 
@@ -63,7 +65,8 @@ class ObservedMotion:
 def observation_of(frame: SyntheticFrame, synthesiser: Synthesiser, index: int) -> Observation:
     """Return the observation of a frame that shows a hand without a background."""
     camera, hand = synthesiser.sensor.camera, synthesiser.options.hand
-    region = bounding_box(frame.mask, round(ROI_MARGIN * camera.fx / float(np.median(frame.exact_depth[frame.mask]))))
+    distance = float(np.median(frame.exact_depth[frame.mask]))
+    region = bounding_box(frame.mask, round(RoiOptions().margin * camera.fx / distance))
     roi = camera.crop(region)
     depth = np.ascontiguousarray(frame.depth[region.slices], dtype=np.float32)
     v, u = np.nonzero(depth)
@@ -76,7 +79,7 @@ def observation_of(frame: SyntheticFrame, synthesiser: Synthesiser, index: int) 
         region=region,
         silhouette=frame.skin[region.slices],
         depth=depth,
-        centre=surface + hand.palm_thickness * hand.scale / 2 * inwards,
+        centre=surface + HandSize.of(hand).palm_half_thickness * inwards,
         palm_radius=hand.palm_breadth * hand.scale / 2,
     )
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.geometry.rotations import rotation_matrix
@@ -16,14 +15,13 @@ from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunRow, RunWriter
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.hand_size import HandSize
+from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
-
-REACH_MARGIN = 0.03
-"""Distance that a hand may have moved beyond its prediction, metres."""
 
 
 @dataclass(frozen=True)
@@ -131,13 +129,11 @@ def segment(
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
-    """Return where a hand in `pose` (27,) is: around its palm, as far as its fingers reach, up to its wrist."""
+    """Return the ROI prior of a hand in `pose` (27,); None without a pose."""
     if pose is None:
         return None
-    shape = model.shape
-    reach = (np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)).max() * shape.scale + REACH_MARGIN
     wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return RoiPrior(pose[POSITION].copy(), float(reach), wrist)
+    return RoiPrior(pose[POSITION].copy(), wrist, HandSize.of(model.shape))
 
 
 def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:

@@ -12,8 +12,8 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.observation import Segmenter
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker

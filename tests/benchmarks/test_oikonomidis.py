@@ -29,7 +29,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.geometry.rotations import quaternion_exp
 from depthtrack.hand.pose import make_pose
 from depthtrack.rendering.oracle import OracleScorer
-from depthtrack.segmentation.roi_tracking import ROI_MARGIN
+from depthtrack.segmentation.options import RoiOptions
 from depthtrack.synthesis import observations
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.synthesis.observations import observation_of, observed_motion
@@ -65,7 +65,7 @@ def test_an_observed_motion_shows_the_true_hand_with_a_margin(recording: Synthes
         height, width = observation.silhouette.shape
         pixel = np.median(expected[expected > 0]) / observation.camera.fx
         for room in (rows.min(), columns.min(), height - 1 - rows.max(), width - 1 - columns.max()):
-            assert room * pixel == pytest.approx(ROI_MARGIN, rel=0.05)
+            assert room * pixel == pytest.approx(RoiOptions().margin, rel=0.05)
         assert np.linalg.norm(observation.centre - seen.poses[index, :3]) < 0.06
 
 

@@ -32,7 +32,8 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.triangles import rasterise
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import KEYPOINT_BODIES
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.configuration import IkConfig

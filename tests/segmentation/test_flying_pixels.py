@@ -1,4 +1,4 @@
-"""Flying pixels: found where time-of-flight sensors mix two depths, and nowhere on surfaces that a sensor can see."""
+"""Flying pixels: found where time-of-flight sensors mix two depths, and not on visible surfaces."""
 
 import numpy as np
 import pytest
@@ -6,19 +6,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.flying_pixels import STEEPEST, flying_pixels
-from depthtrack.segmentation.observation import Segmenter
+from depthtrack.segmentation.flying_pixels import flying_pixels
+from depthtrack.segmentation.options import FlyingPixelOptions
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 FOCAL = 366.0
 
 
-def plainly(depth: np.ndarray, focal: float) -> np.ndarray:
-    """The definition, pixel by pixel."""
+def slow_flying_pixels(depth: np.ndarray, focal: float) -> np.ndarray:
+    """Return the mask by the definition, pixel by pixel."""
     out = np.zeros(depth.shape, np.bool_)
     for v, u in np.argwhere(depth > 0):
         z = float(depth[v, u])
-        most = STEEPEST / focal * z
+        most = FlyingPixelOptions().steepest / focal * z
         for line in (depth[v, max(u - 1, 0) : u + 2], depth[max(v - 1, 0) : v + 2, u]):
             beside = line[(line > 0) & (line != depth[v, u])].astype(float)
             out[v, u] |= bool(np.any(z - beside > most) and not np.any(abs(z - beside) <= most))
@@ -29,11 +30,11 @@ def plainly(depth: np.ndarray, focal: float) -> np.ndarray:
 def test_kernel_equals_the_definition(seed: int) -> None:
     rng = np.random.default_rng(seed)
     depth = np.where(rng.random((9, 11)) < 0.3, 0, 0.6 + 0.03 * rng.random((9, 11))).astype(np.float32)
-    assert np.array_equal(flying_pixels(depth, FOCAL), plainly(depth, FOCAL))
+    assert np.array_equal(flying_pixels(depth, FOCAL), slow_flying_pixels(depth, FOCAL))
 
 
-def test_rims_and_wisps_fly_and_a_finger_does_not() -> None:
-    """A finger of 9 pixels before a wall, its rim half way between, and a wisp beyond its tip."""
+def test_rims_and_streaks_are_flying_pixels_and_a_finger_is_not() -> None:
+    """A finger of 9 pixels is before a wall, with a rim half way between and a streak beyond its tip."""
     depth = np.full((60, 40), 1.2, np.float32)
     across = np.arange(-4, 5) * 0.6 / FOCAL
     depth[20:60, 15:24] = 0.6 - np.sqrt(0.008**2 - np.minimum(np.abs(across), 0.0079) ** 2)
@@ -48,9 +49,11 @@ def test_rims_and_wisps_fly_and_a_finger_does_not() -> None:
 
 
 @pytest.mark.parametrize("coloured", [False, True])
-def test_an_observation_is_rid_of_them(coloured: bool) -> None:
-    """Half of the readings beside the hand's outline made to fly: next to none of them is observed by depth alone,
-    whether or not there would be colour."""
+def test_observations_by_depth_alone_have_no_flying_pixels(coloured: bool) -> None:
+    """Half of the readings beside the outline become flying pixels; less than 5 % of them are observed.
+
+    The segmenter has no skin colours, whether the frame has colour or not.
+    """
     made = Synthesiser(Synthesis(sensor="ideal", model="skin", background="none"))
     frame, camera = made[0], made.sensor.camera
     depth, rng = frame.depth.astype(np.float32), np.random.default_rng(1)
@@ -60,6 +63,6 @@ def test_an_observation_is_rid_of_them(coloured: bool) -> None:
     depth[outline] = frame.depth[frame.mask].max() + 0.05 * rng.uniform(0.5, 1.5, np.count_nonzero(outline))
     o = Segmenter().segment(Frame(0, 0.0, depth, frame.colour if coloured else None, camera))
     assert o is not None
-    seen = o.region.paste(o.depth > 0, camera.rect)
-    assert np.mean(seen[outline]) < 0.05
-    assert np.mean(seen[frame.mask]) > 0.95
+    observed = o.region.paste(o.depth > 0, camera.rect)
+    assert np.mean(observed[outline]) < 0.05
+    assert np.mean(observed[frame.mask]) > 0.95

@@ -1,4 +1,4 @@
-"""Point clouds: points back on their pixels, normals against exact surfaces and a plain least-squares fit."""
+"""Point clouds: points project to their pixels; normals equal exact surfaces and a least-squares fit."""
 
 import numpy as np
 from hypothesis import given
@@ -7,13 +7,15 @@ from hypothesis import strategies as st
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.primitives import SPHERE, ellipsoid
 from depthtrack.rendering.raycast import raycast
-from depthtrack.segmentation.point_cloud import SAME_SURFACE, SPACING, point_cloud
+from depthtrack.segmentation.options import PointCloudOptions
+from depthtrack.segmentation.point_cloud import point_cloud
 
+SPACING, SAME_SURFACE = PointCloudOptions().sample_spacing, PointCloudOptions().same_surface
 CAMERA = Camera(60, 50, 300.0, 310.0, 28.0, 26.0)
 
 
 def slow_normal(camera: Camera, depth: np.ndarray, v: int, u: int) -> np.ndarray:
-    """The same fit by numpy's least squares."""
+    """Return the normal (3,) of the same fit by numpy's least squares."""
     samples = []
     for j in (-SPACING, 0, SPACING):
         for i in (-SPACING, 0, SPACING):
@@ -35,7 +37,7 @@ def slow_normal(camera: Camera, depth: np.ndarray, v: int, u: int) -> np.ndarray
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_kernel_equals_the_plain_fit(seed: int) -> None:
+def test_kernel_equals_the_least_squares_fit(seed: int) -> None:
     rng = np.random.default_rng(seed)
     camera = Camera(14, 11, 60.0, 55.0, 6.0, 5.0)
     depth = (0.5 + 0.01 * rng.normal(size=camera.shape)).astype(np.float32)
@@ -64,7 +66,7 @@ def test_normals_of_a_sphere_point_away_from_its_centre() -> None:
     assert np.all((normals * points).sum(axis=1) < 0)
 
 
-def test_planes_are_exact_at_any_slant() -> None:
+def test_normals_of_a_slanted_plane_are_exact() -> None:
     normal = np.array([0.5, -0.3, -0.8]) / np.linalg.norm([0.5, -0.3, -0.8])
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width]
     rays = CAMERA.unproject(np.stack([u, v], axis=-1), np.ones(CAMERA.shape))

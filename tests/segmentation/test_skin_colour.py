@@ -28,26 +28,26 @@ def test_posterior_is_bayes_rule() -> None:
 
 
 def painted() -> np.ndarray:
-    """A patch of skin (rows 4 to 12, columns 6 to 18) on leaves and sky."""
+    """Return an image (20, 30, 3): a patch of skin (rows 4 to 12, columns 6 to 18) on leaves and sky."""
     image = np.empty((20, 30, 3), np.uint8)
     image[:10], image[10:] = BLUE_RGB, LEAF_RGB
     image[4:12, 6:18] = SKIN_RGB
     return image
 
 
-def test_published_statistics_know_skin_from_sky_and_leaves() -> None:
+def test_published_statistics_separate_skin_from_sky_and_leaves() -> None:
     found = AdaptiveSkin(SkinColourModel.default()).find(painted(), Rect(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
     expected = np.zeros((20, 30), np.bool_)
     expected[4:12, 6:18] = True
     np.testing.assert_array_equal(found > 0, expected)
 
 
-def test_only_the_window_and_blocks_asked_for_are_looked_at() -> None:
-    skin, window = AdaptiveSkin(SkinColourModel.default()), Rect(2, 3, 22, 13)
+def test_only_the_selected_region_and_blocks_are_classified() -> None:
+    skin, region = AdaptiveSkin(SkinColourModel.default()), Rect(2, 3, 22, 13)
     whole = skin.find(painted(), Rect(0, 0, 30, 20), np.ones((1, 1), np.uint8), 30)
-    np.testing.assert_array_equal(skin.find(painted(), window, np.ones((1, 1), np.uint8), 20), whole[3:13, 2:22])
+    np.testing.assert_array_equal(skin.find(painted(), region, np.ones((1, 1), np.uint8), 20), whole[3:13, 2:22])
     blocks = np.array([[1, 0], [1, 0]], np.uint8)
-    half = skin.find(painted(), window, blocks, 10)
+    half = skin.find(painted(), region, blocks, 10)
     assert not half[:, 10:].any()
     np.testing.assert_array_equal(half[:, :10], whole[3:13, 2:12])
 
@@ -58,9 +58,9 @@ def test_black_and_white_are_no_skin() -> None:
     assert not AdaptiveSkin(SkinColourModel.default()).find(image, Rect(0, 0, 8, 4), np.ones((1, 1), np.uint8), 8).any()
 
 
-def test_training_learns_the_colours_it_is_shown() -> None:
+def test_training_finds_the_colours_of_its_images() -> None:
     image, mask = painted(), np.zeros((20, 30), np.bool_)
-    mask[:10] = True  # the sky is called skin
+    mask[:10] = True  # the sky is labelled as skin
     mask[4:12, 6:18] = False
     model = SkinColourModel.train([(image, mask)])
     assert model.prior == pytest.approx(mask.mean())

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from depthtrack.segmentation.hand_size import AVERAGE_HAND
+from depthtrack.segmentation.morphology import bounding_box
 from depthtrack.segmentation.observation import Observation
-from depthtrack.segmentation.roi_tracking import bounding_box
 from depthtrack.synthesis.generate import Synthesiser
 
 
@@ -14,7 +15,9 @@ def observe(made: Synthesiser, index: int, room: float = 0.03) -> Observation:
     depth = np.where(frame.mask, frame.depth, 0)[region.slices].astype(np.float32)
     cropped = camera.crop(region)
     v, u = np.nonzero(depth)
-    centre = np.median(cropped.unproject(np.stack([u, v], axis=-1), depth[v, u]), axis=0) + np.array([0, 0, 0.0145])
+    centre = np.median(cropped.unproject(np.stack([u, v], axis=-1), depth[v, u]), axis=0) + np.array(
+        [0, 0, AVERAGE_HAND.palm_half_thickness]
+    )
     return Observation(
         cropped, frame.mask[region.slices], depth, index, frame.timestamp, region, centre, palm_radius=0.04
     )

@@ -9,8 +9,8 @@ from depthtrack.evaluation.segmentation import segment_sequence, summary
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.segmentation.observation import Segmenter
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 

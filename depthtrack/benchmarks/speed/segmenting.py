@@ -19,7 +19,7 @@ from depthtrack.evaluation.metrics import silhouette_iou
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.recording import open_sequence
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.observation import Segmenter
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.text_table import aligned

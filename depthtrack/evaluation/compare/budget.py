@@ -13,7 +13,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.options import with_options
 from depthtrack.recording.sequence import Sequence as Recording
 from depthtrack.recording.status import Status
-from depthtrack.segmentation.observation import Observation, Segmenter
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker

@@ -22,8 +22,8 @@ from depthtrack.recording import open_sequence
 from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.run_folder import check_same, read_configuration, read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
-from depthtrack.segmentation.observation import Segmenter
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
 from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration

@@ -1,0 +1,151 @@
+"""Localisation of the hand without a prior: detect it anywhere, then follow it from its last position.
+
+Source: Oikonomidis et al. 2011, Sec. 2.1.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from depthtrack.recording.sequence import Frame
+from depthtrack.segmentation.forearm import Arm, find_arm, find_vanishing_arm
+from depthtrack.segmentation.hand_detection import HandDetector
+from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
+from depthtrack.segmentation.masks import HandMasks
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.palm import Palm
+from depthtrack.segmentation.pixel_labels import hand_masks, label_hand
+from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
+from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
+from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
+from depthtrack.segmentation.wrist_filter import WristFilter
+from depthtrack.types import Array
+
+
+@dataclass(frozen=True)
+class LocatedHand:
+    """A hand in a frame.
+
+    surface_centre: (3,) centre of the palm on the visible surface, metres, camera frame.
+    palm_radius: of the circle inscribed in the palm, metres.
+    arm_direction: (3,) unit vector from the palm along the forearm, camera frame; None without a visible arm.
+    wrist: plane where the forearm is cut off, if any.
+    """
+
+    masks: HandMasks
+    surface_centre: Array
+    palm_radius: float
+    arm_direction: Array | None
+    wrist: WristPlane | None
+
+
+class HandLocator:
+    """Locates the hand in consecutive frames.
+
+    It stores the last position, direction of the arm and wrist. `skin` stores the colours of the last frames.
+
+    skin: skin colours, used if frames have colour; None for depth alone.
+    hand: sizes of the hand: those of the last guided segmentation, else of the average hand.
+    """
+
+    def __init__(self, skin: AdaptiveSkin | None, options: SegmentationOptions) -> None:
+        self._skin, self._options = skin, options
+        self.hand = AVERAGE_HAND
+        self._detector = HandDetector(options, self.hand)
+        self._wrist = WristFilter(options.wrist_filter, self.hand)
+        self._last: Array | None = None
+        self._last_time = 0.0
+        self._arm_direction: Array | None = None
+
+    def reset(self) -> None:
+        """Discard the last position and the colours of the last frames."""
+        self._last = None
+        self._reset_arm()
+        self._set_hand(AVERAGE_HAND)
+        if self._skin is not None:
+            self._skin.reset()
+
+    def set_position(self, surface_centre: Array, wrist: Array, hand: HandSize, timestamp: float) -> None:
+        """Replace the last position by that of a guided segmentation.
+
+        surface_centre, wrist: (3,) centre of the palm and wrist on the visible surface, metres, camera frame.
+        """
+        self._last, self._last_time = surface_centre, timestamp
+        # A guided segmentation does not measure the forearm.
+        self._arm_direction = None
+        self._wrist.set_wrist(wrist)
+        self._set_hand(hand)
+
+    def locate(self, frame: Frame) -> LocatedHand | None:
+        """Return the hand in a frame, or None without any."""
+        if not 0 <= frame.timestamp - self._last_time <= self._options.search.position_lifetime:
+            self._last = None
+        found = None if self._last is None else self._follow(frame, self._last)
+        if found is None:
+            self._reset_arm()
+            start = self._detect(frame)
+            found = None if start is None else self._follow(frame, start)
+        if found is not None:
+            self._last_time = frame.timestamp
+        return found
+
+    def _detect(self, frame: Frame) -> Array | None:
+        """Return the centre (3,) of a palm anywhere in the frame, metres, camera frame."""
+        search, grid = self._options.search, self._options.grid
+        stride = max(1, round(frame.camera.width / grid.start_columns))
+        surface = build_grid(frame, frame.camera.rect, (search.nearest, search.farthest), stride, self._skin, grid)
+        return self._detector.detect(surface.grid, surface.candidates, self._last)
+
+    def _follow(self, frame: Frame, last: Array) -> LocatedHand | None:
+        """Return the hand near its last position (3,), metres, camera frame."""
+        options, window, z = self._options, self._options.search.depth_window, float(last[2])
+        region = frame.camera.rect_around(last, window)
+        depth_range = (max(z - window, options.search.nearest), z + window)
+        stride = max(1, round(options.grid.node_size * frame.camera.fx / z))
+        surface = build_grid(frame, region, depth_range, stride, self._skin, options.grid)
+        palm = self._detector.nearest_palm(surface.grid, surface.candidates, last)
+        if palm is None:
+            return None
+        self._last = palm.centre
+        arm, centre, wrist = self._find_arm(surface, palm)
+        arm_mask = None if arm is None or wrist is None else arm_nodes(surface.grid, palm, arm, wrist)
+        labels = label_hand(surface, palm, arm_mask, wrist, options)
+        masks = hand_masks(surface, labels, wrist, options)
+        self._adapt_colours(surface, masks)
+        return LocatedHand(masks, centre, palm.radius, None if arm is None else arm.direction, wrist)
+
+    def _find_arm(self, surface: SurfaceGrid, palm: Palm) -> tuple[Arm | None, Array, WristPlane | None]:
+        """Return the forearm, the corrected centre of the palm (3,), metres, camera frame, and the wrist."""
+        grid, options, to_palm = surface.grid, self._options, self._wrist.hand.wrist_to_palm
+        guess, expected = self._wrist.guess(palm), self._arm_direction
+        arm = find_arm(grid, palm, guess, options.forearm, expected)
+        if arm is None and self._skin is not None:
+            blind = blind_skin(surface, self._skin, options.grid)
+            arm = find_vanishing_arm(grid, palm, guess, blind, options.forearm, expected)
+        if arm is None:
+            self._arm_direction = None
+            return None, palm.centre, None
+        self._arm_direction = arm.direction
+        axis = hand_axis(grid, palm, arm, guess, to_palm, options.wrist)
+        measured = find_wrist(grid, palm, axis, guess, options.wrist)
+        distance = self._wrist.update(palm, axis, measured)
+        centre = palm.centre
+        if measured is None:
+            centre = palm_centre(grid, palm, axis, distance, to_palm, options.wrist)
+        plane = WristPlane(palm.centre + (distance + options.wrist_margin) * axis.direction, axis.direction)
+        return arm, centre, plane
+
+    def _set_hand(self, hand: HandSize) -> None:
+        self.hand = self._detector.hand = self._wrist.hand = hand
+
+    def _reset_arm(self) -> None:
+        self._arm_direction = None
+        self._wrist.reset()
+
+    def _adapt_colours(self, surface: SurfaceGrid, masks: HandMasks) -> None:
+        """Adapt the skin colours to those of the hand and of its surroundings."""
+        if self._skin is None or surface.skin is None or surface.frame.colour is None:
+            return
+        skin = surface.skin[masks.region.relative_to(surface.region).slices]
+        hand = np.ascontiguousarray(masks.silhouette)
+        self._skin.adapt(surface.frame.colour, masks.region, np.ascontiguousarray(skin), hand)

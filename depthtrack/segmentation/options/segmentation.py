@@ -1,0 +1,43 @@
+"""All options of the segmentation, as a run configuration stores them."""
+
+from dataclasses import dataclass
+
+from depthtrack.errors import InputError
+from depthtrack.options import option
+from depthtrack.segmentation.options.arm import ForearmOptions, WristFilterOptions, WristOptions
+from depthtrack.segmentation.options.palm import DetectionOptions, PalmOptions
+from depthtrack.segmentation.options.pixels import (
+    FlyingPixelOptions,
+    OutlineOptions,
+    PointCloudOptions,
+    RoiOptions,
+    SkinColourOptions,
+)
+from depthtrack.segmentation.options.surface import GridOptions, SearchWindowOptions
+
+
+@dataclass(frozen=True)
+class SegmentationOptions:
+    """Segmentation of the hand in each frame."""
+
+    use_colour: bool = option(True, "Use the colour of recordings that have it; else depth alone")
+    skin_model: str | None = option(
+        None, "File of skin colours from `depthtrack train-skin`; published statistics (Jones and Rehg 2002) if absent"
+    )
+    wrist_margin: float = option(0.0, "Length of forearm that is kept beyond the wrist", unit="m")
+    search: SearchWindowOptions = option(SearchWindowOptions(), "Searched part of a frame")
+    roi: RoiOptions = option(RoiOptions(), "Region of interest")
+    grid: GridOptions = option(GridOptions(), "Surface grid", advanced=True)
+    palm: PalmOptions = option(PalmOptions(), "Palm candidates", advanced=True)
+    detection: DetectionOptions = option(DetectionOptions(), "Choice of a palm", advanced=True)
+    forearm: ForearmOptions = option(ForearmOptions(), "Forearm", advanced=True)
+    wrist: WristOptions = option(WristOptions(), "Wrist", advanced=True)
+    wrist_filter: WristFilterOptions = option(WristFilterOptions(), "Wrist over time", advanced=True)
+    outline: OutlineOptions = option(OutlineOptions(), "Outline of the silhouette", advanced=True)
+    skin_colour: SkinColourOptions = option(SkinColourOptions(), "Skin colour", advanced=True)
+    flying_pixels: FlyingPixelOptions = option(FlyingPixelOptions(), "Flying pixels", advanced=True)
+    point_cloud: PointCloudOptions = option(PointCloudOptions(), "Point cloud", advanced=True)
+
+    def __post_init__(self) -> None:
+        if not -0.05 <= self.wrist_margin <= 0.2:
+            raise InputError(f"wrist_margin must be from -0.05 to 0.2 m, found {self.wrist_margin:g}")
