@@ -1,4 +1,4 @@
-"""`python -m depthtrack`."""
+"""Run the command line with `python -m depthtrack`."""
 
 import sys
 

@@ -1,20 +1,27 @@
-"""Errors a user can act on: each message says what was expected, what was found, and what to do."""
+"""Errors that a user can correct.
+
+Each message is one sentence with the expected value, the value found, and what to do.
+"""
 
 
 class DepthtrackError(Exception):
-    """Base of every error that is the user's to mend; the command line prints it and exits with code 2."""
+    """Base of all errors that a user can correct; the command line exits with code 2."""
 
 
 class InputError(DepthtrackError):
-    """A file, folder or option that cannot be used as it is."""
+    """A file, folder or option is unusable."""
 
 
 class DamagedFrameError(InputError):
-    """One frame of a recording cannot be read, while the rest of the recording can."""
+    """One frame of a recording is unreadable; the others may be readable."""
 
 
 class MissingExtraError(DepthtrackError):
-    """An optional library is not installed; the message names the `pip install` line that brings it."""
+    """An optional library is not installed; the message contains the command to install it.
+
+    what: the feature that needs the library.
+    extra: name of the extra that installs it.
+    """
 
     def __init__(self, what: str, extra: str) -> None:
         super().__init__(f"{what} needs an optional library: run  pip install 'depthtrack[{extra}]'")

@@ -12,7 +12,10 @@ import pytest
 ROOT = Path(__file__).parents[1]
 REWRITTEN = (
     "depthtrack/__init__.py",
+    "depthtrack/__main__.py",
     "depthtrack/api",
+    "depthtrack/cli",
+    "depthtrack/errors.py",
     "depthtrack/simd",
     "depthtrack/synthesis",
     "depthtrack/types.py",
@@ -20,6 +23,7 @@ REWRITTEN = (
     "CHANGELOG.md",
     "CONTRIBUTING.md",
     "README.md",
+    "examples/README.md",
     "docs/benchmarks.md",
     "docs/joints.md",
     "docs/limitations.md",
@@ -27,8 +31,8 @@ REWRITTEN = (
     "docs/parameters.md",
     "docs/rigs.md",
     "examples",
-    "examples/README.md",
     "tests/api",
+    "tests/cli",
     "tests/support",
     "tests/synthesis",
     "tests/test_examples.py",

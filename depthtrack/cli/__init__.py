@@ -1,4 +1,4 @@
-"""The command line: parse, call, print. One module a command; none is imported before it is asked for."""
+"""Command line: parse, call, print. Each command is one module, imported on its call."""
 
 import os
 import sys
@@ -11,36 +11,41 @@ from depthtrack.errors import DepthtrackError
 
 @dataclass(frozen=True)
 class CommandEntry:
-    """Where a command lives: `module` holds a dataclass `Command` with a `run()` that returns nothing."""
+    """Entry of the overview of commands.
+
+    module: module with a dataclass `Command` that has a method `run()`, or a function `command(arguments)`.
+    summary: one line of help.
+    """
 
     module: str
     summary: str
 
 
 COMMANDS = {
-    "demo": CommandEntry(
-        "depthtrack.cli.demo", "one command to a report: both trackers on a synthetic recording, or yours"
-    ),
-    "info": CommandEntry("depthtrack.cli.info", "tell what a recording holds"),
-    "synth": CommandEntry("depthtrack.cli.synth", "synthesise a sequence of a moving hand with exact ground truth"),
-    "segment": CommandEntry("depthtrack.cli.segment", "find the hand in every frame: overlay video, contact sheet"),
-    "train-skin": CommandEntry("depthtrack.cli.train_skin", "learn a skin colour model from labelled images"),
-    "track": CommandEntry("depthtrack.cli.track", "track the hand through a recording, into a run folder"),
-    "compare": CommandEntry("depthtrack.cli.compare", "trackers side by side: table, results, report"),
-    "evaluate": CommandEntry("depthtrack.cli.evaluate", "how good and how fast a run is, against the ground truth"),
-    "calibrate": CommandEntry("depthtrack.cli.calibrate", "measure the hand of a recording: side, scale, every finger"),
-    "synergies": CommandEntry("depthtrack.cli.synergies", "principal components of hand postures: fit, look at"),
-    "view": CommandEntry("depthtrack.cli.view", "look at a recording: viewer, video or contact sheet"),
-    "video": CommandEntry("depthtrack.cli.video", "a film of a run: the tracked hand over the recording"),
-    "export": CommandEntry("depthtrack.cli.export", "the joints of a run, as a table, arrays or a benchmark's text"),
-    "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat the papers' experiments, our figures beside theirs"),
-    "bench": CommandEntry("depthtrack.cli.bench", "speed of scoring hypotheses, and of fitting the surface"),
-    "doctor": CommandEntry("depthtrack.cli.doctor", "tell what works on this machine, and what to install"),
+    "demo": CommandEntry("depthtrack.cli.demo", "track a synthetic recording or yours, and write a report"),
+    "info": CommandEntry("depthtrack.cli.info", "list frames, camera, depth and ground truth of a recording"),
+    "synth": CommandEntry("depthtrack.cli.synth", "synthesise a recording of a moving hand with exact ground truth"),
+    "segment": CommandEntry("depthtrack.cli.segment", "segment the hand in every frame: video, contact sheet, table"),
+    "train-skin": CommandEntry("depthtrack.cli.train_skin", "train a skin colour model on labelled images"),
+    "track": CommandEntry("depthtrack.cli.track", "track the hand of a recording and write a run folder"),
+    "compare": CommandEntry("depthtrack.cli.compare", "compare trackers on recordings: table, results, report"),
+    "evaluate": CommandEntry("depthtrack.cli.evaluate", "measure errors and time of runs"),
+    "calibrate": CommandEntry("depthtrack.cli.calibrate", "measure the hand of a recording: side, scale, sizes"),
+    "synergies": CommandEntry("depthtrack.cli.synergies", "fit or show principal components of hand postures"),
+    "view": CommandEntry("depthtrack.cli.view", "show a recording or a run: viewer, video, contact sheet"),
+    "video": CommandEntry("depthtrack.cli.video", "write a video of a run: the tracked hand over the recording"),
+    "export": CommandEntry("depthtrack.cli.export", "write the joints of a run for other programs"),
+    "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat experiments of the papers, with both figures"),
+    "bench": CommandEntry("depthtrack.cli.bench", "measure the speed of scoring, fitting and segmentation"),
+    "doctor": CommandEntry("depthtrack.cli.doctor", "check the renderers of this machine"),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code: 0 done, 2 the user's mistake or a bad file, 130 interrupted."""
+    """Run one command and return its exit code.
+
+    The code is 0 on success, 2 for an error that the user can correct, and 130 after an interrupt.
+    """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     name = arguments[0] if arguments else "--help"
     try:
@@ -54,11 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"depthtrack {name}: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader of our output (head, less) went away: what remains, Python's last flush included, is dropped.
+        # The reader of the output (head, less) has closed it: drop the rest, including Python's last flush.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        # A full disk, a folder without permission: nothing of ours is wrong, and the reason says what to do.
+        # A full disk or a missing permission: the reason of the system is enough.
         print(f"depthtrack {name}: {error.filename or 'input or output'}: {error.strerror or error}", file=sys.stderr)
         return 2
 
@@ -71,7 +76,7 @@ def _run(name: str, arguments: list[str]) -> int:
     elif name in COMMANDS:
         _parse(name, arguments).run()
     else:
-        raise DepthtrackError(f"no such command; choose one of {', '.join(COMMANDS)}")
+        raise DepthtrackError(f"there is no such command: choose one of {', '.join(COMMANDS)}")
     return 0
 
 
@@ -91,9 +96,14 @@ def _parse(name: str, arguments: list[str]) -> "RunnableCommand":
 
 
 class RunnableCommand:
-    """A command's options; `run` does the work and raises DepthtrackError for what the user can mend."""
+    """Options of a command."""
 
     def run(self) -> None:
+        """Execute the command.
+
+        Raises:
+            DepthtrackError: if the user can correct the cause.
+        """
         raise NotImplementedError
 
 
@@ -104,7 +114,7 @@ def _overview() -> str:
         [
             f"depthtrack {__version__}: hand tracking from RGB-D video on an ordinary CPU",
             "",
-            "usage: depthtrack COMMAND [OPTIONS]      (depthtrack COMMAND --help tells its options)",
+            "usage: depthtrack COMMAND [OPTIONS]      (depthtrack COMMAND --help lists its options)",
             "",
             *lines,
         ]

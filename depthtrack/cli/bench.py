@@ -1,4 +1,4 @@
-"""`depthtrack bench`: how fast this machine is at it, beside what one would use instead."""
+"""`depthtrack bench`: measure speed on this machine, beside alternative libraries."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,15 +17,21 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class _Benchmark:
     seconds: float = 1.0
-    """Time spent on each row of the table; the best and the median call count."""
+    """Duration of the measurement for each row. The table gives the best and the median call."""
     json: bool = False
     """Print JSON instead of a table."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Write the JSON to a file as well."""
+    """Also write the JSON to a file."""
 
     def _measure(self, benchmark: "ModuleType", plan: Any) -> None:
-        """Run and report. `benchmark` has `run(plan, progress)`, which measures, and `as_text(report)`, which tells it
-        to people; the report, a dataclass, has `rows`, and none where nothing could run."""
+        """Run a benchmark and print its report.
+
+        benchmark: module with `run(plan, progress) -> report` and `as_text(report) -> str`. The report is a dataclass
+            with `rows`.
+
+        Raises:
+            DepthtrackError: if the report has no rows.
+        """
         from dataclasses import asdict
         from json import dumps
 
@@ -35,19 +41,19 @@ class _Benchmark:
             write_atomic(self.out, text + "\n")
         print(text if self.json else benchmark.as_text(report))
         if not report.rows:
-            raise DepthtrackError("nothing asked for can run here: the reasons are above")
+            raise DepthtrackError("none of the requested backends runs here: the reasons are above")
 
 
 @dataclass(frozen=True)
 class Score(_Benchmark):
-    """From poses to energies, kinematics and objective included, in hypotheses a second.
+    """Measure scored hypotheses per second: kinematics, rendering and objective.
 
-    For every backend that runs here, at the sensor's resolution and at 96 and 64 pixels a side; and, where they are
-    installed, for pyrender, Open3D and embree on a mesh of the same hand.
+    Each backend runs at the sensor's resolution and at 96 and 64 pixels per side. If installed, pyrender, Open3D and
+    embree run on a mesh of the same hand.
     """
 
     backends: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="NAME ...")] = None
-    """Only these, of raster, egl, osmesa, oracle, pyrender, open3d, embree; unless told, all but the slow oracle."""
+    """Backends to measure: raster, egl, osmesa, oracle, pyrender, open3d, embree (default: all but the oracle)."""
 
     def run(self) -> None:
         from depthtrack.benchmarks.speed import scoring
@@ -57,9 +63,9 @@ class Score(_Benchmark):
 
 @dataclass(frozen=True)
 class Ik(_Benchmark):
-    """From a segmented depth map to a pose by fitting the hand's surface, on one core, in frames a second.
+    """Measure frames per second of the surface fit, from segmented depth to pose, on one core.
 
-    For the skin and the cylinders, all residuals, 26 and 6+6 degrees of freedom, and several numbers of points.
+    The rows differ in surface (skin, cylinders), residual, degrees of freedom (26, 6+6) and number of points.
     """
 
     def run(self) -> None:
@@ -70,13 +76,13 @@ class Ik(_Benchmark):
 
 @dataclass(frozen=True)
 class Segment(_Benchmark):
-    """From an RGB-D frame to the hand cut out of it, following it from the frame before, on one core.
+    """Measure the time to segment the hand in an RGB-D frame on one core.
 
-    For synthetic recordings of every camera, or recordings of your own, with colour and by depth alone.
+    The recordings are synthetic, one per camera, or your own. Each is measured with colour and with depth alone.
     """
 
     recordings: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FOLDER ...")] = ()
-    """Sequence folders with a hand in their first frames, in place of the synthetic ones."""
+    """Recordings that show a hand in their first frames (default: synthetic ones)."""
 
     def run(self) -> None:
         from depthtrack.benchmarks.speed import segmenting

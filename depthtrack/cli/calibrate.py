@@ -1,4 +1,4 @@
-"""`depthtrack calibrate`: measure the sizes of a hand on a recording."""
+"""`depthtrack calibrate`: measure the sizes of a hand in a recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,35 +16,35 @@ if TYPE_CHECKING:
     from depthtrack.calibration.rig_calibration import RigCalibration
 
 
-_MOST_SURE = 0.99
-"""The largest confidence told: none is beyond doubt."""
+_LARGEST_CONFIDENCE = 0.99
+"""Largest confidence to print, since rounding would give 1."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Measure the hand of a recording: side, scale, length and width of each finger, and the palm.
+    """Measure the hand of a recording: side, scale, palm, length and width of each finger.
 
-    Best on a few seconds of one bare hand that turns, opens and closes in front of the camera. Sizes that the recording
-    does not show stay average; the file gives a confidence for each. Use it with `track --hand`.
+    Record a few seconds of one bare hand that turns, opens and closes in front of the camera. Sizes that the recording
+    does not show keep the average. The file contains a confidence for each size. Use the file with `track --hand`.
 
-    With --hand RIG.glb only the scale of that mesh is measured, and the file refers to it.
+    With --hand RIG.glb, only the scale of the mesh is measured. The file then refers to the mesh.
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="HAND.json")]
     """Hand file to write."""
     side: Literal["auto", "right", "left"] = "auto"
-    """Which hand it is; both are tried unless given."""
+    """Side of the hand; `auto` tries both."""
     hand: Annotated[Path | None, tyro.conf.arg(metavar="RIG.glb")] = None
-    """A rigged mesh (.glb, .gltf) or a hand file of one: measure its scale, and check its side."""
+    """Rigged mesh (.glb, .gltf), or hand file that refers to one, to scale to the recording."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
-    """Picture of the hand before and after over some frames (default: beside the hand file)."""
+    """Picture of the hand before and after calibration to write (default: beside the hand file)."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+    """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     seed: int = 0
-    """Chooses the random numbers: the same seed gives the same hand."""
+    """Seed of the random numbers. The same seed gives the same hand."""
     threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """As many as there are cores unless given. The result does not depend on it."""
+    """Number of threads (default: one per core). The result does not depend on it."""
     json: bool = False
     """Print JSON instead of text."""
 
@@ -62,7 +62,7 @@ class Command:
             if not path.parent.is_dir():
                 raise InputError(f"the folder {path.parent} does not exist: create it first")
             if path.is_dir():
-                raise InputError(f"{path} is a folder: name a file in it")
+                raise InputError(f"expected a file, found the folder {path}: name a file in it")
         side = None if self.side == "auto" else self.side
         rig = None if self.hand is None else load_hand(self.hand, side)
         sequence = self.recording.open()
@@ -88,14 +88,14 @@ def _rig_text(calibration: "RigCalibration", out: Path, picture: Path) -> str:
             f"a {hand.side} hand (the other side fits {100 * calibration.side_margin:.0f} % worse), {hand.scale:.3f} "
             f"times the rig, from {len(calibration.observations)} frames",
             f"depth disagreement {calibration.after:.3f}, {calibration.before:.3f} at the rig's own scale",
-            f"look at {picture}; use it:  depthtrack track RECORDING --hand {out}",
+            f"check the picture {picture}; use the hand:  depthtrack track RECORDING --hand {out}",
         ]
     )
 
 
 def _text(calibration: "Calibration", out: Path, picture: Path) -> str:
     hand, margin = calibration.hand, calibration.side_margin
-    doubt = "" if calibration.side_sure else ": side not sure; give --side"
+    doubt = "" if calibration.side_sure else ": the side is uncertain; give --side"
     sure = "" if margin is None else f" (the other side fits {100 * margin:.0f} % worse{doubt})"
     before, after, views = calibration.before_mm, calibration.after_mm, len(calibration.observations)
     lines = [
@@ -103,9 +103,9 @@ def _text(calibration: "Calibration", out: Path, picture: Path) -> str:
         f"observed points lie {after:.1f} mm from its skin, {before:.1f} mm from the average hand's",
         f"  {'':16}{'mm':>8}{'± mm':>8}{'confidence':>12}",
         *(
-            f"  {name:16}{m.mm:8.1f}{m.sigma_mm:8.1f}{min(m.confidence, _MOST_SURE):12.2f}"
+            f"  {name:16}{m.mm:8.1f}{m.sigma_mm:8.1f}{min(m.confidence, _LARGEST_CONFIDENCE):12.2f}"
             for name, m in calibration.measured.items()
         ),
-        f"look at {picture}; use it:  depthtrack track RECORDING --hand {out}",
+        f"check the picture {picture}; use the hand:  depthtrack track RECORDING --hand {out}",
     ]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""`depthtrack compare`: trackers side by side on the same recordings, and a report that says which to take."""
+"""`depthtrack compare`: run trackers on the same recordings and write a report."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,35 +14,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Track recordings with several trackers, and compare: a table here; results.csv, results.json and report.html.
+    """Track recordings with several trackers and compare them.
 
-    The runs lie in DIR/runs. What was interrupted goes on where it stood when the same command is given again; runs
-    that are whole are kept. `depthtrack evaluate DIR/runs/* --report DIR` makes the report again. Times are CPU times,
-    for runs share the machine.
+    Prints a table and writes results.csv, results.json and report.html to DIR. The runs are stored in DIR/runs. The
+    same command continues an interrupted comparison and keeps complete runs. Make the report again with `depthtrack
+    evaluate DIR/runs/* --report DIR`. Times are CPU times, since runs share the machine.
     """
 
     sequences: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SEQUENCE ...")]
-    """Recordings."""
+    """Recordings to track."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")]
     """Folder to write to."""
     trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="pso,ik")] = ("pso,ik",)
-    """Trackers, with options where wanted, as in  pso,ik,ik:variant=paper,rounds=8 ; or a .toml file with a table for
-    each: [label], tracker = "ik", and its options."""
+    """Trackers, each with options after a colon, as in  pso,ik,ik:icp_iterations=8,subsample=2 ; or a .toml file with a
+    table per tracker: [label], tracker = "ik", and its options."""
     repeats: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Times that every tracker goes through every recording, each time with another seed."""
+    """Runs per tracker and recording, each with another seed."""
     equal_time: Annotated[float | None, tyro.conf.arg(metavar="MS")] = None
-    """Give every tracker the same CPU milliseconds an ordinary frame: its work is chosen by timing a few. Frames in
-    doubt cost a search besides; where even the least work takes longer, the report says so."""
+    """CPU milliseconds per median frame for every tracker. The work of each is chosen by timing some frames. A search
+    after a loss takes extra time. The report warns if even the least work takes longer."""
     seed: int = 0
-    """The first seed."""
+    """Seed of the first run."""
 
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
 
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Processes on this machine; as many as there are cores unless given."""
+    """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
-    """A Dask scheduler, as tcp://127.0.0.1:8786, whose workers (one thread each) track instead (extra: sweep). They
-    must see the recordings and DIR under the same paths."""
+    """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers track instead (extra: sweep). Each worker
+    needs one thread, and the recordings and DIR under the same paths."""
     json: bool = False
     """Print results.json instead of the table."""
 

@@ -1,4 +1,4 @@
-"""What `compare` and `demo` share: a comparison shown as it goes on, then its table, files and report."""
+"""Run a comparison with a progress bar, then write its table, files and report."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,13 +16,17 @@ from depthtrack.report.build import check_reportable, write_report
 
 
 def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> None:
-    """Make the runs, print the table (or JSON), and write results and report to `folder`."""
+    """Run the comparison, print its table or JSON, and write results and report to `folder`.
+
+    Raises:
+        InputError: if a recording is unusable, or `folder` is a file or contains runs with other options.
+        SweepError: if a run failed.
+    """
     check_output_folder(folder)
     with _bar() as listener:
         plans = compare(comparison, folder, workers, listener)
     folders = [Path(plan.folder) for plan in plans]
-    looked_at = evaluate_runs(folders, workers)
-    evaluations = list(bar(looked_at, "run", len(folders), "measuring"))
+    evaluations = list(bar(evaluate_runs(folders, workers), "run", len(folders), "evaluating"))
     if as_json:
         print(json.dumps([run_record(evaluation) for evaluation in evaluations], indent=2))
     else:
@@ -33,13 +37,20 @@ def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, a
 def write_everything(
     evaluations: Sequence[Evaluation], folder: Path, sequence: Path | None = None, quiet: bool = False
 ) -> None:
-    """Write results.csv, results.json and report.html, and say where the report is."""
+    """Write results.csv, results.json and report.html; print the path of the report.
+
+    sequence: where the recording is now; its recorded path if None.
+    quiet: print nothing.
+
+    Raises:
+        InputError: if the runs cannot share one report.
+    """
     check_reportable(evaluations)
     folder.mkdir(parents=True, exist_ok=True)
     write_results(evaluations, folder)
     write_report(evaluations, folder / "report.html", sequence, _frames)
     if not quiet:
-        print(f"\nthe report: {(folder / 'report.html').resolve()}")
+        print(f"\nwrote the report {(folder / 'report.html').resolve()}")
 
 
 def _frames(frames: Iterable[Frame], heading: str, total: int) -> Iterable[Frame]:
@@ -48,7 +59,7 @@ def _frames(frames: Iterable[Frame], heading: str, total: int) -> Iterable[Frame
 
 @contextmanager
 def _bar() -> Iterator[Listener]:
-    """A progress bar over the frames of all runs."""
+    """Yield a listener that shows the progress over the frames of all runs."""
     with counter() as shown:
 
         def listen(progress: ComparisonProgress) -> None:

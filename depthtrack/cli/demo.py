@@ -1,4 +1,4 @@
-"""`depthtrack demo`: from nothing, or a recording of your own, to a report on both trackers, in one command."""
+"""`depthtrack demo`: synthesise or open a recording, track it, and write a report."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
     from depthtrack.evaluation.compare.running import Source
 
 FRAMES = 240
-"""Of each synthetic recording: eight seconds."""
+"""Frames of each synthetic recording: eight seconds."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Track a recording with every tracker, and write a report to open in a browser.
+    """Track a recording with every tracker and write a report for the browser.
 
-    Without PATH, two recordings are synthesised first, as a Kinect would make them in a cluttered room: one of a
-    smooth skin, which ik fits, and one of spheres and cylinders, which pso fits, so that each tracker has a home
-    ground. With PATH, a recording of your own; it needs no ground truth.
+    Without PATH, two recordings of a Kinect in a cluttered room are synthesised first. One shows a smooth skin, the
+    surface that ik fits. The other shows spheres and cylinders, the surface that pso fits. Your own recording needs no
+    ground truth.
     """
 
     path: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")] = None
-    """A recording of your own."""
+    """Your own recording."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
-    """Folder to write to; given again, the demo goes on where it stood."""
+    """Folder to write to. The same folder continues an interrupted demo."""
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Processes; as many as there are cores unless given."""
+    """Processes on this machine (default: one per core)."""
     calibrate: bool = True
-    """Measure the hand of your recording first, unless --hand gives it; takes a minute or two on two cores."""
+    """Measure the hand of your recording first if --hand is absent. This takes one to two minutes on two cores."""
     open: bool = False
     """Open the report in the browser."""
 
@@ -56,14 +56,14 @@ class Command:
         print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
         comparison = Comparison(sources, tuple(read_specs(["pso,ik"])))
         compare_and_report(comparison, self.out, workers)
-        print(f"made in {perf_counter() - begun:.0f} s; open it in a browser")
+        print(f"finished in {perf_counter() - begun:.0f} s; open the report in a browser")
         if self.open:
             import webbrowser
 
             webbrowser.open((self.out / "report.html").resolve().as_uri())
 
     def _own(self, path: Path) -> "Source":
-        """Return the user's recording, with its hand measured unless --hand was given."""
+        """Return the user's recording with its measured hand, or with the hand of --hand."""
         source, file = self.recordings.source(path), self.out / f"hand-of-{path.resolve().name}.json"
         if source.hand is not None or not self.calibrate:
             return source
@@ -72,7 +72,7 @@ class Command:
         return replace(source, hand=str(file.resolve()))
 
     def _synthesised(self) -> "tuple[Source, ...]":
-        """The two recordings, those that are there already as they are."""
+        """Return the two synthetic recordings; existing ones are kept."""
         return self._recording("skin-hand", "skin"), self._recording("primitive-hand", "primitives")
 
     def _recording(self, name: str, model: Literal["skin", "primitives"]) -> "Source":
@@ -97,13 +97,13 @@ class Command:
 
 
 def _measure_hand(source: "Source", file: Path) -> bool:
-    """Write the sizes of the recording's hand to `file`; False where it does not show a hand well enough."""
+    """Write the sizes of the recording's hand to `file`; return False if the calibration fails."""
     sequence = source.open()
     print(f"measuring the hand: {file}", flush=True)
     try:
         found = calibrate_sequence(sequence, source.segmentation, source.side)
     except InputError as error:
-        print(f"the hand cannot be measured, so the average adult's sizes are used: {error}")
+        print(f"the calibration failed, so the average adult's sizes are used: {error}")
         return False
     file.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(file, found.to_json())

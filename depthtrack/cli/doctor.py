@@ -1,4 +1,4 @@
-"""`depthtrack doctor`: what works on this machine, and what to install for what does not."""
+"""`depthtrack doctor`: check the renderers of this machine."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Tell what works here: versions, processor, and every renderer, held to the oracle and timed.
+    """Check this machine: versions, processor and renderers.
 
-    Each renderer is tried in a process of its own, for drivers may crash or hang. EGL and OSMesa are optional: the
-    default renderer needs neither.
+    Prints the speed of each renderer and its difference from the oracle. Each renderer runs in its own process, since
+    drivers may crash or hang. EGL and OSMesa are optional. The default renderer needs neither.
     """
 
     time_limit: float = 60.0
-    """Seconds a renderer may take to start, compile and answer."""
+    """Seconds that a renderer may take to start, compile and return."""
     json: bool = False
     """Print JSON, in SI units, instead of text."""
 
@@ -48,7 +48,7 @@ class Command:
 
 
 def _text(machine: "SystemInfo", outcomes: "list[Outcome]") -> str:
-    """Aligned lines for people, depth in millimetres."""
+    """Return aligned lines, with depth in millimetres."""
     libraries = [f"{name} {version}" for name, version in machine.libraries.items() if version]
     absent = [name for name, version in machine.libraries.items() if version is None]
     vectors = ", ".join(name for name, has in (("AVX2", machine.avx2), ("AVX-512", machine.avx512)) if has)
@@ -60,8 +60,8 @@ def _text(machine: "SystemInfo", outcomes: "list[Outcome]") -> str:
         "",
         *_table(outcomes),
         "",
-        "Speed: 64 hypotheses of 64 x 64 pixels, kinematics and objective included, best of many calls.",
-        "Differences: the largest from the float64 ray caster over the same 64.",
+        "Speed: 64 hypotheses of 64 x 64 pixels, with kinematics and objective; best of many calls.",
+        "Differences: the largest ones from the float64 ray caster, over the same hypotheses.",
     ]
     problems = [outcome for outcome in outcomes if not outcome.works]
     for outcome in problems:
@@ -94,7 +94,7 @@ def _listed(items: list[str]) -> list[str]:
 
 
 def _wrapped(label: str, words: list[str], indent: int = 15, width: int = 110) -> list[str]:
-    """Words after a label, on as many lines as they need, indented alike; nothing where there are none."""
+    """Return lines with words after a label, equally indented; none without words."""
     lines: list[str] = []
     for word in words:
         if lines and indent + len(lines[-1]) + 1 + len(word) <= width:

@@ -1,4 +1,4 @@
-"""`depthtrack evaluate`: how good a run is, and how fast it was."""
+"""`depthtrack evaluate`: measure errors and time of runs."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,29 +17,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Tell how good runs are: against the truth their recordings know (phalanx endpoints or annotated joints in mm,
-    joint angles in degrees), by how they explain what the sensor saw (e3d, e2d, silhouettes), and how fast.
+    """Evaluate runs: pose errors, E3D, E2D, silhouette IoU and timing.
 
-    Or, with --predictions, how good somebody's predictions for a public benchmark are.
+    Pose errors need ground truth. Errors of phalanx endpoints or annotated joints are in mm, those of joint angles in
+    degrees. With --predictions, evaluate a prediction file of a public benchmark instead.
     """
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
-    """Run folders written by `depthtrack track`."""
+    """Run folders from `depthtrack track`."""
     sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Where the recording is, if it was moved since; or the recording that --predictions are for."""
+    """Recording of the runs, if it was moved, or of the predictions."""
     residuals: bool = True
-    """Look at every frame again, for the metrics that need no truth; without, this is quick."""
+    """Segment every frame again for the metrics without ground truth. This takes most of the time."""
     json: bool = False
-    """Print JSON instead of a table: an object for one run, a list for several."""
+    """Print JSON instead of a table: an object for one run, an array for several."""
     report: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Also write report.html, results.csv and results.json to this folder."""
 
     predictions: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
-    """A public prediction file: a line a frame, u v d of each joint, pixels and millimetres."""
+    """Prediction file of a public benchmark: one line per frame, with u v d of each joint in pixels and millimetres."""
     labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
-    """The true joints of the same frames, in the same format; or give --sequence."""
+    """True joints of the same frames in the same format, instead of --sequence."""
     benchmark: Annotated[Literal["nyu", "icvl", "msra"] | None, tyro.conf.arg(metavar="nyu|icvl|msra")] = None
-    """Whose joints, order and camera both files have."""
+    """Benchmark that defines the joints, their order and the camera of both files."""
 
     def run(self) -> None:
         from json import dumps
@@ -64,7 +64,7 @@ class Command:
         if not self.runs:
             raise InputError("name at least one run folder")
         if self.labels is not None or self.benchmark is not None:
-            raise InputError("--labels and --benchmark belong to --predictions: a run is held against its recording")
+            raise InputError("--labels and --benchmark need --predictions: leave them out to evaluate a run")
         return [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
 
     def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:
@@ -73,11 +73,11 @@ class Command:
         from depthtrack.recording import open_sequence
 
         if self.runs or self.report is not None:
-            raise InputError("--report and run folders are about tracking: --predictions go without them")
+            raise InputError("--predictions takes neither run folders nor --report: leave them out")
         if self.benchmark is None:
-            raise InputError("--predictions need --benchmark nyu, icvl or msra, which tells their joints and camera")
+            raise InputError("--predictions needs the joints and camera of a benchmark: give --benchmark nyu|icvl|msra")
         if (self.labels is None) == (self.sequence is None):
-            raise InputError("--predictions are held against --labels FILE.txt or a --sequence PATH: give one of them")
+            raise InputError("--predictions needs either --labels FILE.txt or --sequence PATH: give one of them")
         truth = self.labels if self.sequence is None else open_sequence(self.sequence)
         assert truth is not None
         evaluation = evaluate_predictions(path, find_benchmark(self.benchmark), truth)
@@ -93,18 +93,18 @@ def _text(evaluation: "Evaluation") -> str:
     if losses.losses:
         mean = losses.time_to_recovery().statistics()["mean"]
         after = "" if mean is None else f" after {mean:.2f} s on average"
-        lines.append(f"  lost {len(losses.losses)} times, found again {losses.recovered} times{after}")
+        lines.append(f"  lost {len(losses.losses)} times, recovered {losses.recovered} times{after}")
     lines.append(_HEAD)
     lines += [_row(metric.name, metric) for metric in evaluation.metrics]
     lines += [_row(f"  {finger} (mm)", metric) for finger, metric in evaluation.finger_errors.items()]
     lines.append(_row("ms_per_frame", evaluation.ms_per_frame))
     lines += [_row(f"  {stage} (ms)", metric) for stage, metric in evaluation.stage_ms.items()]
     if _compiled(evaluation.ms_per_frame):
-        lines.append("  (the first frames compile kernels: read the median)")
+        lines.append("  (the first frames compile kernels: use the median)")
     if evaluation.success is None:
-        lines.append("  (the recording knows neither true poses nor joints)")
+        lines.append("  (the recording has neither true poses nor true joints)")
     else:
-        lines.append(_shares(evaluation.success))
+        lines.append(_success_text(evaluation.success))
     return "\n".join(lines)
 
 
@@ -117,22 +117,22 @@ def _prediction_text(evaluation: "PredictionEvaluation") -> str:
         *(_row(f"  {name} (mm)", metric) for name, metric in evaluation.by_joint.items()),
     ]
     if evaluation.left_out_joints:
-        lines.insert(1, f"  left out: {evaluation.left_out_joints} joints of other frames that have no position")
-    return "\n".join(lines if evaluation.success is None else [*lines, _shares(evaluation.success)])
+        lines.insert(1, f"  left out: {evaluation.left_out_joints} joints without a position in the other frames")
+    return "\n".join(lines if evaluation.success is None else [*lines, _success_text(evaluation.success)])
 
 
 _HEAD = f"  {'':28}{'mean':>9}{'median':>9}{'p95':>9}{'max':>9}"
-_TELLING = 20
-"""Times the median frame's milliseconds beyond which one was no ordinary frame."""
+_COMPILED_RATIO = 20
+"""Ratio of the longest to the median time of a frame above which the longest includes compilation."""
 
 
 def _compiled(time: "Metric") -> bool:
-    """Whether a frame took so long that the mean tells little."""
+    """Return whether the longest frame includes compilation, which makes the mean useless."""
     median, longest = (time.statistics()[name] for name in ("median", "max"))
-    return median is not None and longest is not None and longest > _TELLING * median
+    return median is not None and longest is not None and longest > _COMPILED_RATIO * median
 
 
-def _shares(success: "SuccessCurve") -> str:
+def _success_text(success: "SuccessCurve") -> str:
     shares = ", ".join(f"{100 * success.within(mm):.0f} % within {mm} mm" for mm in (10, 20, 30, 40))
     return f"  largest error of a frame: {shares}; area under the curve {success.auc:.3f}"
 

@@ -1,4 +1,4 @@
-"""`depthtrack export`: write the joints of a run for other programs."""
+"""`depthtrack export`: write the joints of a run in another format."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +11,15 @@ from depthtrack.export.registry import EXPORTERS, export_joints, suffixes
 
 @dataclass(frozen=True)
 class Command:
-    """Write pose and 21 keypoints of each frame of a run. Keypoints are in MediaPipe's order, metres, camera frame (x
-    right, y down, z forward).
+    """Write the pose and the 21 keypoints of each frame of a run.
+
+    Keypoints are in MediaPipe order, in metres, in the camera frame (x right, y down, z forward).
     """
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
-    """A run folder written by `depthtrack track`."""
+    """Run folder from `depthtrack track`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
-    """The file to write: a table, numpy arrays, or a benchmark's text (u v d of each joint, pixels and millimetres)."""
+    """File to write: a table, numpy arrays, or a benchmark's text (u v d of each joint in pixels and millimetres)."""
     format: Annotated[str | None, tyro.conf.arg(metavar="|".join(EXPORTERS))] = None
     """Format of the file (default: by its suffix). A .txt file needs the benchmark whose joints and camera it uses."""
 

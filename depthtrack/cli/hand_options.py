@@ -21,13 +21,17 @@ class HandOptions:
     """Side of the average hand (default: right), or of the hand to read from a rig with both."""
 
     def chosen(self, sequence: "Sequence") -> "HandShape":
-        """Return the hand for a recording. Raises InputError if it cannot be read, or is another side's."""
+        """Return the hand for a recording.
+
+        Raises:
+            InputError: if the hand is unreadable, or of another side than `side`.
+        """
         from depthtrack.recording.hand_choice import chosen_hand
 
         return chosen_hand(sequence, self.hand, self.side)
 
     def note(self, sequence: "Sequence", path: Path) -> str | None:
-        """Return a line on the hand to use for the recording at `path` instead; None if one was given."""
+        """Return advice on the hand for the recording at `path`; None if one was given."""
         if self.hand is not None:
             return None
         own = sequence.hand

@@ -1,4 +1,4 @@
-"""`depthtrack info`: what a recording holds."""
+"""`depthtrack info`: summarise a recording."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Tell what a recording holds: frames, rate, camera, depth range, missing readings, ground truth, damage."""
+    """Summarise a recording: frames, rate, camera, depth, ground truth, damage."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     sample: Annotated[int | None, tyro.conf.arg(metavar="FRAMES")] = None
-    """Read only so many frames, evenly spread, where a recording is long; all of them unless given."""
+    """Number of evenly spaced frames to read (default: all)."""
     json: bool = False
     """Print JSON, in SI units and radians, instead of text."""
 
@@ -46,7 +46,7 @@ class Command:
 
 
 def _text(summary: "RecordingSummary") -> str:
-    """Aligned lines for people, in the units they think in."""
+    """Return aligned lines, with angles in degrees."""
     from math import degrees
 
     camera = summary.camera
@@ -68,7 +68,7 @@ def _text(summary: "RecordingSummary") -> str:
         ("ground truth", _truth_lines(summary, of_those_read)),
         (
             "made as",
-            [f"{_value_text(key)}: {_value_text(value)}" for key, value in summary.description.items()] or ["not told"],
+            [f"{_value_text(key)}: {_value_text(value)}" for key, value in summary.description.items()] or ["unknown"],
         ),
         ("damaged", _damage_lines(summary)),
     ]
@@ -78,7 +78,7 @@ def _text(summary: "RecordingSummary") -> str:
 def _depth_lines(summary: "RecordingSummary") -> list[str]:
     unit = f"in steps of {1000 * summary.camera.depth_scale:g} mm"
     if summary.depth_percentiles is None:
-        return [f"no reading at all; {unit}"]
+        return [f"no reading; {unit}"]
     nearest, low, median, high, farthest = summary.depth_percentiles.values()
     return [
         f"{nearest:.3f} to {farthest:.3f} m, {unit}",
@@ -107,13 +107,13 @@ def _damage_lines(summary: "RecordingSummary") -> list[str]:
 
 
 def _block(label: str, lines: list[str], width: int = 15, most: int = 12) -> list[str]:
-    """A label and its lines, indented alike; a long block is cut, and says so."""
+    """Return a label and its lines, equally indented; a long block is shortened."""
     shown = lines if len(lines) <= most else [*lines[: most - 1], f"... and {len(lines) - most + 1} more"]
     return [f"{label if i == 0 else '':<{width}}{line}" for i, line in enumerate(shown)]
 
 
 def _value_text(value: object) -> str:
-    """A value of sequence.json on one line, cut short, without characters that could steer a terminal."""
+    """Return a value of sequence.json as one line of at most 200 printable characters."""
     from json import dumps
 
     text = value if isinstance(value, str) else dumps(value, ensure_ascii=False)

@@ -1,4 +1,4 @@
-"""Folders to write to, checked before any work is done."""
+"""Check folders to write to before the work starts."""
 
 from pathlib import Path
 
@@ -6,6 +6,10 @@ from depthtrack.errors import InputError
 
 
 def check_output_folder(path: Path, option: str = "-o") -> None:
-    """Raise InputError where `path`, which is to be a folder, is a file."""
+    """Check that `path` is a folder or does not exist.
+
+    Raises:
+        InputError: if `path` is a file.
+    """
     if path.exists() and not path.is_dir():
-        raise InputError(f"{option} must be a folder, {path} is a file")
+        raise InputError(f"{option} must be a folder, found the file {path}: choose another name")

@@ -1,4 +1,4 @@
-"""Progress bars of long work, shown on a terminal only."""
+"""Progress bars of long work, only on a terminal."""
 
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -10,13 +10,16 @@ if TYPE_CHECKING:
     Item = TypeVar("Item")
 
 DELAY = 1.0
-"""Seconds that work takes before a bar appears."""
+"""Seconds of work before a bar appears."""
 
 
 def bar(
     items: "Iterable[Item]", unit: str = "frame", total: int | None = None, heading: str | None = None, initial: int = 0
 ) -> "Iterable[Item]":
-    """Return `items` under a bar; `initial` of the `total` were done before."""
+    """Return the items with a progress bar around them.
+
+    initial: number of items that were finished before, of `total`.
+    """
     from tqdm import tqdm
 
     shown: Iterable[Item] = tqdm(
@@ -26,7 +29,10 @@ def bar(
 
 
 def counter(total: int | None = None, unit: str = "frame", initial: int = 0, leave: bool = False) -> "Any":
-    """Return a tqdm bar to update by hand, a context manager; `leave` keeps it on the terminal."""
+    """Return a tqdm bar to update by hand, as a context manager.
+
+    leave: keep the bar on the terminal at the end.
+    """
     from tqdm import tqdm
 
     return tqdm(total=total, unit=unit, initial=initial, leave=leave, disable=None)

@@ -1,4 +1,4 @@
-"""The options of every command that opens a recording."""
+"""Options of the commands that open one recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,35 +19,39 @@ Pixels = Annotated[float | None, tyro.conf.arg(metavar="PIXELS")]
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """Which recording to open and, where it brings none of its own, its camera."""
+    """Recording to open, and its camera if it has none of its own."""
 
     path: tyro.conf.Positional[Path]
     """The recording: a sequence folder, or a plain TUM RGB-D folder with a camera given below."""
     camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Camera to use instead of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
+    """Camera in place of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
     camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
-    """Nominal camera of a sensor, or of the TUM RGB-D benchmark, to use instead."""
+    """Nominal camera of a sensor or of the TUM RGB-D benchmark, in place of the recording's own."""
     fx: Pixels = None
-    """Focal length; replaces the file's or preset's, or makes a camera together with --depth-scale."""
+    """Horizontal focal length. Replaces that of the file or preset, or defines a camera together with --depth-scale."""
     fy: Pixels = None
-    """Vertical focal length; the same as --fx unless given."""
+    """Vertical focal length (default: --fx)."""
     cx: Pixels = None
-    """Column of the principal point; the image's middle unless given."""
+    """Column of the principal point (default: the centre of the image)."""
     cy: Pixels = None
-    """Row of the principal point; the image's middle unless given."""
+    """Row of the principal point (default: the centre of the image)."""
     depth_scale: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
-    """Worth of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
+    """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
-    """At a frame that cannot be read: stop with an error, or skip and count it."""
+    """At an unreadable frame: stop with an error, or skip and count it."""
 
     def open(self, camera: "Camera | None" = None) -> "Sequence":
-        """Return the recording, seen through `camera` unless the options name another one. Raises InputError."""
+        """Return the recording with the camera of the options, else with `camera`, else its own.
+
+        Raises:
+            InputError: if the recording or the camera of the options is unusable.
+        """
         from depthtrack.recording import open_sequence
 
         return open_sequence(self.path, self._chosen_camera() or camera, self.on_damage)
 
     def _chosen_camera(self) -> "Camera | None":
-        """The camera these options describe, or None for the recording's own."""
+        """Return the camera that the options describe; None for the recording's own."""
         from dataclasses import replace
 
         from depthtrack.geometry.camera import PRESETS, Camera
@@ -62,7 +66,7 @@ class RecordingOptions:
         }
         given: dict[str, Any] = {name: number for name, number in numbers.items() if number is not None}
         if self.camera is not None and self.camera_preset is not None:
-            raise InputError("--camera and --camera-preset both name a camera: give one of them")
+            raise InputError("--camera and --camera-preset exclude each other: give one of them")
         if self.camera is not None:
             return replace(Camera.from_json(self.camera), **given)
         if self.camera_preset is not None:
@@ -70,6 +74,6 @@ class RecordingOptions:
         if not given:
             return None
         if self.fx is None or self.depth_scale is None:
-            raise InputError("a camera from numbers needs --fx and --depth-scale at least (or name a --camera-preset)")
+            raise InputError("a camera from numbers needs --fx and --depth-scale: give both, or a --camera-preset")
         width, height = image_size(self.path)
         return Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given})

@@ -1,4 +1,4 @@
-"""`depthtrack reproduce`: the papers' experiments, our figures beside theirs."""
+"""`depthtrack reproduce`: repeat experiments of the papers."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,40 +17,39 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Repeat the experiments of a paper: a table, a picture, our figures beside the paper's, and the time it took.
+    """Repeat the experiments of a paper and print both figures and the time.
 
-    Every figure gets a folder under DIR: rows.jsonl with a row a measurement, table.csv, summary.json, figure.png.
-    Rows are written as they come; the same command goes on where an interrupted one stood. After a change of the
-    code, choose a new DIR.
+    Each figure gets a folder in DIR with rows.jsonl (one row per measurement), table.csv, summary.json and figure.png.
+    The same command continues an interrupted one. After a change of the code, choose a new DIR.
     """
 
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
-    """Figures by name, as schroeder-8 or fig8; all of a paper by its author, as schroeder; all; or list, which tells
-    what there is."""
+    """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; or `list` to print the
+    names."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = None
     """Folder to write to."""
     quick: bool = False
-    """A coarse version: fewer cells and repetitions, swarms at 96 pixels; two minutes a figure on two cores, less than
-    one for those of schroeder."""
+    """Run a coarse version with fewer cells and repetitions and swarms at 96 pixels. A figure then takes two minutes on
+    two cores, less than one for those of schroeder."""
     variant: Literal["default", "paper"] = "default"
-    """The trackers as we measured them best, or as their papers have them."""
+    """Trackers of this program, or those of the papers."""
     renderer: Literal["raster", "egl", "osmesa"] = "raster"
-    """What renders and scores the swarm's hypotheses."""
+    """Renderer of the swarm's hypotheses."""
     repetitions: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Times every measurement of the swarm is repeated with another seed; unless given, as often as in the paper."""
+    """Measurements of the swarm per cell, each with another seed (default: as many as in the paper)."""
     resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
-    """Longest side of the region that the swarm's hypotheses are rendered at; the sensor's own unless given."""
+    """Longest side of the rendered hypotheses of the swarm (default: the resolution of the sensor)."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Only the first so many frames of the motion."""
+    """Use only the first N frames of the motion."""
     synergies: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH")] = None
-    """In place of each figure's own synergies: a set by name, as leap; those of a motion's own postures, as signs; a
-    .json of `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
+    """Synergies in place of those of each figure: the name of a set, as leap, or of a motion, as signs; a .json from
+    `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Processes on this machine; as many as there are cores unless given."""
+    """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
-    """A Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""
+    """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""
     json: bool = False
-    """Print the summaries as JSON, one array."""
+    """Print the summaries as a JSON array."""
 
     def run(self) -> None:
         from json import dumps
@@ -64,14 +63,20 @@ class Command:
         names = [name for name in self.figures if name != "list"]
         experiments = chosen_experiments(names or ["all"])
         options = ExperimentOptions(
-            self.quick, self.variant, self.renderer, self.repetitions, self.resolution, self.frames, self.synergies
+            quick=self.quick,
+            variant=self.variant,
+            renderer=self.renderer,
+            repetitions=self.repetitions,
+            resolution=self.resolution,
+            frames=self.frames,
+            synergies=self.synergies,
         )
         if "list" in self.figures:
             for experiment in experiments:
                 print(f"{experiment.name:15} {len(experiment.cells(options)):4} cells  {experiment.title}")
             return
         if self.out is None or not self.figures:
-            raise InputError("name the figures and a folder to write to, as in  depthtrack reproduce all -o DIR")
+            raise InputError("expected figures and a folder to write to: use  depthtrack reproduce all -o DIR")
         check_output_folder(self.out)
         workers, done = chosen_workers(self.jobs, self.scheduler), []
         for experiment in experiments:
@@ -91,8 +96,8 @@ def _as_text(done: "Reproduction", folder: Path) -> str:
     from depthtrack.text_table import aligned
 
     lines = [("", "paper, in its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
-    reused = f"{done.reused} of them from before, " if done.reused else ""
-    time = f"{done.seconds:.0f} s ({done.cell_seconds:.0f} s in the workers together)"
+    reused = f"{done.reused} of them reused, " if done.reused else ""
+    time = f"{done.seconds:.0f} s ({done.cell_seconds:.0f} s in all workers)"
     return "\n".join(
         [
             f"{done.figure}: {done.title} ({done.source})",

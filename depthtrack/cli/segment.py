@@ -1,4 +1,4 @@
-"""`depthtrack segment`: the hand in every frame, to look at and in figures."""
+"""`depthtrack segment`: segment the hand in every frame."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,23 +24,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Find the hand in every frame, by skin colour and depth, its bare forearm cut off at the wrist.
+    """Segment the hand in every frame by skin colour and depth, without its bare forearm.
 
-    Writes an overlay video, a contact sheet and a table, and tells how well the result agrees with the recording's
-    true silhouettes where it knows them.
+    Writes an overlay video, a contact sheet and a table. Prints the IoU with the true silhouettes if the recording has
+    them.
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FOLDER")] = None
-    """Folder to write to; NAME-segmented here unless given."""
+    """Folder to write to (default: NAME-segmented in the current folder)."""
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+    """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     depth_only: bool = False
-    """Leave colour aside."""
+    """Ignore colour."""
     wrist_margin: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
-    """Keep so much of the forearm beyond the wrist, to compare with silhouettes that do."""
+    """Length of the forearm to keep beyond the wrist, for comparison with silhouettes that include it."""
     tracker: TrackerName | None = None
-    """Let a tracker tell where hand and wrist are, as it does in `depthtrack track`: slower, and surer of the wrist."""
+    """Tracker whose predictions guide the segmentation, as in `depthtrack track`. This is slower but finds the wrist
+    more reliably."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     json: bool = False
     """Print JSON instead of text."""
@@ -54,7 +55,7 @@ class Command:
         from depthtrack.segmentation.segmenter import Segmenter
 
         if self.hands != HandOptions() and self.tracker is None:
-            raise InputError("--hand and --side are for a tracker: give one with --tracker ik or --tracker pso")
+            raise InputError("--hand and --side need a tracker: give --tracker ik or --tracker pso")
         if not -50 <= self.wrist_margin <= 200:
             raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
         sequence = self.recording.open()
@@ -82,7 +83,7 @@ class Command:
     def _written(
         self, sequence: "Sequence", results: "Iterator[SegmentedFrame]", folder: Path
     ) -> "Iterator[dict[str, Any]]":
-        """Pass on the figures of each frame, while video, contact sheet and table are made of the whole."""
+        """Yield the row of each frame, and write video, table and contact sheet."""
         import csv
 
         from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, sequence_depth_range
@@ -99,10 +100,10 @@ class Command:
         ):
             rows: csv.DictWriter[str] | None = None
             for result in bar(results, total=len(sequence)):
-                moment = AnnotatedFrame(result.frame, result.mask)
-                video.write(panel(moment, ("depth", "mask"), 360, near, far))
+                annotated = AnnotatedFrame(result.frame, result.mask)
+                video.write(panel(annotated, ("depth", "mask"), 360, near, far))
                 if result.frame.index in chosen:
-                    shown.append(moment)
+                    shown.append(annotated)
                 row = result.row()
                 if rows is None:
                     rows = csv.DictWriter(file, row)
@@ -117,8 +118,8 @@ def _text(report: dict[str, Any]) -> str:
     ms = report["ms_per_frame"]
     lines = [
         f"{report['recording']}: a hand in {report['frames_with_hand']} of {report['frames']} frames",
-        *([] if iou is None else [f"mean overlap with the true silhouette (IoU) {iou:.3f}"]),
-        *([] if ms is None else [f"{ms['median']:.1f} ms a frame (95 %: {ms['p95']:.1f} ms)"]),
-        f"look at {report['written_to']}/contact-sheet.png and overlay.mp4; figures are in segments.csv",
+        *([] if iou is None else [f"mean IoU with the true silhouette: {iou:.3f}"]),
+        *([] if ms is None else [f"median {ms['median']:.1f} ms per frame, 95th percentile {ms['p95']:.1f} ms"]),
+        f"wrote contact-sheet.png, overlay.mp4 and segments.csv to {report['written_to']}",
     ]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Options of the commands that track many recordings alike."""
+"""Options of the commands that track several recordings."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,22 +16,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """How much of each recording to track, and what to know beside it."""
+    """Frames to track, and the hand, skin colours and camera of all recordings."""
 
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Only the first so many frames of each recording."""
+    """Track only the first N frames of each recording."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours learnt by `depthtrack train-skin`; published statistics unless given."""
+    """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Camera of recordings that bring none."""
+    """Camera of recordings without one."""
     camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
-    """Nominal camera of a sensor instead."""
+    """Nominal camera of a sensor, for recordings without one."""
     on_damage: Literal["refuse", "skip"] = "refuse"
-    """At a frame that cannot be read: stop with an error, or skip and count it."""
+    """At an unreadable frame: stop with an error, or skip and count it."""
 
     def source(self, path: Path) -> "Source":
-        """A recording with these options. Raises InputError."""
+        """Return the recording at `path` with these options.
+
+        Raises:
+            InputError: if the number of frames is below 1, or two cameras or an unreadable one are given.
+        """
         from depthtrack.evaluation.compare.running import Source
 
         if self.frames is not None and self.frames < 1:
@@ -53,7 +57,7 @@ class SourceOptions:
         from depthtrack.geometry.camera import PRESETS, Camera
 
         if self.camera is not None and self.camera_preset is not None:
-            raise InputError("--camera and --camera-preset both name a camera: give one of them")
+            raise InputError("--camera and --camera-preset exclude each other: give one of them")
         if self.camera is not None:
             return asdict(Camera.from_json(self.camera))
         return None if self.camera_preset is None else asdict(PRESETS[self.camera_preset])

@@ -1,4 +1,4 @@
-"""`depthtrack synergies`: the principal components of recorded postures."""
+"""`depthtrack synergies`: fit and show principal components of hand postures."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Fit:
-    """Fit synergies to recorded postures, from one file or several.
+    """Fit synergies to the recorded postures of one or more files.
 
-    Reads the synergy papers' .mat (26 columns), .csv of finger angles or joint positions, recordings and run folders,
-    and .npz of joint positions. Joint positions are fitted by inverse kinematics, each hand with its own sizes.
+    Reads .mat files with 26 columns, .csv files of finger angles or joint positions, .npz files of joint positions,
+    recordings and run folders. Joint positions are converted by inverse kinematics, with sizes fitted to each hand.
     """
 
     postures: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POSTURES ...")]
@@ -27,13 +27,13 @@ class Fit:
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE.json")]
     """File to write."""
     tracks: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
-    """Only the tracks of these names, of files that name theirs."""
+    """Names of the tracks to use, for files with named tracks (default: all)."""
     components: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
-    """Keep only the first so many of the 20 components."""
+    """Number of first components to keep (default: all 20)."""
     within_limits: bool = False
-    """Move angles outside the joint limits to the nearest within, before fitting."""
+    """Clip angles to the joint limits before the fit."""
     source: str = ""
-    """Where the postures are from, and under which licence; the files' names unless told."""
+    """Origin and licence of the postures (default: the names of the files)."""
 
     def run(self) -> None:
         import numpy as np
@@ -42,22 +42,22 @@ class Fit:
         from depthtrack.hand.synergies import Synergies, save_synergies
 
         if not self.postures:
-            raise InputError("say which postures to fit: depthtrack synergies fit POSTURES... -o FILE.json")
+            raise InputError("expected files of postures: use  depthtrack synergies fit POSTURES... -o FILE.json")
         sets = [self._read(path) for path in bar(self.postures, "file")]
-        angles = np.concatenate([one.angles for one in sets])
+        angles = np.concatenate([postures.angles for postures in sets])
         outside = float(np.mean((angles < LOWER) | (angles > UPPER)))
         if self.within_limits:
             angles = np.clip(angles, LOWER, UPPER)
         synergies = Synergies.fit(angles, self.source or ", ".join(path.name for path in self.postures))
         kept = synergies if self.components is None else synergies.truncated(self.components)
         save_synergies(kept, self.out)
-        for path, one in zip(self.postures, sets, strict=True):
-            misfit = "" if one.misfit is None else f", the hand fitted to the joints within {1000 * one.misfit:.1f} mm"
-            print(f"{path}: {len(one.angles)} postures{misfit}")
-        what = "moved there" if self.within_limits else "kept as they are; --within-limits moves them there"
-        print(f"outside the joint limits: {outside:.1%} of the angles, {what}\n")
+        for path, postures in zip(self.postures, sets, strict=True):
+            misfit = "" if postures.misfit is None else f", fitted to the joints within {1000 * postures.misfit:.1f} mm"
+            print(f"{path}: {len(postures.angles)} postures{misfit}")
+        action = "clipped" if self.within_limits else "kept; --within-limits clips them"
+        print(f"outside the joint limits: {outside:.1%} of the angles, {action}\n")
         print(_text(kept))
-        print(f"\nwrote {self.out}: look at it with  depthtrack synergies info {self.out} --picture FILE.png")
+        print(f"\nwrote {self.out}: draw it with  depthtrack synergies info {self.out} --picture FILE.png")
 
     def _read(self, path: Path) -> "PostureSet":
         from depthtrack.posture_databases.registry import read_postures
@@ -71,16 +71,16 @@ class Fit:
 
 @dataclass(frozen=True)
 class Info:
-    """Tell what synergies do: variance and limits of each component, and a picture of the first ones."""
+    """Print variance and limits of each synergy, and draw the first ones."""
 
     file: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.json")] = "leap"
-    """File written by `fit`, or the name of a set that comes with depthtrack: leap, leap-grasps."""
+    """File from `fit`, or the name of an included set: leap, leap-grasps."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
-    """Write a picture: the hand from -2 to +2 standard deviations along each of the first components."""
+    """Picture to write: the hand from -2 to +2 standard deviations along each of the first components."""
     components: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 4
-    """How many components the picture shows."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.JSON")] = None
-    """Sizes of the hand in the picture; the average adult's unless given."""
+    """Number of components in the picture."""
+    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
+    """Hand of the picture (default: the average adult's)."""
     json: bool = False
     """Print JSON, in radians, instead of a table."""
 
@@ -109,7 +109,7 @@ class Info:
 
 @dataclass(frozen=True)
 class Command:
-    """Hand synergies: fit them to recorded postures, or tell what a set of them does."""
+    """Fit hand synergies to recorded postures, or print a set of them."""
 
     action: tyro.conf.OmitSubcommandPrefixes[
         Annotated[Fit, tyro.conf.subcommand("fit")] | Annotated[Info, tyro.conf.subcommand("info")]
@@ -120,7 +120,7 @@ class Command:
 
 
 _PAPER = {3: "80 % of varied motions, 90 % of grasps", 6: "90 % of varied motions"}
-"""What the first components cover in Schroeder et al. 2014, Sec. VI-A."""
+"""Variance covered by the first components in Schroeder et al. 2014, Sec. VI-A."""
 
 
 def _text(synergies: "Synergies") -> str:
@@ -130,7 +130,7 @@ def _text(synergies: "Synergies") -> str:
         f"source   {synergies.source}",
         f"spread   {degrees(sqrt(synergies.total_variance / 20)):.1f} degrees, root mean square of the 20 angles",
         "",
-        "component  share of variance  so far  deviation  least  most   (degrees along the component)",
+        "component  share of variance     sum  deviation    min   max   (degrees along the component)",
     ]
     for k in range(len(synergies)):
         so_far = synergies.variance_share(k + 1)

@@ -1,4 +1,4 @@
-"""`depthtrack synth`: a synthetic recording of a moving hand, with exact ground truth."""
+"""`depthtrack synth`: synthesise a recording of a moving hand with exact ground truth."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,61 +15,61 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Synthesise a recording of a moving hand, with exact ground truth: poses, joints, hand mask and depth.
+    """Synthesise a recording of a moving hand with exact ground truth.
 
-    Motions: everyday, grasp, other-grasps, signs, fast, random (any length), or a motion file of your own. The same
-    options give the same bytes.
+    The ground truth has poses, joints, hand masks and depth. The motions are everyday, grasp, other-grasps, signs, fast
+    and random (any length), or your own motion file. The same options give the same bytes.
     """
 
     motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")]
-    """Name of a motion, or path of a .toml file like those in `sequences/`; `list` tells what there is."""
+    """Name of a motion, or path of a .toml file like those in `sequences/`; `list` prints the names."""
     out: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")] = None
-    """Folder to write; refused when it is there already, unless --overwrite."""
+    """Folder to write. An existing folder needs --overwrite."""
 
     sensor: Literal["ideal", "kinect1", "kinect2", "realsense"] = "ideal"
-    """Depth camera to imitate: its image, noise, missing readings, shadows."""
+    """Depth camera to simulate: resolution, noise, missing readings, shadows."""
     background: Literal["none", "wall", "room"] = "none"
-    """What is behind the hand; the room is cluttered, with a face and other things of skin's colour."""
+    """Background of the hand. The room is cluttered, with a face and other objects of skin colour."""
     model: Annotated[str, tyro.conf.arg(metavar="primitives|skin|RIG.glb")] = "primitives"
-    """The hand: 37 spheres and cylinders, a smooth skin, or a rigged mesh (.glb, .gltf) with its own sizes."""
+    """Hand to draw: 37 spheres and cylinders, a smooth skin, or a rigged mesh (.glb, .gltf) with its own sizes."""
     forearm: Literal["auto", "on", "off"] = "auto"
-    """With its bare forearm, which trackers must cut off; auto is on before a wall and in a room."""
+    """Draw the bare forearm, which a tracker must cut off. With auto it is drawn before a wall and in a room."""
 
     distance: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
-    """From the camera to the hand; 0.5 unless told, 0.65 for kinect2, which sees nothing nearer than 0.5."""
+    """Camera-to-hand distance (default: 0.5, or 0.65 for kinect2, whose minimum range is 0.5)."""
     viewpoint: Annotated[int, tyro.conf.arg(metavar="0..7")] = 0
-    """Camera on the hemisphere around the hand: 0 frontal; 1-4 40 degrees to the right, above, left, below; 5-7 75
-    degrees to the right, above, left."""
+    """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
+    to 7 are 75 degrees to the right, above, left."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
-    """Only so many frames; how many, for the random motion (360)."""
+    """Number of frames (default: the whole motion, or 360 of the random motion)."""
     fps: Annotated[float, tyro.conf.arg(metavar="HZ")] = 30.0
-    """Frames a second."""
+    """Frames per second."""
 
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.JSON")] = None
+    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
     """Sizes of the hand (default: the average adult's)."""
     scale: float = 1.0
     """Factor on all sizes of the hand."""
     side: Annotated[Literal["right", "left"] | None, tyro.conf.arg(metavar="{right,left}")] = None
-    """Right or left hand (default: the side of --hand or --model, or right). Of a rigged mesh, the hand to read."""
+    """Side of the hand (default: that of --hand or --model, or right), or of the hand to read from a rigged mesh."""
 
     depth_noise: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
-    """Add Gaussian noise of this deviation to the depth, on top of the sensor's."""
+    """Standard deviation of Gaussian noise to add to the depth of the sensor."""
     skin_flips: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 0.0
-    """Make this share of all pixels look like skin where there is none, and the other way round."""
+    """Share of the pixels whose skin label is inverted."""
     seed: int = 0
-    """Chooses person, room, noise and random motion."""
+    """Seed of the person, room, noise and random motion."""
 
     overwrite: bool = False
-    """Replace the recording that OUT holds."""
+    """Replace the recording in OUT."""
     threads: int = 2
-    """Workers; the result is the same for any number."""
+    """Number of threads. The result does not depend on it."""
 
     def run(self) -> None:
         if self.motion == "list" and self.out is None:
             print(_motions())
             return
         if self.out is None:
-            raise InputError(f"say where to write: depthtrack synth {self.motion} OUT")
+            raise InputError(f"expected a folder to write to: use  depthtrack synth {self.motion} OUT")
         if self.threads < 1:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
 
@@ -102,7 +102,7 @@ class Command:
         print(
             f"{self.out}: {len(made)} frames of '{made.motion.name}', {camera.width}x{camera.height}"
             f" at {self.fps:g} Hz, a {options.hand.side} hand {made.distance:g} m before the {self.sensor} camera\n"
-            f"look at it with  depthtrack view {self.out}"
+            f"show it with  depthtrack view {self.out}"
         )
 
     def _hand(self) -> "HandShape":

@@ -1,4 +1,4 @@
-"""`depthtrack track`: the hand of a recording, frame by frame, into a run folder."""
+"""`depthtrack track`: track the hand of a recording and write a run folder."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -114,7 +114,9 @@ class TrackCommand:
 
 
 def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]:
-    """Return the command with the options of the tracker that the arguments name, and its defaults after `--config`.
+    """Return the command with the options of the tracker in the arguments, and its defaults.
+
+    The defaults are those of the run that `--config` names, if any.
 
     Raises:
         InputError: no tracker has this name, or `--config` names no run.

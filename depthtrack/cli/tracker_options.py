@@ -1,4 +1,4 @@
-"""Command-line options of a tracker, derived from its configuration: names, defaults and help."""
+"""Derive the command-line options of a tracker from its configuration."""
 
 import dataclasses
 import json
@@ -23,7 +23,7 @@ def requested_run(arguments: Sequence[str]) -> "RunConfiguration | None":
     """Return the configuration that `--config` names among the arguments, if any.
 
     Raises:
-        InputError: the file holds no configuration of a run.
+        InputError: if the file contains no configuration of a run.
     """
     path = _value(arguments, "--config")
     if path is None:
@@ -34,10 +34,10 @@ def requested_run(arguments: Sequence[str]) -> "RunConfiguration | None":
 
 
 def requested_tracker(arguments: Sequence[str], run: "RunConfiguration | None") -> TrackerConfig:
-    """Return the configuration of the tracker that the arguments name, else of the run, else the default's.
+    """Return the configuration of the tracker in the arguments, of the run, or the default.
 
     Raises:
-        InputError: no tracker has this name.
+        InputError: if no tracker has this name.
     """
     name = _value(arguments, "--tracker")
     if run is not None and name in (None, run.tracker.name):
@@ -48,7 +48,7 @@ def requested_tracker(arguments: Sequence[str], run: "RunConfiguration | None") 
 
 
 def options_type(config: TrackerConfig) -> type[Any]:
-    """Return a frozen dataclass with one field per option of a tracker; its defaults are those of `config`."""
+    """Return a frozen dataclass with one field per option of `config`, with its defaults."""
     fields = [(_field_name(each), _annotation(each), _default(each)) for each in parameters(config)]
     return dataclasses.make_dataclass("TrackerOptions", fields, frozen=True)
 
@@ -57,7 +57,7 @@ def chosen_config(config: TrackerConfig, chosen: Any) -> TrackerConfig:
     """Return `config` with the options that the command line changed.
 
     Raises:
-        InputError: a value is out of range, or no JSON where that is expected.
+        InputError: if a value is out of range, or is not JSON although its type needs it.
     """
     changed = {}
     for each in parameters(config):
@@ -72,7 +72,7 @@ def _field_name(parameter: Parameter) -> str:
 
 
 def _annotation(parameter: Parameter) -> Any:
-    """Return the type of the field with its names and help; advanced options are parsed but not listed."""
+    """Return the type of a field with its names and help; advanced options are not listed."""
     flag = parameter.name.replace("_", "-")
     unit, source = (
         f" [{parameter.unit}]" if parameter.unit else "",

@@ -1,4 +1,4 @@
-"""`depthtrack train-skin`: a skin colour model from labelled images."""
+"""`depthtrack train-skin`: train a skin colour model on labelled images."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,18 +11,18 @@ from depthtrack.cli.progress import bar
 
 @dataclass(frozen=True)
 class Command:
-    """Learn skin colours where the published statistics do not fit: other light, other cameras.
+    """Train a skin colour model if the published statistics do not fit the light or the camera.
 
-    Give a folder of images and one of masks, white on skin, with the same names; or a recording with colour and
-    hand_mask/, whose forearms should then be covered. Use the result with --skin-model.
+    Give a folder of images and a folder of masks with the same names, white on skin. Or give a recording with colour
+    and hand_mask/, in which the forearm should be covered. Use the model with --skin-model.
     """
 
     images: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="IMAGES")]
     """Folder of images, or a recording."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")]
-    """Where to write the model."""
+    """Model to write."""
     masks: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="MASKS")] = None
-    """Folder of masks; not needed for a recording."""
+    """Folder of masks; leave it out for a recording."""
 
     def run(self) -> None:
         from depthtrack.segmentation.labelled_images import from_folders, from_recording

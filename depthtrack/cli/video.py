@@ -1,4 +1,4 @@
-"""`depthtrack video`: a film of a run, with the tracked hand over it."""
+"""`depthtrack video`: write a video of a run."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,22 +12,23 @@ from depthtrack.errors import InputError
 
 @dataclass(frozen=True)
 class Command:
-    """Write a film of a run: the recording with the tracked hand over it, the hypothesis over depth, the residual, the
-    skeleton beside the true one if there is one, what the tracker said, and the energy over time.
+    """Write a video of a run: the tracked hand over colour and depth, residual and skeletons.
+
+    The true skeleton is drawn if the recording has one. Below are the status of the tracker and the energy over time.
     """
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
-    """A run folder written by `depthtrack track`."""
+    """Run folder from `depthtrack track`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT.mp4")]
-    """The film to write."""
+    """Video to write."""
     sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Where the recording is, if it was moved since."""
+    """Recording of the run, if it was moved."""
     height: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 360
     """Height of each of the four views."""
     speed: float = 1.0
-    """Slower below 1, faster above."""
+    """Factor on the playback speed."""
     codec: Literal["quick", "web"] = "quick"
-    """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
+    """Video encoding: "quick" for video players; "web" also for browsers, but it takes much longer."""
 
     def run(self) -> None:
         from depthtrack.evaluation.replay import Replay
@@ -43,5 +44,5 @@ class Command:
         codecs = WEB_CODECS if self.codec == "web" else None
         count = write_run_film(replay, self.out, codecs, self.height, bar, self.speed)
         if count == 0:
-            raise InputError(f"the run {self.path} holds no frame to show")
+            raise InputError(f"the run {self.path} has no frame to show: choose another run")
         print(f"wrote the video {self.out}: {count} frames")

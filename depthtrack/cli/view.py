@@ -1,4 +1,4 @@
-"""`depthtrack view`: look at a recording, or at a run beside its recording."""
+"""`depthtrack view`: show a recording, or a run over its recording."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -15,16 +15,19 @@ if TYPE_CHECKING:
     from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator
     from depthtrack.viewing.rerun_viewer import RerunViewer
 
-MOST_MOMENTS = 200
+MOST_FRAMES = 200
+"""Largest number of frames on a contact sheet or strip."""
 
 
 @dataclass(frozen=True)
 class Command(ViewOptions):
-    """Look at a recording: depth, colour, the hand's mask and the true skeleton. Or at a run (a folder that `depthtrack
-    track` wrote): the tracked hand over its recording, the residual, skeletons, and the energies over time.
+    """Show a recording, or a run from `depthtrack track`.
 
-    Opens the interactive viewer where it is installed and there is a screen, and else writes a contact sheet. The
-    options below write files instead; several may be given at once.
+    A recording is shown with depth, colour, hand mask and true skeleton. A run is shown as the tracked hand over its
+    recording, with the residual, skeletons, and energies over time.
+
+    Opens the interactive viewer if it is installed and a screen is available; otherwise writes a contact sheet. The
+    options below write files instead and can be combined.
     """
 
     def run(self) -> None:
@@ -45,7 +48,7 @@ class Command(ViewOptions):
         if self.video is not None:
             self._write_video(sequence, self.video, near, far)
         if self.rrd is not None:
-            _write_rrd(_viewer(sequence, near, far), self.rrd, self._all_moments(sequence))
+            _write_rrd(_viewer(sequence, near, far), self.rrd, self._all_frames(sequence))
         if self.web:
             self._serve(sequence, near, far)
         if not (self.sheet or self.strip or self.video or self.rrd or self.web):
@@ -54,21 +57,21 @@ class Command(ViewOptions):
             print(f"skipped frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}")
 
     def _check_options(self) -> None:
-        if self.count is not None and not 1 <= self.count <= MOST_MOMENTS:
-            raise InputError(f"--count must be from 1 to {MOST_MOMENTS} moments, found {self.count}")
-        if len(self.frames) > MOST_MOMENTS:
-            raise InputError(f"--frames must name at most {MOST_MOMENTS} frames, found {len(self.frames)}")
+        if self.count is not None and not 1 <= self.count <= MOST_FRAMES:
+            raise InputError(f"--count must be from 1 to {MOST_FRAMES} frames, found {self.count}")
+        if len(self.frames) > MOST_FRAMES:
+            raise InputError(f"--frames must name at most {MOST_FRAMES} frames, found {len(self.frames)}")
         if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1] < float("inf"):
-            raise InputError(f"--depth-range must be two growing numbers of metres, found {self.depth_range}")
+            raise InputError(f"--depth-range must be two increasing numbers of metres, found {self.depth_range}")
 
     def _show(self, sequence: "Sequence", near: float, far: float) -> None:
-        """The interactive viewer, or the next best thing."""
+        """Open the interactive viewer, or write a contact sheet if that is impossible."""
         reason = why_no_window()
         if reason is None:
             viewer = _viewer(sequence, near, far)
             viewer.open_window()
-            for moment in self._all_moments(sequence):
-                viewer.log(moment)
+            for annotated in self._all_frames(sequence):
+                viewer.log(annotated)
             viewer.close()
         else:
             self._write_sheet(sequence, Path(f"{sequence.name}-contact-sheet.png"), near, far)
@@ -80,8 +83,8 @@ class Command(ViewOptions):
         viewer = _viewer(sequence, near, far)
         print(f"the viewer is at {viewer.serve()}  (Ctrl-C ends it)", flush=True)
         try:
-            for moment in self._all_moments(sequence):
-                viewer.log(moment)
+            for annotated in self._all_frames(sequence):
+                viewer.log(annotated)
             while True:
                 sleep(3600)
         except KeyboardInterrupt:
@@ -90,15 +93,15 @@ class Command(ViewOptions):
     def _write_sheet(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:
         from depthtrack.viewing.contact_sheet import contact_sheet, describe, save_picture
 
-        moments = self._chosen_moments(sequence, self.count or 12)
-        save_picture(contact_sheet(moments, sequence.name, describe(sequence), near, far), path)
+        frames = self._chosen_frames(sequence, self.count or 12)
+        save_picture(contact_sheet(frames, sequence.name, describe(sequence), near, far), path)
         print(f"wrote the contact sheet {path}")
 
     def _write_strip(self, sequence: "Sequence", path: Path) -> None:
         from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.strip import strip
 
-        save_picture(strip(self._chosen_moments(sequence, self.count or 7)), path)
+        save_picture(strip(self._chosen_frames(sequence, self.count or 7)), path)
         print(f"wrote the strip {path}")
 
     def _write_video(self, sequence: "Sequence", path: Path, near: float, far: float) -> None:
@@ -109,17 +112,17 @@ class Command(ViewOptions):
         layers = useful_layers(sequence, self._estimator())
         codecs = WEB_CODECS if self.codec == "web" else QUICK_CODECS
         with VideoWriter(path, frame_rate(sequence) or 30.0, codecs) as writer:
-            for moment in self._all_moments(sequence):
-                writer.write(panel(moment, layers, 360, near, far))
+            for annotated in self._all_frames(sequence):
+                writer.write(panel(annotated, layers, 360, near, far))
         print(f"wrote the video {path}: {writer.frame_count} frames")
 
-    def _all_moments(self, sequence: "Sequence") -> "Iterator[AnnotatedFrame]":
-        """Every frame, with a progress bar where people watch."""
+    def _all_frames(self, sequence: "Sequence") -> "Iterator[AnnotatedFrame]":
+        """Yield every frame, with a progress bar on a terminal."""
         from depthtrack.viewing.annotated_frame import moments
 
         yield from bar(moments(sequence, None, self._estimator()), total=len(sequence))
 
-    def _chosen_moments(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
+    def _chosen_frames(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
         from depthtrack.viewing.annotated_frame import evenly_chosen, moments
 
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
@@ -128,7 +131,7 @@ class Command(ViewOptions):
         return moments(sequence, self.frames or evenly_chosen(len(sequence), count), self._estimator())
 
     def _estimator(self) -> "MaskEstimator | None":
-        """A fresh one for each pass over the recording, which it follows."""
+        """Return a new mask estimator for one pass over the recording; None if not wanted."""
         if not self.estimate:
             return None
         from depthtrack.viewing.estimated_masks import mask_estimator

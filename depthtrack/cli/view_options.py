@@ -1,4 +1,4 @@
-"""The options of `depthtrack view`, for recordings and for runs."""
+"""Options of `depthtrack view` for recordings and runs."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,29 +11,29 @@ from depthtrack.cli.recording_options import RecordingOptions
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What to show, and which files to write."""
+    """Content to show and files to write."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
-    """Write a contact sheet: moments evenly chosen from the recording."""
+    """Contact sheet to write, with evenly spaced frames of the recording."""
     strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
-    """Write a banner close on the hand: a column a moment; colour, depth, hand and skeleton below each other."""
+    """Strip of close-ups to write: one column per frame, with colour, depth, hand and skeleton below each other."""
     video: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mp4")] = None
-    """Write a video of the whole recording."""
+    """Video of the whole recording to write."""
     rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
-    """Write a recording for the interactive viewer (rerun FILE.rrd opens it)."""
+    """File of the interactive viewer to write (rerun FILE.rrd opens it)."""
     web: bool = False
     """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
     frames: Annotated[tuple[int, ...], tyro.conf.arg(metavar="INDEX...")] = ()
-    """Frames to show on sheet and strip, instead of evenly chosen ones."""
-    count: Annotated[int | None, tyro.conf.arg(metavar="MOMENTS")] = None
-    """How many moments to choose: 12 on a sheet and 7 on a strip unless given."""
+    """Indices of the frames on sheet and strip (default: evenly spaced frames)."""
+    count: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
+    """Number of evenly spaced frames (default: 12 on a sheet, 7 on a strip)."""
     depth_range: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="NEAR FAR")] = None
-    """Metres at the ends of the depth colours; found from the recording unless given."""
+    """Metres at the ends of the depth colours (default: the range of the recording)."""
     estimate: bool = True
-    """Where the recording knows no true mask, show the hand as segmentation finds it, in another colour."""
+    """Show the segmented hand in another colour if the recording has no true masks."""
     codec: Literal["quick", "web"] = "quick"
-    """Video encoding: "quick" for video players, "web" for browsers too, which takes much longer."""
+    """Video encoding: "quick" for video players; "web" also for browsers, but it takes much longer."""
 
     sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
-    """Where the recording of a run is, if it was moved since."""
+    """Recording of the run, if it was moved."""

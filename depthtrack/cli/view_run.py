@@ -1,4 +1,4 @@
-"""`depthtrack view` on a run: the same options, for the tracked hand over its recording."""
+"""`depthtrack view` on a run: show the tracked hand over its recording."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,18 +13,23 @@ if TYPE_CHECKING:
 
 _NOT_FOR_RUNS = ("strip", "depth_range")
 _CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy", "depth_scale")
-"""A run brings its own."""
+"""Options of the camera, which a run stores."""
 
 
 def view_run(options: ViewOptions) -> None:
-    """Show the run that the options name. Raises InputError, and MissingExtraError for a viewer without its extra."""
+    """Show the run that the options name.
+
+    Raises:
+        InputError: if an option is not for runs, or the run or its recording is unusable.
+        MissingExtraError: if the viewer is not installed.
+    """
     from depthtrack.evaluation.replay import Replay
     from depthtrack.recording.run_folder import Run
 
     for owner, names in ((options, _NOT_FOR_RUNS), (options.recording, _CAMERA)):
         for name in names:
             if getattr(owner, name) is not None:
-                raise InputError(f"--{name.replace('_', '-')} is for recordings: leave it out for a run")
+                raise InputError(f"--{name.replace('_', '-')} applies to recordings: leave it out for a run")
     replay = Replay.open(Run.load(options.recording.path), options.sequence)
     if options.sheet is not None:
         _write_sheet(replay, options, options.sheet)
@@ -42,7 +47,7 @@ def view_run(options: ViewOptions) -> None:
 
 
 def _show(replay: "Replay", options: ViewOptions) -> None:
-    """The interactive viewer, or the next best thing."""
+    """Open the interactive viewer, or write a contact sheet if that is impossible."""
     reason = why_no_window()
     if reason is not None:
         _write_sheet(replay, options, Path(f"{replay.run.folder.resolve().name}-contact-sheet.png"))
@@ -52,8 +57,8 @@ def _show(replay: "Replay", options: ViewOptions) -> None:
 
     viewer = RerunRunViewer(replay)
     viewer.open_window()
-    for seen in bar(replay):
-        viewer.log(seen)
+    for replayed in bar(replay):
+        viewer.log(replayed)
     viewer.close()
 
 
@@ -65,8 +70,8 @@ def _serve(replay: "Replay") -> None:
     viewer = RerunRunViewer(replay)
     print(f"the viewer is at {viewer.serve()}  (Ctrl-C ends it)", flush=True)
     try:
-        for seen in bar(replay):
-            viewer.log(seen)
+        for replayed in bar(replay):
+            viewer.log(replayed)
         while True:
             sleep(3600)
     except KeyboardInterrupt:
@@ -82,7 +87,7 @@ def _write_sheet(replay: "Replay", options: ViewOptions, path: Path) -> None:
     outside = [index for index in options.frames if index not in row_of]
     if outside:
         raise InputError(
-            f"--frames must be frames of the run {replay.run.folder}, which has none numbered {outside[0]}"
+            f"--frames must be frames of the run {replay.run.folder}, found {outside[0]}: choose among its frames"
         )
     rows = [row_of[index] for index in options.frames] or evenly_chosen(len(replay), options.count or 12)
     save_picture(run_sheet(replay, rows), path)

@@ -1,10 +1,10 @@
-"""Whether the interactive viewer can open a window here."""
+"""Check whether the interactive viewer can open a window."""
 
 INSTALL_HINT = "pip install 'depthtrack[view]'"
 
 
 def why_no_window() -> str | None:
-    """What keeps the interactive viewer from opening, and what to do; None when nothing does."""
+    """Return why the interactive viewer cannot open a window, and what to do; None if it can."""
     import os
     import sys
     from importlib.util import find_spec
@@ -12,7 +12,5 @@ def why_no_window() -> str | None:
     if find_spec("rerun") is None:
         return f"for the interactive viewer:  {INSTALL_HINT}"
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return (
-            "there is no screen for the interactive viewer: --web serves it to a browser, --rrd FILE.rrd saves for it"
-        )
+        return "no screen is available for the interactive viewer: use --web for a browser, or --rrd FILE.rrd to save"
     return None

@@ -1,4 +1,4 @@
-"""The demo: from nothing to a report, and from a recording of one's own without any truth."""
+"""Test the demo: a report on synthetic recordings, and on a recording without ground truth."""
 
 import json
 import shutil
@@ -19,7 +19,7 @@ from tests.support.runs import synthesise
 
 
 @pytest.mark.slow
-def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_demo_makes_a_report_on_synthetic_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "demo"
     assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0
     assert str(out / "report.html") in capsys.readouterr().out
@@ -28,11 +28,11 @@ def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.Cap
         (recording, tracker) for recording in ("skin-hand", "primitive-hand") for tracker in ("pso", "ik")
     }
     assert all(0 < row["endpoint_error_mm"]["mean"] < 30 for row in rows)
-    # Each tracker has a home ground, and the page says so.
+    # The surface of each tracker occurs in one recording, and the page warns of it.
     kinds = {open_sequence(folder).description["model"] for folder in (out / "recordings").iterdir()}
     assert kinds == {"skin", "primitives"}
     assert (out / "report.html").read_text().count("Home ground") == 2
-    # Given again, nothing is made again.
+    # The same command makes nothing again.
     made = {path: path.stat().st_mtime_ns for path in (*out.glob("recordings/*/*"), *out.glob("runs/*/poses.csv"))}
     assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0
     assert made == {path: path.stat().st_mtime_ns for path in made}
@@ -40,7 +40,7 @@ def test_the_demo_makes_a_report_from_nothing(tmp_path: Path, capsys: pytest.Cap
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
-    """A recording as a camera gives it: depth and colour."""
+    """Return a recording with depth and colour only."""
     folder = synthesise(tmp_path / "own", 3)
     for name in ("hand_poses.csv", "joints.csv", "hand.json", "sequence.json"):
         (folder / name).unlink()
@@ -49,7 +49,7 @@ def own(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_recording_of_ones_own_needs_no_truth(own: Path, tmp_path: Path) -> None:
+def test_a_users_recording_needs_no_ground_truth(own: Path, tmp_path: Path) -> None:
     assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1", "--no-calibrate"]) == 0
     rows = json.loads((tmp_path / "demo" / "results.json").read_text())
     assert [row["recording"] for row in rows] == ["own", "own"]
@@ -57,14 +57,14 @@ def test_a_recording_of_ones_own_needs_no_truth(own: Path, tmp_path: Path) -> No
     assert "E3D" in (tmp_path / "demo" / "report.html").read_text()
 
 
-def test_the_hand_of_ones_own_recording_is_measured_first(
+def test_the_hand_of_a_users_recording_is_calibrated_once_and_used(
     own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """That measuring is right is tested elsewhere; here, that it is asked for once, and used."""
-    asked: list[int] = []
+    """The calibration itself is replaced."""
+    calls: list[int] = []
 
     def measured(observations: Sequence[Observation], *_: Any) -> SimpleNamespace:
-        asked.append(len(observations))
+        calls.append(len(observations))
         hand = HandShape(scale=1.07)
         return SimpleNamespace(hand=hand, to_json=hand.to_json)
 
@@ -72,12 +72,12 @@ def test_the_hand_of_ones_own_recording_is_measured_first(
     monkeypatch.setattr("depthtrack.api.measuring.choose_views", lambda *_: [None] * 5)
     for _ in range(2):
         assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
-    assert asked == [5]
+    assert calls == [5]
     for run in (tmp_path / "demo" / "runs").iterdir():
         assert read_configuration(run)["hand"]["scale"] == 1.07
 
 
-def test_a_hand_that_cannot_be_measured_is_taken_for_the_average(
+def test_the_average_hand_is_used_if_the_calibration_fails(
     own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def refused(*_: Any) -> None:
@@ -90,6 +90,6 @@ def test_a_hand_that_cannot_be_measured_is_taken_for_the_average(
         assert read_configuration(run)["hand"]["scale"] == 1
 
 
-def test_a_demo_of_nothing_is_told_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_recording_is_reported_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", str(tmp_path / "nowhere"), "-o", str(tmp_path / "demo")]) == 2
     assert "there is no recording" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The command line as a whole: it answers at once, and mistakes end in one sentence and exit code 2."""
+"""Test the command line as a whole: overview, help, errors in one sentence, exit codes."""
 
 import subprocess
 import sys
@@ -26,7 +26,7 @@ def test_the_overview_names_every_command(capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.parametrize("command", [None, *COMMANDS])
 def test_help_imports_nothing_heavy(command: str | None) -> None:
-    """What makes `--help` quick: asserted by what it loads, not by a clock."""
+    """The imported modules decide how fast `--help` is; a clock would be unreliable."""
     arguments = ["--help"] if command is None else [command, "--help"]
     code = (
         "import sys\nfrom depthtrack.cli import main\n"
@@ -50,7 +50,7 @@ def test_version() -> None:
     assert run("--version").stdout.strip() == f"depthtrack {__version__}"
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
+def test_a_closed_output_pipe_is_no_error() -> None:
     done = subprocess.run(
         f"{sys.executable} -m depthtrack --help | head -1", shell=True, capture_output=True, text=True, check=False
     )
@@ -68,12 +68,12 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         (["evaluate", "{recording}"], "--report"),
     ],
 )
-def test_a_file_is_no_folder_to_write_to(
+def test_a_file_in_place_of_the_output_folder_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], option: str
 ) -> None:
     recording, file = tmp_path / "everyday", tmp_path / "file"
     assert main(["synth", "everyday", str(recording), "--frames", "1"]) == 0
     file.write_text("mine")
     assert main([part.format(recording=recording) for part in arguments] + [option, str(file)]) == 2
-    assert f"{option} must be a folder, {file} is a file" in capsys.readouterr().err
+    assert f"{option} must be a folder, found the file {file}" in capsys.readouterr().err
     assert file.read_text() == "mine"

@@ -1,4 +1,4 @@
-"""A user's rigged hand through the commands: recorded, tracked, evaluated, filmed."""
+"""Test the commands with a rigged hand: record, track, evaluate, make a video."""
 
 import json
 import shutil
@@ -37,7 +37,7 @@ def run(recording: Path, rig: Path) -> Path:
     return folder
 
 
-def test_the_truth_of_a_recording_is_the_rigs(recording: Path, rig: Path) -> None:
+def test_the_ground_truth_of_a_recording_is_that_of_the_rig(recording: Path, rig: Path) -> None:
     sequence, hand = open_sequence(recording), load_hand(rig)
     truth = sequence.ground_truth
     assert truth is not None
@@ -60,7 +60,7 @@ def test_a_run_stores_the_rig_and_follows_the_hand(run: Path, rig: Path, capsys:
     assert report["endpoint_error_mm"]["mean"] < 3
 
 
-def test_pictures_of_a_run_need_the_rig_that_it_was_made_with(
+def test_a_video_of_a_run_needs_the_rig_of_the_run(
     run: Path, rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["video", str(run), "-o", str(tmp_path / "film.mp4")]) == 0
@@ -87,7 +87,7 @@ def test_pictures_of_a_run_need_the_rig_that_it_was_made_with(
         (["--model", "nothing.glb"], "nothing.glb"),
     ],
 )
-def test_synth_refuses_what_is_no_hand(
+def test_synth_rejects_models_that_are_no_hand(
     rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     arguments = [str(rig) if argument == "RIG" else argument for argument in arguments]
@@ -97,7 +97,7 @@ def test_synth_refuses_what_is_no_hand(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("letter", ["R", "L"])
-def test_a_hand_of_another_make_is_recorded_and_followed(
+def test_a_rig_of_another_maker_is_recorded_and_tracked(
     real_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], letter: str
 ) -> None:
     pytest.importorskip("pygltflib", reason="rigged hands need the extra: pip install 'depthtrack[gltf]'")

@@ -1,4 +1,4 @@
-"""`depthtrack segment` and `train-skin` on small synthetic recordings."""
+"""Test `depthtrack segment` and `train-skin` on small synthetic recordings."""
 
 import csv
 import json
@@ -24,7 +24,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_summary_counts_what_was_found() -> None:
+def test_summary_counts_the_frames_with_a_hand() -> None:
     rows: list[dict[str, Any]] = [{"found": True, "iou": 0.5, "ms": 1.0}, {"found": False, "iou": None, "ms": 3.0}]
     report = summary(rows)
     assert report["frames_with_hand"] == 1
@@ -33,7 +33,7 @@ def test_summary_counts_what_was_found() -> None:
     assert summary([])["mean_iou"] is None
 
 
-def test_segment_writes_pictures_and_figures(
+def test_segment_writes_video_contact_sheet_and_table(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--json"]) == 0
@@ -55,7 +55,7 @@ def test_segment_writes_pictures_and_figures(
     ]
 
 
-def test_a_tracker_tells_where_the_wrist_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_tracker_guides_the_segmentation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = tmp_path / "skin"
     options = ("--sensor", "kinect1", "--background", "room", "--model", "skin", "--frames", "24")
     assert main(["synth", "everyday", str(recording), *options]) == 0
@@ -66,19 +66,19 @@ def test_a_tracker_tells_where_the_wrist_is(tmp_path: Path, capsys: pytest.Captu
     assert report["mean_iou"] > 0.95
 
 
-def test_sizes_are_for_a_tracker(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_hand_sizes_need_a_tracker(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--hand", "hand.json"]) == 2
     assert "--tracker" in capsys.readouterr().err
 
 
-def test_depth_alone_finds_the_hand_too(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_depth_alone_segments_the_hand(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["segment", str(recording), "-o", str(tmp_path / "out"), "--depth-only", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["frames_with_hand"] == FRAMES
     assert report["mean_iou"] > 0.75
 
 
-def test_a_wrist_margin_keeps_more_of_the_arm(
+def test_a_wrist_margin_keeps_more_of_the_forearm(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     areas = []
@@ -90,7 +90,7 @@ def test_a_wrist_margin_keeps_more_of_the_arm(
     assert areas[1] > 1.02 * areas[0]
 
 
-def test_training_on_a_recording_makes_a_usable_model(
+def test_a_model_trained_on_a_recording_segments_it(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = tmp_path / "skin.json"
@@ -102,7 +102,7 @@ def test_training_on_a_recording_makes_a_usable_model(
     assert json.loads(capsys.readouterr().out)["mean_iou"] > 0.8
 
 
-def test_training_on_folders(recording: Path, tmp_path: Path) -> None:
+def test_training_on_folders_equals_training_on_the_recording(recording: Path, tmp_path: Path) -> None:
     assert (
         main(["train-skin", str(recording / "rgb"), str(recording / "hand_mask"), "-o", str(tmp_path / "m.json")]) == 0
     )
@@ -111,14 +111,16 @@ def test_training_on_folders(recording: Path, tmp_path: Path) -> None:
     assert SkinColourModel.load(tmp_path / "m.json").prior == pytest.approx(SkinColourModel.load(from_recording).prior)
 
 
-def test_a_skin_model_needs_a_file(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_train_skin_needs_an_output_file(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_info:
         main(["train-skin", str(recording)])
     assert exit_info.value.code == 2
     assert "--out" in capsys.readouterr().err
 
 
-def test_mistakes_are_told_in_one_sentence(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_one_sentence_without_traceback(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "empty").mkdir()
     other = tmp_path / "other"
     other.mkdir()

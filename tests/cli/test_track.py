@@ -1,4 +1,4 @@
-"""`depthtrack track` and `evaluate` on a small synthetic recording, killed and resumed as a user might."""
+"""Test `depthtrack track` and `evaluate` on a small synthetic recording, killed and resumed."""
 
 import json
 import os
@@ -55,7 +55,7 @@ def test_a_run_follows_the_hand(recording: Path, run: Path, capsys: pytest.Captu
 def test_a_killed_run_resumes_to_the_same_poses(recording: Path, run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "depthtrack", "track", str(recording), "-o", str(folder), *_QUICK]
-    # Slow enough to be killed in the middle: the first frames compile or load the kernels.
+    # The first frames compile or load the kernels, so the run lasts long enough to be killed.
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while time.monotonic() < deadline and process.poll() is None:
@@ -70,26 +70,25 @@ def test_a_killed_run_resumes_to_the_same_poses(recording: Path, run: Path, tmp_
     assert (folder / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
 
 
-def test_a_run_is_replayed_exactly_as_the_tracker_saw_it(run: Path) -> None:
-    """The energies that the tracker wrote down come back bit for bit, which no other segmentation of a frame gives."""
+def test_a_replay_segments_the_frames_of_a_run_to_the_same_bits(run: Path) -> None:
+    """The stored energies come back bit for bit; another segmentation would change them."""
     replay = Replay.open(Run.load(run))
     with RasterScorer(replay.hand) as scorer:
-        for seen in replay:
-            assert seen.observation is not None
-            assert seen.estimate.pose is not None
-            observed = seen.observation
-            scorer.set_target(observed.reduced(RESOLUTION))
-            assert scorer.score(seen.estimate.pose[None])[0] == seen.estimate.energy
+        for replayed in replay:
+            assert replayed.observation is not None
+            assert replayed.estimate.pose is not None
+            scorer.set_target(replayed.observation.reduced(RESOLUTION))
+            assert scorer.score(replayed.estimate.pose[None])[0] == replayed.estimate.energy
 
 
-def test_text_names_the_metrics(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_text_contains_the_metrics(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", str(run)]) == 0
     text = capsys.readouterr().out
     assert "endpoint_error_mm" in text
     assert "ms_per_frame" in text
 
 
-def test_several_runs_give_a_list(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_several_runs_give_a_json_array(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", str(run), str(run), "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)) == 2
 
@@ -108,7 +107,7 @@ def test_a_recording_without_true_poses_cannot_start_from_them(
     assert not (tmp_path / "run").exists()
 
 
-def test_sizes_that_are_nobodys_are_told_of(
+def test_a_recording_without_hand_sizes_gets_advice_to_calibrate(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import shutil
@@ -117,14 +116,14 @@ def test_sizes_that_are_nobodys_are_told_of(
     shutil.copytree(recording, unsized)
     (unsized / "hand.json").unlink()
     short = (*_QUICK, "--frames", "1")
-    for path, more, told in ((unsized, (), True), (unsized, ("--hand", str(recording / "hand.json")), False)):
-        assert main(["track", str(path), "-o", str(tmp_path / f"run{told}"), *short, *more]) == 0
-        assert (f"measure this hand with  depthtrack calibrate {unsized}" in capsys.readouterr().out) == told
+    for path, more, advised in ((unsized, (), True), (unsized, ("--hand", str(recording / "hand.json")), False)):
+        assert main(["track", str(path), "-o", str(tmp_path / f"run{advised}"), *short, *more]) == 0
+        assert (f"measure this hand with  depthtrack calibrate {unsized}" in capsys.readouterr().out) == advised
     assert main(["track", str(recording), "-o", str(tmp_path / "sized"), *short]) == 0
     assert "average" not in capsys.readouterr().out
 
 
-def test_mistakes_are_told_in_one_sentence(
+def test_errors_are_one_sentence_without_traceback(
     recording: Path, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for arguments, expected in (

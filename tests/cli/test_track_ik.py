@@ -1,4 +1,4 @@
-"""`depthtrack track --tracker ik`: its options, what the run tells of them, and resuming."""
+"""Test `depthtrack track --tracker ik`: options, stored configuration, resuming."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def track(recording: str, run: Path, *more: str) -> int:
     return main(["track", recording, "-o", str(run), "--tracker", "ik", "--start", "truth", *more])
 
 
-def test_a_run_in_synergies_stays_among_them_and_tells_which(recording: str, tmp_path: Path) -> None:
+def test_a_run_restricted_to_synergies_stays_in_their_space_and_stores_them(recording: str, tmp_path: Path) -> None:
     run = tmp_path / "run"
     options = ("--synergies", "leap-grasps", "--components", "4", "--icp-iterations", "3", "--gn-iterations", "2")
     assert track(recording, run, *options) == 0
@@ -43,7 +43,7 @@ def test_a_synergy_prior_leaves_all_angles_free(recording: str, tmp_path: Path) 
     assert np.abs(synergies.angles(synergies.project(angles)) - angles).max() > 0.05
 
 
-def test_a_run_goes_on_only_with_the_synergies_that_it_began_with(
+def test_a_run_resumes_only_with_its_own_synergies(
     recording: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run, file = tmp_path / "run", tmp_path / "mine.json"
@@ -63,7 +63,7 @@ def test_a_run_goes_on_only_with_the_synergies_that_it_began_with(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "message"),
     [
         (("--components", "3"), "choose a set with --synergies"),
         (("--synergy-prior",), "choose a set with --synergies"),
@@ -72,28 +72,25 @@ def test_a_run_goes_on_only_with_the_synergies_that_it_began_with(
         (("--icp-iterations", "0"), "icp_iterations"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(
-    recording: str, tmp_path: Path, arguments: tuple[str, ...], complaint: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_options_are_rejected(
+    recording: str, tmp_path: Path, arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert track(recording, tmp_path / "run", *arguments) == 2
-    told = capsys.readouterr().err
-    assert complaint in told
-    assert "Traceback" not in told
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert "Traceback" not in printed
     assert not (tmp_path / "run").exists()
 
 
-def test_the_configuration_can_be_read_by_people(recording: str, tmp_path: Path) -> None:
+def test_run_json_contains_the_options_of_the_tracker_only(recording: str, tmp_path: Path) -> None:
     assert track(recording, tmp_path / "run") == 0
-    told = json.loads((tmp_path / "run" / "run.json").read_text())
-    assert (told["tracker"], told["options"]["fit"]["surface"], told["options"]["fit"]["subsample"]) == (
-        "ik",
-        "skin",
-        3,
-    )
-    assert "swarm" not in told["options"]
+    stored = json.loads((tmp_path / "run" / "run.json").read_text())
+    fit = stored["options"]["fit"]
+    assert (stored["tracker"], fit["surface"], fit["subsample"]) == ("ik", "skin", 3)
+    assert "swarm" not in stored["options"]
 
 
-def test_options_of_another_tracker_are_refused(recording: str, tmp_path: Path) -> None:
+def test_options_of_another_tracker_are_rejected(recording: str, tmp_path: Path) -> None:
     with pytest.raises(SystemExit) as ended:
         track(recording, tmp_path / "run", "--particles", "8")
     assert ended.value.code == 2

@@ -1,4 +1,4 @@
-"""Videos, viewer recordings and the command that makes them."""
+"""Test videos, files of the viewer, and the command that writes them."""
 
 import subprocess
 import sys
@@ -29,7 +29,7 @@ def sample(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder, on a machine without a screen."""
+    """Return an empty current folder, on a machine without a screen."""
     folder = tmp_path / "out"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -50,27 +50,27 @@ def names(folder: Path) -> list[str]:
 # Videos
 
 
-def test_a_video_holds_every_image_in_order_and_size(out: Path) -> None:
+def test_a_video_contains_all_images_in_order_and_size(out: Path) -> None:
     greys = [20, 90, 160, 230]
     with VideoWriter(out / "film.mp4", rate=12.5) as writer:
         for grey in greys:
             writer.write(np.full((49, 65, 3), (grey, 0, 0), dtype=np.uint8))
-    film = cv2.VideoCapture(str(out / "film.mp4"))
-    assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(12.5)
+    video = cv2.VideoCapture(str(out / "film.mp4"))
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(12.5)
     for grey in greys:
-        readable, image = film.read()
+        readable, image = video.read()
         assert readable
         assert image.shape == (48, 64, 3)
-        # OpenCV reads blue, green, red: the red that was written stays red.
+        # OpenCV returns blue, green, red: the written red comes last.
         assert np.abs(image.mean(axis=(0, 1)) - [0, 0, grey]).max() < 8
-    assert not film.read()[0]
+    assert not video.read()[0]
     assert names(out) == ["film.mp4"]
 
 
 @pytest.mark.parametrize(
     ("name", "codecs"), [("film.mp4", QUICK_CODECS), ("film.mp4", WEB_CODECS), ("film.webm", WEBM_CODECS)]
 )
-def test_each_kind_of_video_can_be_encoded(out: Path, name: str, codecs: tuple[str, ...]) -> None:
+def test_all_codecs_encode_a_video(out: Path, name: str, codecs: tuple[str, ...]) -> None:
     image = np.zeros((48, 64, 3), dtype=np.uint8)
     image[:, 32:] = (30, 200, 90)
     with VideoWriter(out / name, 30, codecs) as writer:
@@ -80,8 +80,8 @@ def test_each_kind_of_video_can_be_encoded(out: Path, name: str, codecs: tuple[s
     assert found[:, :24].mean() < 10
 
 
-def test_a_video_that_fails_leaves_what_was_there(out: Path) -> None:
-    (out / "film.mp4").write_bytes(b"the old film")
+def test_a_failed_video_keeps_the_existing_file(out: Path) -> None:
+    (out / "film.mp4").write_bytes(b"the old video")
 
     def write(*heights: int) -> None:
         with VideoWriter(out / "film.mp4", rate=30) as writer:
@@ -94,10 +94,10 @@ def test_a_video_that_fails_leaves_what_was_there(out: Path) -> None:
         write(48, -1)
     write()
     assert names(out) == ["film.mp4"]
-    assert (out / "film.mp4").read_bytes() == b"the old film"
+    assert (out / "film.mp4").read_bytes() == b"the old video"
 
 
-def test_a_codec_that_opencv_lacks_is_told_of(out: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_codec_that_opencv_lacks_is_reported(out: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with (
         pytest.raises(InputError, match="can encode none of zzzz"),
         VideoWriter(out / "film.mp4", 30, codecs=("zzzz",)) as writer,
@@ -107,7 +107,7 @@ def test_a_codec_that_opencv_lacks_is_told_of(out: Path, capfd: pytest.CaptureFi
 
 
 @pytest.mark.parametrize(("name", "rate"), [("film.avi", 30.0), ("nowhere/film.mp4", 30.0), ("film.mp4", 0.0)])
-def test_a_video_that_cannot_be_is_refused_at_once(out: Path, name: str, rate: float) -> None:
+def test_invalid_names_and_rates_are_rejected_before_the_first_image(out: Path, name: str, rate: float) -> None:
     with pytest.raises(InputError), VideoWriter(out / name, rate):
         pass
 
@@ -115,29 +115,29 @@ def test_a_video_that_cannot_be_is_refused_at_once(out: Path, name: str, rate: f
 # The command
 
 
-def test_all_pictures_from_one_command(sample: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_command_writes_sheet_strip_and_video(sample: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--sheet", "a.png", "--strip", "b.png", "--video", "c.mp4", "--count", "3"]
     assert main(["view", str(sample), *options]) == 0
     assert names(out) == ["a.png", "b.png", "c.mp4"]
-    told = capsys.readouterr().out
-    assert all(name in told for name in names(out))
-    film = cv2.VideoCapture("c.mp4")
-    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == len(TIMES)
-    assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(1 / 0.0335, rel=0.03)
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in names(out))
+    video = cv2.VideoCapture("c.mp4")
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == len(TIMES)
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(1 / 0.0335, rel=0.03)
 
 
-def test_without_the_extra_a_contact_sheet_and_the_way_to_more(
+def test_without_the_extra_a_contact_sheet_and_the_install_command(
     sample: Path, out: Path, without_rerun: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(sample)]) == 0
     assert names(out) == ["sample-contact-sheet.png"]
-    told = capsys.readouterr().out
-    assert "sample-contact-sheet.png" in told
-    assert "pip install 'depthtrack[view]'" in told
+    printed = capsys.readouterr().out
+    assert "sample-contact-sheet.png" in printed
+    assert "pip install 'depthtrack[view]'" in printed
 
 
 @needs_rerun
-def test_without_a_screen_a_contact_sheet_and_the_way_to_more(
+def test_without_a_screen_a_contact_sheet_and_the_other_options(
     sample: Path, out: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
@@ -146,7 +146,7 @@ def test_without_a_screen_a_contact_sheet_and_the_way_to_more(
     assert "--web" in capsys.readouterr().out
 
 
-def test_asking_for_a_viewer_file_without_the_extra_names_the_pip_line(
+def test_a_viewer_file_without_the_extra_prints_the_install_command(
     sample: Path, out: Path, without_rerun: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(sample), "--rrd", "a.rrd"]) == 2
@@ -170,7 +170,7 @@ def test_asking_for_a_viewer_file_without_the_extra_names_the_pip_line(
         ["--sheet", "nowhere/a.png"],
     ],
 )
-def test_what_cannot_be_shown_is_refused_in_a_sentence(
+def test_invalid_options_are_rejected_in_one_sentence(
     sample: Path, out: Path, options: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(sample), *options]) == 2
@@ -178,7 +178,7 @@ def test_what_cannot_be_shown_is_refused_in_a_sentence(
     assert names(out) == []
 
 
-def test_damaged_frames_are_refused_or_skipped_and_told(
+def test_damaged_frames_are_rejected_or_skipped_and_printed(
     sample: Path, out: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     damaged = sample / "depth" / "0.067000.png"
@@ -190,11 +190,11 @@ def test_damaged_frames_are_refused_or_skipped_and_told(
     assert "skipped frame 2" in capsys.readouterr().out
 
 
-# The viewer's file
+# Files of the viewer
 
 
 @needs_rerun
-def test_a_viewer_file_holds_every_moment(sample: Path, out: Path) -> None:
+def test_a_viewer_file_contains_all_entities(sample: Path, out: Path) -> None:
     assert main(["view", str(sample), "--rrd", "a.rrd"]) == 0
     assert names(out) == ["a.rrd"]
     listing = subprocess.run(
@@ -205,7 +205,7 @@ def test_a_viewer_file_holds_every_moment(sample: Path, out: Path) -> None:
 
 
 @needs_rerun
-def test_a_viewer_file_that_fails_leaves_nothing(sample: Path, out: Path) -> None:
+def test_a_failed_viewer_file_leaves_nothing(sample: Path, out: Path) -> None:
     def broken() -> Iterator[AnnotatedFrame]:
         yield next(moments(open_sequence(sample)))
         raise InputError("the disk is on fire")
@@ -221,7 +221,7 @@ def test_a_viewer_file_that_fails_leaves_nothing(sample: Path, out: Path) -> Non
 # Estimated masks
 
 
-def test_a_hand_without_a_true_mask_is_estimated_unless_told_not_to(real_data: Path, out: Path) -> None:
+def test_a_hand_without_true_mask_is_segmented_by_default(real_data: Path, out: Path) -> None:
     recording = str(real_data / "rgbd" / "sr305-poses")
     assert main(["view", recording, "--sheet", "with.png", "--count", "3"]) == 0
     assert main(["view", recording, "--sheet", "without.png", "--count", "3", "--no-estimate"]) == 0

@@ -105,7 +105,7 @@ def test_without_any_truth_the_label_free_metrics_remain(
     assert {"e3d_mm", "e2d_px", "silhouette_iou", "jitter_mm", "ms_per_frame", "stage_ms"} <= set(report)
     assert not any("error" in key or "within" in key for key in report)
     assert main(["evaluate", str(run)]) == 0
-    assert "neither true poses nor joints" in capsys.readouterr().out
+    assert "neither true poses nor true joints" in capsys.readouterr().out
 
 
 def test_the_command_prints_what_the_function_returns(
@@ -117,7 +117,7 @@ def test_the_command_prints_what_the_function_returns(
     assert main(["evaluate", str(run), "--no-residuals"]) == 0
     text = capsys.readouterr().out
     assert "1 without a trusted pose" in text
-    assert "lost 1 times, found again 1 times" in text
+    assert "lost 1 times, recovered 1 times" in text
     assert "100 % within 10 mm" in text
     assert "e3d" not in text
 
@@ -166,7 +166,7 @@ def test_times_with_compilation_come_with_a_hint(
     for text, told in ((timings, False), (timings.replace("16.000", "9000.000", 1), True)):
         (run / "timings.csv").write_text(text)
         assert main(["evaluate", str(run), "--no-residuals"]) == 0
-        assert ("compile kernels: read the median" in capsys.readouterr().out) == told
+        assert ("compile kernels: use the median" in capsys.readouterr().out) == told
 
 
 @pytest.mark.parametrize("name", ["sequence", "skin_model"])

@@ -46,9 +46,9 @@ def test_joints_without_a_position_are_counted(tmp_path: Path, capsys: pytest.Ca
     write_uvd(predictions, MSRA, found)
     arguments = ["evaluate", "--predictions", str(predictions), "--benchmark", "msra", "--labels", str(labels)]
     assert main(arguments) == 0
-    told = capsys.readouterr().out
-    assert "1 without a prediction" in told
-    assert "left out: 3 joints" in told
+    printed = capsys.readouterr().out
+    assert "1 without a prediction" in printed
+    assert "left out: 3 joints" in printed
     assert main([*arguments, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["left_out_joints"] == 3
 
@@ -69,19 +69,19 @@ def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(
         assert report["joint_error_mm"]["max"] == pytest.approx(5, abs=0.01)
         assert len(report["joint_error_mm_by_joint"]) == len(BENCHMARKS[benchmark].joints)
         assert main(arguments) == 0
-        told = capsys.readouterr().out
-        assert "100 % within 10 mm" in told
-        assert all(joint in told for joint in BENCHMARKS[benchmark].joints)
+        printed = capsys.readouterr().out
+        assert "100 % within 10 mm" in printed
+        assert all(joint in printed for joint in BENCHMARKS[benchmark].joints)
 
 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ([], "need --benchmark"),
+        ([], "give --benchmark"),
         (["--benchmark", "msra"], "give one of them"),
         (["--benchmark", "msra", "--labels", "{short}"], "has 4 frames, but"),
         (["--benchmark", "nyu", "--labels", "{labels}"], "u v d of the 14 joints of nyu"),
-        (["--benchmark", "msra", "--labels", "{labels}", "{folder}"], "--predictions go without them"),
+        (["--benchmark", "msra", "--labels", "{labels}", "{folder}"], "--predictions takes neither run folders"),
         (["--benchmark", "msra", "--sequence", "{folder}/gone"], "there is no recording"),
     ],
 )
@@ -110,7 +110,7 @@ def test_a_recording_without_joints_or_with_fewer_frames_is_none_to_compare_with
     assert "knows no joints" in capsys.readouterr().err
     assert main(["evaluate", "--labels", str(text)]) == 2
     assert main(["evaluate", str(tmp_path), "--labels", str(text)]) == 2
-    assert "belong to --predictions" in capsys.readouterr().err
+    assert "need --predictions" in capsys.readouterr().err
 
 
 def test_real_joints_predict_themselves(real_data: Path, tmp_path: Path) -> None:

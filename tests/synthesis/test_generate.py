@@ -341,7 +341,7 @@ def test_the_command_reports_missing_and_unknown_arguments(tmp_path: Path, capsy
     assert main(["synth", "list"]) == 0
     assert "everyday" in capsys.readouterr().out
     assert main(["synth", "everyday"]) == 2
-    assert "say where to write" in capsys.readouterr().err
+    assert "expected a folder to write to" in capsys.readouterr().err
     assert main(["synth", "nonsense", str(tmp_path / "x")]) == 2
     assert "choose one of everyday" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
