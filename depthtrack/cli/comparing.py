@@ -63,7 +63,7 @@ def _bar() -> Iterator[Listener]:
     with counter() as shown:
 
         def listen(progress: ComparisonProgress) -> None:
-            shown.set_description(progress.what)
+            shown.set_description(progress.step)
             if progress.total:
                 shown.total, shown.n = progress.total, progress.frames
                 shown.set_postfix_str("" if progress.frames else "the first use compiles kernels")

@@ -1,1 +1,1 @@
-"""How good and how fast: measurements of scorers and trackers, and their comparison with what others use."""
+"""Evaluation of runs: metrics, replay, comparison of trackers, and sweeps of measurements."""

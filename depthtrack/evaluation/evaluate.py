@@ -1,4 +1,4 @@
-"""A run held against its recording: what `depthtrack evaluate` reports."""
+"""Evaluate a run on its recording, as `depthtrack evaluate` reports it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -30,16 +30,20 @@ from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.types import Array
 
 FrameProgress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
-"""Wraps the frames as they are looked at again: a progress bar."""
+"""Wraps the replayed frames, as a progress bar does."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """All figures of one run; rows are the run's frames.
+    """All metrics of one run; rows are the frames of the run.
 
-    `metrics` a value a frame each, in the order to show them: errors where there is a truth (of `points`: endpoints, or
-    annotated joints), then what needs none. `success` and `points` are None without a truth. `losses` as the tracker
-    saw it. `ms_per_frame` and `stage_ms` time.
+    recording: name of the recording.
+    metrics: metrics with one value per frame, in the order to print; first those that need ground truth.
+    points: errors of endpoints or annotated joints; None without ground truth.
+    success: curve of the frames below each error; None without ground truth.
+    losses: losses that the tracker reported.
+    ms_per_frame: milliseconds per frame.
+    stage_ms: milliseconds per frame of each stage.
     """
 
     run: Run
@@ -54,24 +58,25 @@ class Evaluation:
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return len(self.run.index)
 
     @property
     def lost_frames(self) -> int:
-        """Frames without a trusted pose: lost, or without any hand observed."""
+        """Number of frames without a trusted pose: lost, or without an observed hand."""
         return int(self.losses.lost.sum() + self.losses.absent.sum())
 
     @property
     def finger_errors(self) -> dict[str, Metric]:
-        """The error of each finger, mm, by `pose.FINGERS`; empty without a truth."""
+        """Error of each finger of `pose.FINGERS`, mm; empty without ground truth."""
         return {} if self.points is None else self.points.by_finger()
 
     def metric(self, name: str) -> Metric | None:
-        """One of `metrics` by its name, or None where the recording does not allow it."""
+        """Return the metric of this name; None if the recording does not allow it."""
         return next((metric for metric in self.metrics if metric.name == name), None)
 
     def to_json(self) -> dict[str, Any]:
-        """Statistics of every metric; keys carry the unit."""
+        """Return the statistics of all metrics as JSON values; keys contain the unit."""
         fingers = {finger: metric.statistics() for finger, metric in self.finger_errors.items()}
         return {
             "run": str(self.run.folder),
@@ -90,56 +95,60 @@ class Evaluation:
 def evaluate_run(
     folder: Path, sequence: Path | None = None, residuals: bool = True, progress: FrameProgress | None = None
 ) -> Evaluation:
-    """Hold the run in `folder` against the recording it tracked, or against `sequence` where that has moved.
+    """Return the evaluation of the run in `folder`.
 
-    `residuals` looks at every frame again, which takes as long as segmenting it and a little more; without them the
-    label-free metrics of the silhouette and the surface are left out. Raises InputError.
+    sequence: path of the recording, if it was moved.
+    residuals: compute E3D, E2D and IoU, which segments every frame again.
+    progress: wraps the frames while the residuals are computed.
+
+    Raises:
+        InputError: if the run or its recording is missing or malformed, or they do not belong together.
     """
     return evaluate(Replay.open(Run.load(folder), sequence), residuals, progress)
 
 
 def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | None = None) -> Evaluation:
-    """See `evaluate_run`."""
+    """Return the evaluation of an opened run; see `evaluate_run`."""
     run, model = replay.run, HandModel(replay.hand)
-    points, truth_metrics = _against_truth(run, model, replay.sequence.ground_truth)
+    points, truth_metrics = _pose_errors(run, model, replay.sequence.ground_truth)
     metrics = [*truth_metrics]
     if residuals:
         replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
         metrics += run_residuals(replayed, replay.surface(), len(run.index)).metrics()
     metrics.append(jitter(model.endpoints(run.poses), run.timestamps))
     return Evaluation(
-        run,
-        replay.configuration,
-        replay.sequence.name,
-        tuple(metrics),
-        points,
-        None if points is None else SuccessCurve.of(points),
-        find_losses(run.status, run.timestamps),
-        frame_time(run.stage_ms, len(run.index)),
-        stage_times(run.stage_ms, len(run.index)),
+        run=run,
+        configuration=replay.configuration,
+        recording=replay.sequence.name,
+        metrics=tuple(metrics),
+        points=points,
+        success=None if points is None else SuccessCurve.of(points),
+        losses=find_losses(run.status, run.timestamps),
+        ms_per_frame=frame_time(run.stage_ms, len(run.index)),
+        stage_ms=stage_times(run.stage_ms, len(run.index)),
     )
 
 
-def _against_truth(
+def _pose_errors(
     run: Run, model: HandModel, truth: GroundTruth | None
 ) -> tuple[PointErrors | None, tuple[Metric, ...]]:
-    """Errors against true poses where the recording knows them, else against its annotated joints."""
+    """Return errors relative to true poses if the recording has them, else to joints."""
     if truth is None:
         return None, ()
     rows = [truth.at(float(t)) for t in run.timestamps]
     if truth.poses is not None:
-        true_poses = _taken(truth.poses, rows)
+        true_poses = _select_rows(truth.poses, rows)
         true_model = model if truth.hand is None else HandModel(truth.hand)
         points = endpoint_errors(model, run.poses, true_model, true_poses)
         added = added_jitter(model.endpoints(run.poses), true_model.endpoints(true_poses), run.timestamps)
         return points, (points.mean(), points.largest(), angle_error(run.poses, true_poses), added)
     if truth.joints is not None:
-        points = joint_errors(model, run.poses, _taken(truth.joints, rows))
+        points = joint_errors(model, run.poses, _select_rows(truth.joints, rows))
         return points, (points.mean(), points.largest())
     return None, ()
 
 
-def _taken(values: Array, rows: list[int | None]) -> Array:
-    """The rows of `values` (N, ...), NaN where there is none."""
-    nowhere = np.full(values.shape[1:], np.nan)
-    return np.array([nowhere if row is None else values[row] for row in rows]).reshape(-1, *values.shape[1:])
+def _select_rows(values: Array, rows: list[int | None]) -> Array:
+    """Return rows of `values` (N, ...); NaN for None."""
+    absent = np.full(values.shape[1:], np.nan)
+    return np.array([absent if row is None else values[row] for row in rows]).reshape(-1, *values.shape[1:])

@@ -1,4 +1,4 @@
-"""Other people's predictions against a benchmark's labels, or against a recording's annotated joints."""
+"""Evaluate prediction files of public benchmarks on labels or on annotated recordings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,9 +17,11 @@ from depthtrack.types import Array
 
 @dataclass(frozen=True)
 class PredictionEvaluation:
-    """Errors of the joints of a file of predictions; rows are its lines.
+    """Errors of the joints in a prediction file; rows are its lines.
 
-    `success` counts frames without a prediction as missed; it is None where nothing is known of any frame.
+    predictions: path of the file.
+    points: errors of the joints.
+    success: curve of the frames below each error, frames without prediction included; None without ground truth.
     """
 
     predictions: Path
@@ -29,27 +31,28 @@ class PredictionEvaluation:
 
     @property
     def frames(self) -> int:
+        """Number of frames."""
         return len(self.points.mm)
 
     @property
     def missed_frames(self) -> int:
-        """Frames that have labels, but no predicted joint."""
+        """Number of frames that have labels but no predicted joint."""
         return int(np.sum(self.points.known & ~np.isfinite(self.points.mm).any(axis=1)))
 
     @property
     def left_out_joints(self) -> int:
-        """Joints without a position, here or in the labels, in frames that are judged by their others."""
+        """Number of joints without a prediction or label, in frames that have others with both."""
         judged = np.isfinite(self.points.mm).any(axis=1)
         return int(np.sum(~np.isfinite(self.points.mm[judged])))
 
     @property
     def by_joint(self) -> dict[str, Metric]:
-        """The error of each joint, mm, in the benchmark's order."""
+        """Error of each joint, mm, in the order of the benchmark."""
         columns = zip(self.points.names, self.points.mm.T, strict=True)
         return {name: Metric(f"{name}_error_mm", "mm", column) for name, column in columns}
 
     def to_json(self) -> dict[str, Any]:
-        """Statistics of every metric; keys carry the unit."""
+        """Return the statistics of all metrics as JSON values; keys contain the unit."""
         mean, largest = self.points.mean(), self.points.largest()
         return {
             "predictions": str(self.predictions),
@@ -66,30 +69,38 @@ class PredictionEvaluation:
 
 
 def evaluate_predictions(predictions: Path, benchmark: Benchmark, truth: Path | Sequence) -> PredictionEvaluation:
-    """Hold a file of predictions against a file of labels in the same format, line by line, or against a recording.
+    """Return the evaluation of a prediction file.
 
-    Of a recording, line k is frame k; it may have more frames than the file has lines. Raises InputError.
+    predictions: file with one line per frame.
+    benchmark: joints, order and camera of the files.
+    truth: label file in the same format, or a recording. Line k belongs to frame k of the recording, which may have
+        more frames.
+
+    Raises:
+        InputError: if a file is malformed, the frames do not match, or the recording has no joints.
     """
     found = read_uvd(predictions, benchmark)
     if isinstance(truth, Path):
         known = read_uvd(truth, benchmark)
         if len(known) != len(found):
             raise InputError(
-                f"{predictions} has {len(found)} frames, but {truth} has {len(known)}: they must be of the same ones"
+                f"{predictions} has {len(found)} frames, but {truth} has {len(known)}: give files of the same frames"
             )
     else:
         known = _annotated(truth, benchmark)
         if len(known) < len(found):
-            raise InputError(f"{predictions} has {len(found)} frames, but {truth.name} has only {len(known)}")
+            raise InputError(
+                f"{predictions} has {len(found)} frames, but {truth.name} has only {len(known)}: give another recording"
+            )
     points = PointErrors.between("joint_error_mm", benchmark.joints, found, known[: len(found)])
     return PredictionEvaluation(predictions, benchmark, points, SuccessCurve.of(points))
 
 
 def _annotated(sequence: Sequence, benchmark: Benchmark) -> Array:
-    """The benchmark's joints (T, J, 3) of every frame of a recording, NaN where they are not known."""
+    """Return the joints (T, J, 3) of the benchmark in all frames of a recording; NaN if unknown."""
     truth = sequence.ground_truth
     known = [None if truth is None else truth.keypoints_at(float(time)) for time in sequence.timestamps]
     if all(keypoints is None for keypoints in known):
-        raise InputError(f"{sequence.name} knows no joints to compare with: give --labels")
-    nowhere = np.full((len(KEYPOINT_NAMES), 3), np.nan)
-    return benchmark.from_keypoints([nowhere if keypoints is None else keypoints for keypoints in known])
+        raise InputError(f"{sequence.name} has no joints to compare with: give --labels")
+    absent = np.full((len(KEYPOINT_NAMES), 3), np.nan)
+    return benchmark.from_keypoints([absent if keypoints is None else keypoints for keypoints in known])

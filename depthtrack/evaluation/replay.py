@@ -1,4 +1,4 @@
-"""A run beside its recording: every frame as the tracker saw it, with the estimate of the run."""
+"""Replay a run on its recording: every frame with its observation and estimate."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,19 +20,19 @@ from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.tracker import Estimate
 
 _SAME_TIME = 1e-6
-"""Seconds by which the time of a frame may differ between run and recording."""
+"""Largest difference in the time of a frame between run and recording, s."""
 _LONGEST_PATH = 1024
-"""Characters."""
+"""Largest number of characters in a path of `run.json`."""
 
 
 @dataclass(frozen=True)
 class ReplayedFrame:
     """One frame of a run.
 
-    row: number of the frame in the run.
-    frame: the frame of the recording.
-    observation: the segmented hand, None if there is none.
-    estimate: the estimate of the run.
+    row: row of the frame in the run.
+    frame: frame of the recording.
+    observation: segmented hand; None if there is none.
+    estimate: estimate of the run.
     """
 
     row: int
@@ -43,7 +43,7 @@ class ReplayedFrame:
 
 @dataclass(frozen=True)
 class Replay:
-    """A run and its recording, opened with the camera of the run."""
+    """A run and its recording, which is opened with the camera of the run."""
 
     run: Run
     configuration: RunConfiguration
@@ -52,12 +52,16 @@ class Replay:
 
     @classmethod
     def open(cls, run: Run, sequence: Path | None = None) -> "Replay":
-        """Return the run beside the recording that it tracked, or beside `sequence` if that has moved.
+        """Return the replay of a run.
+
+        sequence: path of the recording, if it was moved.
 
         Raises:
-            InputError: the recording is missing or is another one, or `run.json` is malformed.
+            InputError: if the recording is missing or is another one, or `run.json` is malformed.
         """
         configuration, where = RunConfiguration.of(run), str(run.folder / "run.json")
+        if configuration.segmentation.skin_model is not None:
+            _checked_path(configuration.segmentation.skin_model, "skin_model", where)
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(f"the recording {path} of the run {run.folder} is missing: give --sequence PATH")
@@ -66,18 +70,23 @@ class Replay:
         return cls(run, configuration, recording, configuration.hand_shape(where))
 
     def surface(self) -> HandSurface:
-        """Return the surface that the run fitted; a user's rig if the hand has one.
+        """Return the surface that the tracker fitted; the rig if the hand has one.
 
         Raises:
-            InputError: the sizes give no skin, or the rig's file is missing or changed.
+            InputError: if the sizes give no skin, or the file of the rig is missing or changed.
         """
         return HandSurface.of(self.hand, skin=self.configuration.surface == "skin" or self.hand.rig is not None)
 
     def __len__(self) -> int:
+        """Return the number of frames of the run."""
         return len(self.run.index)
 
     def at(self, row: int) -> ReplayedFrame:
-        """Return one frame without its observation, which depends on all frames before. Raises DamagedFrameError."""
+        """Return one frame without its observation, which depends on all earlier frames.
+
+        Raises:
+            DamagedFrameError: if the frame is unreadable.
+        """
         return ReplayedFrame(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
 
     def __iter__(self) -> Iterator[ReplayedFrame]:
@@ -105,31 +114,44 @@ def estimate_of(run: Run, row: int) -> Estimate:
 
 
 def run_hand(run: Run) -> HandShape:
-    """Return the hand that a run was tracked with. Raises InputError if `run.json` is malformed."""
+    """Return the hand of the tracker of a run.
+
+    Raises:
+        InputError: if `run.json` is malformed.
+    """
     return RunConfiguration.of(run).hand_shape(str(run.folder / "run.json"))
 
 
 def recorded_path(run: Run) -> Path:
-    """Return where the recording of the run was. Raises InputError if `run.json` names no path."""
-    path = RunConfiguration.of(run).sequence
-    if len(path) > _LONGEST_PATH or "\0" in path:
-        raise InputError(f"{run.folder / 'run.json'}: sequence is no path: {path[:80]!r}")
-    return Path(path)
+    """Return the path of the recording when it was tracked.
+
+    Raises:
+        InputError: if `run.json` is malformed, or its entry is no path.
+    """
+    return _checked_path(RunConfiguration.of(run).sequence, "sequence", str(run.folder / "run.json"))
+
+
+def _checked_path(text: str, entry: str, where: str) -> Path:
+    """Return the path in an entry of `run.json`, which may come from anyone."""
+    if len(text) > _LONGEST_PATH or "\0" in text:
+        raise InputError(f"{where}: expected a path as {entry}, found {text[:80]!r}")
+    return Path(text)
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:
-    """Raises InputError unless the run's frames are the recording's."""
+    """Raise InputError unless the frames of the run are those of the recording."""
     outside = (run.index < 0) | (run.index >= len(sequence))
     if outside.any():
         raise InputError(
             f"{path} has {len(sequence)} frames, but the run {run.folder} tracked frame {run.index[outside][0]}: "
-            "--sequence must name the recording that the run was made from"
+            "give the recording of the run with --sequence"
         )
-    apart = np.abs(sequence.timestamps[run.index] - run.timestamps)
-    if len(apart) and not apart.max() <= _SAME_TIME:  # not: NaN is no time
-        index = run.index[apart.argmax()]
+    differences = np.abs(sequence.timestamps[run.index] - run.timestamps)
+    # The negated comparison also rejects NaN.
+    if len(differences) and not differences.max() <= _SAME_TIME:
+        index = run.index[differences.argmax()]
         raise InputError(
             f"frame {index} of {path} was taken at {sequence.timestamps[index]:.12g} s, but at "
-            f"{run.timestamps[apart.argmax()]:.12g} s in the run {run.folder}: --sequence must name the recording that "
-            "the run was made from"
+            f"{run.timestamps[differences.argmax()]:.12g} s in the run {run.folder}: "
+            "give the recording of the run with --sequence"
         )

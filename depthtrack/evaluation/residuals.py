@@ -1,4 +1,4 @@
-"""The label-free residuals of a whole run: its recording observed again, and held against the hand in every pose."""
+"""Residuals of a run without ground truth: observed hand and posed model in every frame."""
 
 from collections.abc import Iterable
 
@@ -11,26 +11,32 @@ from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
 
-_FINEST = 0.001
-"""Metres between the points of the model's surface, at most: a distance to the nearest is one to the surface."""
-_MOST_FINER = 5
+_SPACING = 0.001
+"""Spacing of the points on the model's surface, m, at which the nearest point stands for the surface."""
+_LARGEST_FACTOR = 5
+"""Largest factor on the resolution of the camera."""
 
 
 def run_residuals(replayed: Iterable[ReplayedFrame], surface: HandSurface, rows: int) -> Residuals:
-    """E3D, E2D and the silhouettes' overlap of a run of so many `rows`."""
+    """Return E3D, E2D and silhouette IoU of the frames of a run.
+
+    rows: number of frames of the run.
+    """
     values = np.full((3, rows), np.nan)
-    for moment in replayed:
-        if moment.estimate.pose is not None and moment.observation is not None:
-            values[:, moment.row] = frame_residuals(
-                surface, moment.estimate.pose, moment.observation, moment.frame.camera
-            )
+    for each in replayed:
+        if each.estimate.pose is not None and each.observation is not None:
+            values[:, each.row] = frame_residuals(surface, each.estimate.pose, each.observation, each.frame.camera)
     return Residuals(*values)
 
 
 def frame_residuals(
     surface: HandSurface, pose: Array, observation: Observation, camera: Camera
 ) -> tuple[float, float, float]:
-    """E3D (mm), E2D (pixels) and the overlap of the silhouettes for one pose (27,), in the whole image of `camera`."""
+    """Return E3D (mm), E2D (pixels) and silhouette IoU of one pose.
+
+    pose: (27,).
+    camera: camera of the whole image.
+    """
     observed = observation.whole_mask(camera.shape)
     rendered = surface.silhouette(pose, camera)
     model_points = visible_points(surface, pose, camera)
@@ -38,14 +44,18 @@ def frame_residuals(
 
 
 def visible_points(surface: HandSurface, pose: Array, camera: Camera) -> Array:
-    """Points (M, 3) of the surface that `camera` sees, metres, about a millimetre apart or as far as its pixels are."""
+    """Return points of the visible surface, about 1 mm apart.
+
+    pose: (27,).
+    returns: (M, 3), m, camera frame.
+    """
     region = surface.bounds(pose, camera)
     if region.is_empty:
         return np.empty((0, 3))
     spacing = float(pose[2]) / camera.fx
-    finer = int(np.clip(np.ceil(spacing / _FINEST), 1, _MOST_FINER))
+    factor = int(np.clip(np.ceil(spacing / _SPACING), 1, _LARGEST_FACTOR))
     # An odd factor keeps the rays of the sensor's own pixels.
-    close = camera.crop(region).resized(finer + (finer + 1) % 2)
-    depth = surface.render(pose, close).depth
+    fine = camera.crop(region).resized(factor + (factor + 1) % 2)
+    depth = surface.render(pose, fine).depth
     v, u = np.nonzero(depth)
-    return close.unproject(np.stack([u, v], axis=-1), depth[v, u])
+    return fine.unproject(np.stack([u, v], axis=-1), depth[v, u])

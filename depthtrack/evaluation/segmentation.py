@@ -1,4 +1,4 @@
-"""How well the hand is cut out of a recording, frame by frame."""
+"""Evaluate the segmentation of a recording, frame by frame."""
 
 import time
 from collections.abc import Iterable, Iterator
@@ -19,8 +19,12 @@ from depthtrack.types import Mask
 
 @dataclass(frozen=True)
 class SegmentedFrame:
-    """One frame's result. `mask` (h, w) covers the whole frame, None where no hand was found; `iou` with the true
-    silhouette, None where that is not known; `ms` milliseconds to observe the frame, point cloud included."""
+    """Segmentation of one frame.
+
+    mask: (h, w) of the whole frame; None without a hand.
+    iou: IoU with the true silhouette; None if that is unknown.
+    ms: milliseconds to segment the frame, including the point cloud.
+    """
 
     frame: Frame
     observation: Observation | None
@@ -29,7 +33,7 @@ class SegmentedFrame:
     ms: float
 
     def row(self) -> dict[str, Any]:
-        """Figures for a table; centre in metres, area in pixels."""
+        """Return the columns of a table: centre in metres, area in pixels."""
         x, y, z = (None,) * 3 if self.observation is None else (float(c) for c in self.observation.centre)
         return {
             "index": self.frame.index,
@@ -49,14 +53,13 @@ def segment_sequence(
 ) -> Iterator[SegmentedFrame]:
     """Yield every frame of a recording with its segmentation.
 
-    tracker: tracker of `hand` whose prediction guides the segmentation, as when a recording is tracked; its own time
-        is left out.
+    tracker: tracker of `hand` whose predictions guide the segmentation; its own time is left out.
     """
     pipeline = Pipeline(tracker or NoTracker(), segmenter, hand or HandShape())
     for each in track_frames(sequence, pipeline):
         begun = time.perf_counter()
         if each.observation is not None:
-            each.observation.points  # noqa: B018 (the point cloud belongs to the cost of the observation)
+            each.observation.points  # noqa: B018 (computes the point cloud, which the time includes)
         ms = each.segment_ms + 1e3 * (time.perf_counter() - begun)
         shape = each.frame.depth.shape
         mask = None if each.observation is None else each.observation.whole_mask(shape)
@@ -67,7 +70,12 @@ def segment_sequence(
 
 
 def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """From the frames' rows: mean IoU (None where no truth is known), frames with a hand, milliseconds a frame."""
+    """Return the frames, those with a hand, the mean IoU and the milliseconds per frame.
+
+    rows: rows of the frames, as `SegmentedFrame.row` returns them.
+
+    The mean IoU is None without true silhouettes.
+    """
     rows = list(rows)
     ious, times = [row["iou"] for row in rows if row["iou"] is not None], [row["ms"] for row in rows]
     return {

@@ -1,4 +1,4 @@
-"""Comparisons: who takes part, equal time, runs that are kept and resumed, and results that say what the runs hold."""
+"""Test comparisons: trackers, equal time, runs that are kept and resumed, results."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ from tests.support.workers import InThisProcess
 FRAMES = 8
 QUICK = "pso:particles=12,generations=6,resolution=48,ik:icp_iterations=1,subsample=6"
 
-# Two clusters at a time would share two cores.
+# Two clusters at once would share two cores.
 pytestmark = pytest.mark.xdist_group("dask")
 
 
@@ -53,7 +53,7 @@ def compared(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_trackers_are_read_as_people_write_them() -> None:
+def test_trackers_are_read_from_text() -> None:
     assert read_specs(["pso,ik:surface=cylinders,icp_iterations=3", "pso:particles=16,resolution=64"]) == [
         TrackerSpec("PSO", PsoConfig()),
         TrackerSpec(
@@ -73,7 +73,7 @@ def test_trackers_are_read_from_a_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "at least one"),
         ("pso,kalman", "kalman"),
@@ -87,12 +87,12 @@ def test_trackers_are_read_from_a_file(tmp_path: Path) -> None:
         ("nowhere.toml", "nowhere.toml"),
     ],
 )
-def test_contenders_that_make_no_sense_are_refused(text: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_invalid_trackers_are_rejected(text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         read_specs([text])
 
 
-def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> None:
+def test_a_deeply_nested_file_of_trackers_is_rejected(tmp_path: Path) -> None:
     file = tmp_path / "trackers.toml"
     file.write_text("ik = " + "[" * 50_000)
     with pytest.raises(InputError, match="cannot read the trackers"):
@@ -101,7 +101,7 @@ def test_a_file_of_trackers_nested_without_end_is_refused(tmp_path: Path) -> Non
 
 @given(st.floats(0.5, 500), st.floats(0, 20), st.floats(0.1, 40))
 def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float) -> None:
-    """Whatever a tracker's costs, linear in its work: within a step of the work, or at the least work there is."""
+    """The time is linear in the work; the budget is within one step of it, or at its limit."""
 
     def cost(config: TrackerConfig) -> float:
         assert isinstance(config, PsoConfig)
@@ -114,18 +114,18 @@ def test_the_budget_meets_its_milliseconds(ms: float, always: float, each: float
     assert budget.ms == pytest.approx(reachable, rel=0.15)
 
 
-def test_more_work_is_more_of_everything() -> None:
+def test_the_work_grows_with_the_size() -> None:
     assert scale_work(PsoConfig(), 1) == PsoConfig()
     assert scale_work(PsoConfig(), 4) == tracker_config("pso", particles=128, generations=50)
     assert scale_work(IkConfig(), 1) == IkConfig()
     fits = [scale_work(IkConfig(), size).fit for size in (0.1, 0.5, 1, 2, 4, 9, 30)]  # type: ignore[union-attr]
-    points_times_rounds = [fit.icp.icp_iterations / fit.subsample for fit in fits]
-    assert points_times_rounds == sorted(points_times_rounds)
+    work = [fit.icp.icp_iterations / fit.subsample for fit in fits]
+    assert work == sorted(work)
     assert fits[-1].subsample == 1
 
 
 class Idle:
-    """A tracker that waits and hardly works."""
+    """Tracker that sleeps."""
 
     name, stages, predicted_pose = "idle", ("wait", "work"), None
 
@@ -139,14 +139,14 @@ class Idle:
     def close(self) -> None: ...
 
 
-def test_waiting_costs_no_time() -> None:
-    """CPU time is told, in the shares of the tracker's own clock."""
+def test_sleeping_costs_no_cpu_time() -> None:
+    """The shares of the stages are those of the tracker's own clock."""
     stage_ms = CpuTimed(Idle()).track(None).stage_ms  # type: ignore[arg-type]
     assert sum(stage_ms.values()) < 20
     assert stage_ms["wait"] == pytest.approx(2 * stage_ms["work"])
 
 
-def test_runs_and_results(compared: Path) -> None:
+def test_results_equal_the_runs(compared: Path) -> None:
     runs = sorted((compared / "runs").iterdir())
     assert len(runs) == 4
     rows = json.loads((compared / "results.json").read_text())
@@ -160,14 +160,14 @@ def test_runs_and_results(compared: Path) -> None:
         assert run.configuration["clock"] == row["clock"] == "cpu"
         assert float(columns["endpoint_error_mm_mean"]) == pytest.approx(row["endpoint_error_mm"]["mean"])
         spent = sum(values for stage, values in run.stage_ms.items() if stage != "segment")
-        followed = np.array([status == "tracked" for status in run.status])
-        assert row["tracker_ms"]["mean"] == pytest.approx(np.mean(np.asarray(spent)[followed]), rel=1e-3)
-    # Options that were given, and those that were not, stand in the run: it can be made again.
+        tracked = np.array([status == "tracked" for status in run.status])
+        assert row["tracker_ms"]["mean"] == pytest.approx(np.mean(np.asarray(spent)[tracked]), rel=1e-3)
+    # A run stores given and default options.
     assert Run.load(Path(rows[0]["run"])).configuration["options"]["swarm"]["particles"] == 12
     assert Run.load(Path(rows[0]["run"])).configuration["options"]["scoring"]["renderer"] == "raster"
 
 
-def test_a_table_has_a_line_for_each_tracker(
+def test_the_table_has_one_row_per_tracker_and_nothing_is_tracked_again(
     recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["compare", str(recording), "-o", str(compared), "--trackers", QUICK, "--repeats", "2", "--jobs", "1"]
@@ -177,13 +177,11 @@ def test_a_table_has_a_line_for_each_tracker(
     assert "error mean mm" in head
     assert "PSO particles=12" in pso
     assert "IK icp_iterations=1" in ik
-    # Nothing was tracked again.
     assert before == {file: file.stat().st_mtime_ns for file in compared.glob("runs/*/poses.csv")}
 
 
 @pytest.mark.slow
-def test_half_a_run_is_finished_and_only_that(recording: Path, compared: Path, tmp_path: Path) -> None:
-    """Killed in the middle of a run, then given again: the poses are those of a comparison left in peace."""
+def test_a_killed_comparison_continues_to_the_same_poses(recording: Path, compared: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "depthtrack", "compare", str(recording), "-o", str(folder), "--trackers", QUICK]
     command += ["--repeats", "2", "--jobs", "1"]
@@ -221,25 +219,25 @@ def test_other_options_need_another_folder(recording: Path, compared: Path, caps
     assert "another folder" in message
 
 
-def test_equal_time_is_measured_once_and_told(recording: Path, tmp_path: Path) -> None:
+def test_equal_time_is_measured_once_and_stored(recording: Path, tmp_path: Path) -> None:
     source = Source(str(recording), frames=6)
     comparison = Comparison((source,), tuple(read_specs(["pso:resolution=48,ik:subsample=6"])), equal_ms=6.0)
-    heard: list[ComparisonProgress] = []
-    plans = compare(comparison, tmp_path, InThisProcess(), heard.append)
-    assert "6 ms" in heard[0].what
-    assert (heard[-1].frames, heard[-1].total) == (12, 12)
+    reported: list[ComparisonProgress] = []
+    plans = compare(comparison, tmp_path, InThisProcess(), reported.append)
+    assert "6 ms" in reported[0].step
+    assert (reported[-1].frames, reported[-1].total) == (12, 12)
     for plan in plans:
-        told = Run.load(Path(plan.folder)).configuration
-        assert told["budget"]["equal_ms"] == 6.0
-        assert told["budget"]["calibrated_ms"] > 0
+        stored = Run.load(Path(plan.folder)).configuration
+        assert stored["budget"]["equal_ms"] == 6.0
+        assert stored["budget"]["calibrated_ms"] > 0
     assert Run.load(Path(plans[0].folder)).configuration["options"]["scoring"]["resolution"] == 48
     assert Run.load(Path(plans[1].folder)).configuration["options"] == plans[1].options
-    # A second measurement would choose a little differently; the first one stands.
+    # A second measurement would differ slightly.
     again = compare(comparison, tmp_path, InThisProcess())
     assert again == plans
 
 
-def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> None:
+def test_recordings_of_one_name_get_different_folders(recording: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "everyday"
     assert main(["synth", "everyday", str(other), "--frames", "3", "--seed", "4"]) == 0
     specs = tuple(read_specs(["ik:icp_iterations=1,subsample=6"]))
@@ -250,7 +248,7 @@ def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "expected"),
     [
         (["--repeats", "0"], "repeats"),
         (["--equal-time", "0"], "equal time"),
@@ -260,10 +258,10 @@ def test_recordings_of_one_name_stay_apart(recording: Path, tmp_path: Path) -> N
         (["--camera", "a.json", "--camera-preset", "tum"], "give one"),
     ],
 )
-def test_mistakes_are_told_in_one_sentence(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], told: str
+def test_errors_are_one_sentence_without_traceback(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], expected: str
 ) -> None:
     assert main(["compare", str(recording), "-o", str(tmp_path / "out"), "--trackers", "ik", *more]) == 2
     message = capsys.readouterr().err
-    assert told in message
+    assert expected in message
     assert "Traceback" not in message

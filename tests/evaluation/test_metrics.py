@@ -1,4 +1,4 @@
-"""Every metric against a case computed by hand."""
+"""Test each metric on a case computed by hand."""
 
 import math
 
@@ -36,12 +36,12 @@ NAMES = ("thumb_tip", "index_tip")
 
 
 def errors_of(largest: list[float]) -> PointErrors:
-    """Of two points, the second exact; NaN is a frame without a pose."""
+    """Return errors of two points, the second exact; NaN is a frame without a pose."""
     mm = np.array([[e, 0.0 if math.isfinite(e) else np.nan] for e in largest])
     return PointErrors("endpoint_error_mm", NAMES, mm, np.ones(len(largest), dtype=np.bool_))
 
 
-def test_statistics_of_the_frames_that_could_be_judged() -> None:
+def test_statistics_leave_out_frames_without_a_value() -> None:
     values = np.array([np.nan, *range(101)], dtype=np.float64)
     assert Metric("m_mm", "mm", values).statistics() == {"mean": 50, "median": 50, "p95": 95, "max": 100}
     better = Metric("iou", "", values, higher_is_better=True).statistics()
@@ -64,7 +64,7 @@ def test_endpoint_errors_of_a_hand_moved_by_3_and_4_mm() -> None:
 
 def test_each_finger_has_its_own_error() -> None:
     bent = POSE.copy()
-    bent[7 + 4 * 1 + 3] += 0.2  # the index finger's last joint moves its tip alone
+    bent[7 + 4 * 1 + 3] += 0.2  # the last joint of the index finger moves its tip only
     errors = endpoint_errors(MODEL, bent[None], MODEL, POSE[None])
     length = MODEL.lengths[1, 2]
     chord_mm = 1000 * 2 * length * math.sin(0.1)
@@ -92,7 +92,7 @@ def test_joints_of_another_skeleton_are_compared_by_name() -> None:
 def test_angles_are_compared_in_degrees() -> None:
     turned = POSE.copy()
     turned[7:17] += math.radians(4)
-    turned[3:7] = [1, 0, 0, 0]  # the palm's orientation is no finger angle
+    turned[3:7] = [1, 0, 0, 0]  # the orientation of the palm is no finger angle
     metric = angle_error(np.array([turned, POSE]), np.array([POSE, NOWHERE]))
     np.testing.assert_allclose(metric.values, [2, np.nan])
     assert metric.unit == "deg"
@@ -120,7 +120,7 @@ def test_the_area_is_that_under_the_curve(errors: list[float]) -> None:
     assert np.all(np.diff(curve.shares) >= 0)
 
 
-def test_nothing_to_judge_has_no_curve() -> None:
+def test_a_track_without_ground_truth_has_no_curve() -> None:
     nothing = PointErrors("joint_error_mm", NAMES, np.full((3, 2), np.nan), np.zeros(3, dtype=np.bool_))
     assert SuccessCurve.of(nothing) is None
 
@@ -129,8 +129,8 @@ def test_nothing_to_judge_has_no_curve() -> None:
 
 
 def test_losses_and_the_time_to_recovery() -> None:
-    begun = ["absent", "absent", "started", "tracked"]
-    status = [*begun, "lost", "lost", "started", "tracked", "absent", "tracked", "lost"]
+    first = ["absent", "absent", "started", "tracked"]
+    status = [*first, "lost", "lost", "started", "tracked", "absent", "tracked", "lost"]
     times = np.arange(11) / 10
     losses = find_losses([Status(each) for each in status], times)
     assert losses.first_trusted == 2
@@ -150,7 +150,7 @@ def test_losses_and_the_time_to_recovery() -> None:
 
 
 @pytest.mark.parametrize("status", [[], ["absent", "lost"], ["started", "tracked"]])
-def test_a_track_that_was_never_lost_or_never_began_has_no_losses(status: list[str]) -> None:
+def test_a_track_without_loss_or_without_start_has_no_losses(status: list[str]) -> None:
     losses = find_losses([Status(each) for each in status], np.arange(len(status), dtype=np.float64))
     assert losses.losses == ()
     assert losses.time_to_recovery().statistics()["mean"] is None
@@ -160,11 +160,11 @@ def test_a_track_that_was_never_lost_or_never_began_has_no_losses(status: list[s
 
 
 def line(times: np.ndarray) -> np.ndarray:
-    """Two points (T, 2, 3) that move evenly."""
+    """Return two points (T, 2, 3) that move at constant velocity."""
     return np.array([[[0.1 * t, 0.0, 0.5], [0.0, -0.3 * t, 0.6]] for t in times])
 
 
-def test_even_movement_does_not_jitter_even_at_uneven_times() -> None:
+def test_constant_velocity_has_no_jitter_at_uneven_times() -> None:
     times = np.array([0, 0.033, 0.07, 0.1, 0.133])
     metric = jitter(line(times), times)
     assert np.isnan(metric.values[[0, -1]]).all()
@@ -175,12 +175,12 @@ def test_one_point_that_jumps_by_6_mm() -> None:
     times = np.arange(5) / 30
     points = line(times)
     points[2, 0, 2] += 0.006
-    # Of two points one is 6 mm off its line, and 3 mm off those of its neighbours in time.
+    # One of the two points is 6 mm from its line, and shifts the lines of its neighbours by 3 mm.
     np.testing.assert_allclose(jitter(points, times).values[1:-1], [1.5, 3, 1.5], atol=1e-9)
     np.testing.assert_allclose(added_jitter(points, line(times), times).values[1:-1], [1.5, 3, 1.5], atol=1e-9)
 
 
-def test_acceleration_and_noise_give_the_jitter_that_is_documented() -> None:
+def test_acceleration_and_noise_give_the_documented_jitter() -> None:
     times = np.arange(4000) / 30
     fall = np.zeros((4000, 1, 3))
     fall[:, 0, 1] = 5.0 / 2 * times**2
@@ -190,7 +190,7 @@ def test_acceleration_and_noise_give_the_jitter_that_is_documented() -> None:
     assert np.nanmean(jitter(noise, times).values) == pytest.approx(1.95, rel=0.01)
 
 
-def test_nothing_is_said_across_a_gap_or_without_a_pose() -> None:
+def test_jitter_is_nan_beside_a_gap_and_without_a_pose() -> None:
     times = np.array([0, 1, 2, 3, 9, 10, 11, 12]) / 30
     points = line(times)
     points[6] = np.nan
@@ -209,7 +209,7 @@ def test_e3d_is_the_mean_distance_to_the_nearest_model_point() -> None:
     assert e3d(points, np.empty((0, 3))) == math.inf
 
 
-def test_e2d_is_the_mean_distance_of_what_sticks_out() -> None:
+def test_e2d_is_the_mean_distance_of_the_pixels_outside() -> None:
     observed = np.zeros((20, 20), dtype=np.bool_)
     observed[5:10, 5:10] = True
     rendered = np.zeros_like(observed)

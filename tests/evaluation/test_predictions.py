@@ -1,4 +1,4 @@
-"""`depthtrack evaluate --predictions`: other people's files, held against labels or a recording."""
+"""Test `depthtrack evaluate --predictions` with labels and with a recording."""
 
 import json
 from pathlib import Path
@@ -17,9 +17,9 @@ MSRA = BENCHMARKS["msra"]
 TRUTH = np.random.default_rng(3).uniform([-0.1, -0.1, 0.4], [0.1, 0.1, 0.6], (4, 21, 3))
 
 
-def test_errors_by_hand(tmp_path: Path) -> None:
+def test_errors_computed_by_hand(tmp_path: Path) -> None:
     found = TRUTH.copy()
-    found[0, 4] += [0.012, 0, 0]  # MSRA's fifth joint is the index finger's tip
+    found[0, 4] += [0.012, 0, 0]  # the fifth joint of MSRA is the tip of the index finger
     found[1] += [0, 0.003, 0.004]
     found[3] = np.nan
     labels, predictions = tmp_path / "labels.txt", tmp_path / "predictions.txt"
@@ -53,9 +53,7 @@ def test_joints_without_a_position_are_counted(tmp_path: Path, capsys: pytest.Ca
     assert json.loads(capsys.readouterr().out)["left_out_joints"] == 3
 
 
-def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_exported_predictions_have_the_errors_of_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = synthesise(tmp_path / "everyday", 4)
     poses = true_poses(recording)[:3] + np.array([0.003, 0, 0.004, *np.zeros(24)])
     run, text = write_run(tmp_path / "run", recording, poses), tmp_path / "ours.txt"
@@ -85,7 +83,7 @@ def test_our_own_predictions_of_a_recording_are_as_good_as_the_run(
         (["--benchmark", "msra", "--sequence", "{folder}/gone"], "there is no recording"),
     ],
 )
-def test_mistakes_are_told_in_one_sentence(
+def test_errors_are_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], expected: str
 ) -> None:
     labels, short = tmp_path / "labels.txt", tmp_path / "short.txt"
@@ -96,7 +94,7 @@ def test_mistakes_are_told_in_one_sentence(
     assert expected in capsys.readouterr().err
 
 
-def test_a_recording_without_joints_or_with_fewer_frames_is_none_to_compare_with(
+def test_a_recording_without_joints_or_with_fewer_frames_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recording, text = synthesise(tmp_path / "everyday", 2), tmp_path / "a.txt"
@@ -107,20 +105,20 @@ def test_a_recording_without_joints_or_with_fewer_frames_is_none_to_compare_with
     for name in ("joints.csv", "hand_poses.csv"):
         (recording / name).unlink()
     assert main(arguments) == 2
-    assert "knows no joints" in capsys.readouterr().err
+    assert "has no joints to compare with" in capsys.readouterr().err
     assert main(["evaluate", "--labels", str(text)]) == 2
     assert main(["evaluate", str(tmp_path), "--labels", str(text)]) == 2
     assert "need --predictions" in capsys.readouterr().err
 
 
-def test_real_joints_predict_themselves(real_data: Path, tmp_path: Path) -> None:
-    """The annotated joints of a real recording, written as ICVL's, are found in it without error."""
+def test_annotated_joints_of_a_real_recording_have_no_error(real_data: Path, tmp_path: Path) -> None:
+    """The joints are written in the format of ICVL."""
     sequence, icvl = open_sequence(real_data / "rgbd" / "open-close"), BENCHMARKS["icvl"]
     truth = sequence.ground_truth
     assert truth is not None
     keypoints = [truth.keypoints_at(float(time)) for time in sequence.timestamps]
-    nowhere = np.full((21, 3), np.nan)
-    joints = icvl.from_keypoints([nowhere if points is None else points for points in keypoints])
+    absent = np.full((21, 3), np.nan)
+    joints = icvl.from_keypoints([absent if points is None else points for points in keypoints])
     write_uvd(tmp_path / "a.txt", icvl, joints)
     evaluation = evaluate_predictions(tmp_path / "a.txt", icvl, sequence)
     assert evaluation.missed_frames == 0

@@ -1,4 +1,4 @@
-"""Sweeps: every cell once, whatever becomes of the process, its workers, or the file that rows are written to."""
+"""Test sweeps: each cell is measured once, although processes die and files are cut."""
 
 import json
 import os
@@ -19,23 +19,23 @@ from depthtrack.cli import main
 from depthtrack.errors import InputError, MissingExtraError
 from depthtrack.evaluation.sweep import cluster
 from depthtrack.evaluation.sweep.cluster import DaskWorkers
-from depthtrack.evaluation.sweep.local import PATIENCE, LocalWorkers
+from depthtrack.evaluation.sweep.local import MOST_DEATHS, LocalWorkers
 from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 from depthtrack.evaluation.sweep.run import SweepError, Workers, run_sweep
 from tests.support.dask import dask_scheduler, dask_workers
 from tests.support.workers import InThisProcess
 
-# Two clusters at a time would share two cores.
+# Two clusters at once would share two cores.
 pytestmark = pytest.mark.xdist_group("dask")
 
 
 def square(cell: Cell) -> Row:
-    """A measurement that says which process made it."""
+    """Return a square and the number of the process."""
     return {"square": cell["x"] ** 2, "process": os.getpid()}
 
 
 def deadly_at_first(cell: Cell) -> Row:
-    """As `square`, but the cell that names a file kills its worker as long as that file is not there."""
+    """Return `square`; a cell that names a missing file creates it and kills its worker."""
     time.sleep(0.02)
     if cell["marker"] is not None and not Path(cell["marker"]).exists():
         Path(cell["marker"]).touch()
@@ -48,8 +48,8 @@ def always_deadly(cell: Cell) -> Row:
     return {}
 
 
-def refusing(cell: Cell) -> Row:
-    """What a cell does that finds something missing; this error cannot travel between processes as it is."""
+def failing(cell: Cell) -> Row:
+    """Raise an error that cannot be pickled."""
     raise MissingExtraError(f"cell {cell['x']}", "sweep")
 
 
@@ -60,7 +60,7 @@ def sweep(folder: Path, cells: list[Cell], workers: Workers, measure: Any = squa
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a scheduler with two worker processes."""
+    """Return the address of a scheduler with two worker processes."""
     folder = tmp_path_factory.mktemp("dask")
     with dask_scheduler(folder) as (address, _), dask_workers(address, folder):
         yield address
@@ -73,7 +73,7 @@ def workers(request: pytest.FixtureRequest) -> Workers:
     return DaskWorkers(request.getfixturevalue("scheduler"))
 
 
-def test_every_cell_once_in_its_place(tmp_path: Path, workers: Workers) -> None:
+def test_rows_come_once_and_in_order(tmp_path: Path, workers: Workers) -> None:
     cells: list[Cell] = [{"x": x} for x in range(12)]
     rows = sweep(tmp_path, cells, workers)
     assert [(row["x"], row["square"]) for row in rows] == [(x, x * x) for x in range(12)]
@@ -83,7 +83,7 @@ def test_every_cell_once_in_its_place(tmp_path: Path, workers: Workers) -> None:
     assert sorted(written, key=lambda row: row["x"]) == rows
 
 
-def test_a_killed_worker_loses_nothing(tmp_path: Path, workers: Workers) -> None:
+def test_a_worker_that_kills_itself_loses_no_cell(tmp_path: Path, workers: Workers) -> None:
     cells: list[Cell] = [{"x": x, "marker": str(tmp_path / "died") if x == 5 else None} for x in range(12)]
     rows = sweep(tmp_path, cells, workers, deadly_at_first)
     assert (tmp_path / "died").exists()
@@ -91,44 +91,44 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path, workers: Workers) -> None
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 12
 
 
-def test_a_worker_killed_from_outside_loses_nothing(tmp_path: Path, workers: Workers) -> None:
-    """The first worker to give a row is shot; others, or its successor, do what it would have done."""
-    shot: list[int] = []
+def test_a_worker_killed_from_outside_loses_no_cell(tmp_path: Path, workers: Workers) -> None:
+    """The first worker with a result is killed; others measure its cells."""
+    killed: list[int] = []
 
-    def shoot(rows: Iterator[Row]) -> Iterator[Row]:
+    def kill_first(rows: Iterator[Row]) -> Iterator[Row]:
         for row in rows:
-            if not shot:
-                shot.append(row["process"])
+            if not killed:
+                killed.append(row["process"])
                 os.kill(row["process"], signal.SIGKILL)
             yield row
 
     cells: list[Cell] = [{"x": x, "marker": None} for x in range(30)]
     with Journal(tmp_path / "rows.jsonl", ["x", "marker"]) as journal:
-        rows = run_sweep(deadly_at_first, cells, journal, workers, shoot)
+        rows = run_sweep(deadly_at_first, cells, journal, workers, kill_first)
     assert [row["square"] for row in rows] == [x * x for x in range(30)]
-    assert {row["process"] for row in rows} - set(shot)
+    assert {row["process"] for row in rows} - set(killed)
 
 
-def test_a_cell_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
-    with pytest.raises(SweepError, match=rf"killed {PATIENCE} times in a row.*--jobs"):
+def test_a_cell_that_kills_all_workers_stops_the_sweep(tmp_path: Path) -> None:
+    with pytest.raises(SweepError, match=rf"killed {MOST_DEATHS} times in a row.*--jobs"):
         sweep(tmp_path, [{"x": 1}], LocalWorkers(2), always_deadly)
 
 
-def test_what_a_cell_finds_missing_is_told(tmp_path: Path, workers: Workers) -> None:
+def test_the_error_of_a_cell_keeps_its_message(tmp_path: Path, workers: Workers) -> None:
     with pytest.raises(SweepError, match=r"cell 7 .* pip install 'depthtrack\[sweep\]'"):
-        sweep(tmp_path, [{"x": 7}], workers, refusing)
+        sweep(tmp_path, [{"x": 7}], workers, failing)
 
 
-def test_rows_that_are_there_are_not_measured_again(tmp_path: Path) -> None:
+def test_existing_rows_are_not_measured_again(tmp_path: Path) -> None:
     cells: list[Cell] = [{"x": x} for x in range(6)]
     first = sweep(tmp_path, cells[:4], InThisProcess())
-    assert sweep(tmp_path, cells[:4], InThisProcess(), refusing) == first
+    assert sweep(tmp_path, cells[:4], InThisProcess(), failing) == first
     assert [row["x"] for row in sweep(tmp_path, cells, InThisProcess())] == list(range(6))
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 6
 
 
 @given(st.data())
-def test_a_sweep_goes_on_wherever_its_file_was_cut(data: st.DataObject) -> None:
+def test_a_sweep_continues_wherever_its_file_was_cut(data: st.DataObject) -> None:
     cells: list[Cell] = [{"x": x, "word": "é\n" * x} for x in range(4)]
     with TemporaryDirectory() as name:
         path = Path(name) / "rows.jsonl"
@@ -149,39 +149,39 @@ def test_a_sweep_goes_on_wherever_its_file_was_cut(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize("damage", ["not JSON", "[1, 2]", '{"x": 1', "\xff"])
-def test_a_damaged_file_is_refused(tmp_path: Path, damage: str) -> None:
+def test_a_damaged_file_is_rejected(tmp_path: Path, damage: str) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_bytes(b'{"x": 0}\n' + damage.encode("latin-1") + b"\n")
     with pytest.raises(InputError, match=r"rows\.jsonl, line 2: expected a JSON object"):
         Journal(path, ["x"])
 
 
-def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_dask_the_install_command_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r"depthtrack\[sweep\]"):
         DaskWorkers("tcp://127.0.0.1:1")
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{port}", "nonsense://{port}"])
-def test_an_address_without_scheduler_is_told(
+def test_an_address_without_scheduler_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], address: str
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "PATIENCE", 0.2)
-    with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        there = address.format(port=nobody.getsockname()[1])
-        assert main(["reproduce", "fig2b", "--quick", "-o", str(tmp_path), "--scheduler", there]) == 2
-    assert f"no Dask scheduler answers at '{there}'" in capsys.readouterr().err
+    monkeypatch.setattr(cluster, "TIMEOUT", 0.2)
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        wrong = address.format(port=silent.getsockname()[1])
+        assert main(["reproduce", "fig2b", "--quick", "-o", str(tmp_path), "--scheduler", wrong]) == 2
+    assert f"no Dask scheduler answers at '{wrong}'" in capsys.readouterr().err
 
 
-def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "PATIENCE", 1)
+def test_a_scheduler_without_workers_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "TIMEOUT", 1)
     with dask_scheduler(tmp_path) as (address, _), pytest.raises(InputError, match="has no workers"):
         list(DaskWorkers(address).measure(square, [{"x": 1}]))
 
 
-def test_a_cell_that_kills_every_dask_worker_is_given_up() -> None:
+def test_a_cell_that_kills_all_dask_workers_stops_the_sweep() -> None:
     distributed = pytest.importorskip("distributed")
     import dask
 
@@ -190,7 +190,7 @@ def test_a_cell_that_kills_every_dask_worker_is_given_up() -> None:
         distributed.LocalCluster(1, processes=True, threads_per_worker=1, dashboard_address=":0") as local,
     ):
         workers = DaskWorkers(local.scheduler_address)
-        with pytest.raises(SweepError, match="killed every worker that took it"):
+        with pytest.raises(SweepError, match="killed all its workers"):
             list(workers.measure(always_deadly, [{"x": 1}]))
 
 
@@ -198,23 +198,23 @@ def test_a_sweep_whose_scheduler_dies_keeps_its_rows(tmp_path: Path) -> None:
     cells: list[Cell] = [{"x": x, "marker": None} for x in range(500)]
     with dask_scheduler(tmp_path) as (address, process), dask_workers(address, tmp_path):
 
-        def shoot(rows: Iterator[Row]) -> Iterator[Row]:
+        def kill_scheduler(rows: Iterator[Row]) -> Iterator[Row]:
             for row in rows:
                 process.kill()
                 yield row
 
         with (
             Journal(tmp_path / "rows.jsonl", ["x", "marker"]) as journal,
-            pytest.raises(SweepError, match="went away: run the same command again"),
+            pytest.raises(SweepError, match="closed: run the same command again"),
         ):
-            run_sweep(deadly_at_first, cells, journal, DaskWorkers(address), shoot)
+            run_sweep(deadly_at_first, cells, journal, DaskWorkers(address), kill_scheduler)
         assert (tmp_path / "rows.jsonl").read_bytes().count(b"\n") >= 1
     rows = sweep(tmp_path, cells[:40], InThisProcess(), deadly_at_first)
     assert [row["square"] for row in rows] == [x * x for x in range(40)]
 
 
 @pytest.mark.slow
-def test_a_figure_made_on_a_cluster_is_the_one_made_here(
+def test_a_cluster_reproduces_the_figure_of_this_machine(
     tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tiny = ["reproduce", "fig2b", "--quick", "--repetitions", "1", "--resolution", "32", "--frames", "2", "--json"]

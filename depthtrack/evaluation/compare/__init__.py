@@ -1,1 +1,1 @@
-"""Trackers side by side on the same recordings: who takes part, at which price, and the runs that come of it."""
+"""Comparison of trackers on the same recordings: trackers, equal time, runs, results."""

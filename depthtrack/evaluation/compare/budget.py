@@ -1,4 +1,4 @@
-"""Equal time: how much work a tracker may do a frame, so that it takes the milliseconds it is given."""
+"""Equal time: choose the work of a tracker so that a frame takes given milliseconds."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,23 +21,24 @@ from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.tracker import Estimate
 
 PLACES, STRETCH = 6, 6
-"""Frames are timed at so many places of a recording, so many in a row."""
-CLOSE = 0.04
-"""A budget this close to its milliseconds, or closer, is taken."""
+"""Number of places in a recording at which frames are timed, and of consecutive frames at each."""
+TOLERANCE = 0.04
+"""Relative difference from the milliseconds at which the search stops."""
 TRIES = 6
+"""Largest number of timed sizes."""
 SMALLEST, LARGEST = 1 / 32, 64.0
-"""Of the default work."""
+"""Range of the size, as a factor on the default work."""
 
 Stretch = tuple[Estimate, list[Observation]]
-"""The pose found in a frame, and the observations that follow it."""
+"""Estimate of a frame, and the observations of the frames after it."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What calibration chose.
+    """Work of a tracker and the time that it takes.
 
-    config: tracker with the work that takes the time.
-    ms: CPU milliseconds of the median frame with it.
+    config: configuration of the tracker.
+    ms: CPU milliseconds of the median frame.
     """
 
     config: TrackerConfig
@@ -48,7 +49,7 @@ def scale_work(config: TrackerConfig, size: float) -> TrackerConfig:
     """Return the configuration with `size` times its work.
 
     A swarm keeps the ratio of its generations to its particles, along which the error falls fastest (Oikonomidis et
-    al. 2011, Fig. 2a). Surface fits first take more of the points, then more rounds.
+    al. 2011, Fig. 2a). A surface fit first takes more points, then more iterations.
     """
     changed: dict[str, int] = {}
     swarm, fit = getattr(config, "swarm", None), getattr(config, "fit", None)
@@ -67,12 +68,13 @@ def scale_work(config: TrackerConfig, size: float) -> TrackerConfig:
 def calibrate(
     recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig, ms: float
 ) -> Budget:
-    """Return the work with which a frame takes `ms` of CPU time, from frames timed at several places.
+    """Return the budget with which a frame takes `ms` of CPU time.
 
-    count: number of frames of the recording that are used.
+    count: number of frames of the recording to use.
+    config: configuration with the default work.
 
-    If even the least or the most work misses `ms`, the nearest is chosen, with its own time. If the hand is not found
-    anywhere, the configuration stays as it is and the time is NaN.
+    If even the least or the most work misses `ms`, the nearest time is chosen. If the hand is found nowhere, `config`
+    is returned and the time is NaN.
     """
     places = _stretches(recording, count, segmenter, hand, config)
     if not places:
@@ -81,10 +83,10 @@ def calibrate(
 
 
 def search(at: Callable[[float], TrackerConfig], cost: Callable[[TrackerConfig], float], ms: float) -> Budget:
-    """Return the budget nearest to `ms`.
+    """Return the budget whose time is nearest to `ms`.
 
     at: returns the configuration of a size.
-    cost: returns its milliseconds, about linear in size.
+    cost: returns the milliseconds of a configuration, about linear in its size.
     """
     tried: dict[float, Budget] = {}
     size = 1.0
@@ -93,17 +95,17 @@ def search(at: Callable[[float], TrackerConfig], cost: Callable[[TrackerConfig],
         if any(budget.config == config for budget in tried.values()):
             break
         tried[size] = Budget(config, cost(config))
-        if abs(tried[size].ms / ms - 1) <= CLOSE:
+        if abs(tried[size].ms / ms - 1) <= TOLERANCE:
             break
         size = _next_size(tried, ms)
     return min(tried.values(), key=lambda budget: abs(math.log(budget.ms / ms)))
 
 
 def _next_size(tried: dict[float, Budget], ms: float) -> float:
-    """Return where the line through the two tries around `ms`, or nearest to it, reaches it."""
+    """Return the size at which the line through the two tries nearest to `ms` reaches `ms`."""
     sizes = sorted(tried)
     if len(sizes) == 1:
-        # Some of the time is spent whatever the size: the first step goes further than in proportion.
+        # A part of the time does not depend on the size, so a proportional step is a first guess only.
         wanted = sizes[0] * ms / tried[sizes[0]].ms
     else:
         below, above = min(pairwise(sizes), key=lambda pair: abs(tried[pair[0]].ms + tried[pair[1]].ms - 2 * ms))
@@ -113,7 +115,10 @@ def _next_size(tried: dict[float, Budget], ms: float) -> float:
 
 
 def _cost(places: Sequence[Stretch], hand: HandShape, config: TrackerConfig) -> float:
-    """Return CPU milliseconds of the median tracked frame; a frame that triggers a search costs more at any size."""
+    """Return CPU milliseconds of the median tracked frame.
+
+    The median leaves out frames that trigger a search, whose cost does not depend on the size.
+    """
     spent: list[float] = []
     with closing(CpuTimed(create_tracker(config, hand))) as timed:
         for first, following in places:
@@ -127,7 +132,7 @@ def _cost(places: Sequence[Stretch], hand: HandShape, config: TrackerConfig) -> 
 def _stretches(
     recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig
 ) -> list[Stretch]:
-    """Return places spread over the recording where the tracker finds and keeps the hand."""
+    """Return evenly spaced stretches of the recording in which the tracker follows the hand."""
     length = min(STRETCH + 2, count)
     firsts = sorted({round(place) for place in np.linspace(0, count - length, PLACES)})
     found = []
@@ -136,7 +141,8 @@ def _stretches(
         with closing(create_tracker(config, hand)) as tracker:
             frames = recording.frames(range(first, first + length))
             tracked = list(track_frames(frames, Pipeline(tracker, segmenter, hand)))
-        seen = [each for each in tracked if each.observation is not None]
-        if len(seen) >= 3 and seen[0].estimate.status.is_trusted:
-            found.append((seen[0].estimate, [each.observation for each in seen[1:] if each.observation is not None]))
+        observed = [each for each in tracked if each.observation is not None]
+        if len(observed) >= 3 and observed[0].estimate.status.is_trusted:
+            following = [each.observation for each in observed[1:] if each.observation is not None]
+            found.append((observed[0].estimate, following))
     return found

@@ -1,4 +1,4 @@
-"""A comparison from its plan to its run folders, on all cores or a cluster; what is there already is not made again."""
+"""Run a comparison on all cores or on a cluster; complete runs are kept."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,15 +15,24 @@ from depthtrack.evaluation.sweep.run import Workers, run_sweep
 from depthtrack.options import to_data
 
 MOST_RUNS = 100_000
-_LOOK_EVERY = 0.4
+"""Largest number of runs in a comparison."""
+_INTERVAL = 0.4
+"""Seconds between two counts of the tracked frames."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What to compare: every contender on every recording, `repeats` times with seeds from `seed` on.
+    """Plan of a comparison: each tracker on each recording.
 
-    With `equal_ms`, each contender does as much work as fits into so many CPU milliseconds a frame, segmentation,
-    which all share, not counted.
+    sources: recordings.
+    specs: trackers.
+    repeats: runs per tracker and recording, with consecutive seeds.
+    seed: first seed.
+    equal_ms: CPU milliseconds per frame without segmentation, to which the work of each tracker is scaled; None to
+        keep the configured work.
+
+    Raises:
+        InputError: if a value is out of range, or there is no recording.
     """
 
     sources: tuple[Source, ...]
@@ -36,18 +45,23 @@ class Comparison:
         if not self.sources:
             raise InputError("name at least one recording to compare on")
         if self.repeats < 1 or len(self.sources) * len(self.specs) * self.repeats > MOST_RUNS:
-            raise InputError(f"a comparison has 1 to {MOST_RUNS} runs: choose other repeats, found {self.repeats}")
+            raise InputError(f"repeats must give 1 to {MOST_RUNS} runs, found {self.repeats}: choose another number")
         if not 0 <= self.seed < 2**62:
-            raise InputError(f"the seed must be a whole number from 0 to 2^62 - 1, found {self.seed}")
+            raise InputError(f"the seed must be from 0 to 2^62 - 1, found {self.seed}")
         if self.equal_ms is not None and not 0.1 <= self.equal_ms <= 60_000:
-            raise InputError(f"equal time must lie between 0.1 and 60000 ms a frame, found {self.equal_ms:g}")
+            raise InputError(f"equal time must be from 0.1 to 60000 ms per frame, found {self.equal_ms:g}")
 
 
 @dataclass(frozen=True)
 class ComparisonProgress:
-    """What is going on: `what` in words, `frames` tracked of `total` (0 where not counted in frames)."""
+    """Progress of a comparison.
 
-    what: str
+    step: description of the current step.
+    frames: number of tracked frames.
+    total: number of frames to track; 0 if the step does not track.
+    """
+
+    step: str
     frames: int = 0
     total: int = 0
 
@@ -58,20 +72,25 @@ Listener = Callable[[ComparisonProgress], None]
 def compare(
     comparison: Comparison, folder: Path, workers: Workers, listener: Listener = lambda progress: None
 ) -> list[PlannedRun]:
-    """Make all runs of a comparison under `folder`/runs, those that are missing or not whole; give all, in order.
+    """Make the missing and incomplete runs of a comparison, and return all runs in order.
 
-    Raises InputError where a recording cannot be used or `folder` holds runs of other options, before any work.
+    folder: folder to write to; the runs are in its folder `runs`.
+    listener: called with the progress.
+
+    Raises:
+        InputError: if a recording is unusable, or `folder` contains runs with other options.
+        SweepError: if a run failed.
     """
-    # Workers may stand elsewhere.
+    # Workers may have another current folder.
     folder = folder.resolve()
     totals = {source: source.count(source.open()) for source in comparison.sources}
     budgets = _budgets(comparison, folder, workers, listener)
     plans = _plans(comparison, folder, budgets)
-    left = [plan for plan in plans if plan.state() != "done"]
+    missing = [plan for plan in plans if plan.state() != "done"]
     folders = [Path(plan.folder) for plan in plans]
     total = sum(totals[plan.source] for plan in plans)
-    with _watching(folders, total, listener):
-        for _ in workers.measure(track_cell, [plan.to_cell() for plan in left]):
+    with _reported(folders, total, listener):
+        for _ in workers.measure(track_cell, [plan.to_cell() for plan in missing]):
             pass
     return plans
 
@@ -83,19 +102,19 @@ def _plans(comparison: Comparison, folder: Path, budgets: dict[tuple[int, int], 
         for c, spec in enumerate(comparison.specs):
             budget = budgets.get((s, c))
             options = budget["chosen"] if budget else to_data(spec.config)
-            told = budget and {"equal_ms": comparison.equal_ms, "calibrated_ms": budget["calibrated_ms"]}
+            reported = budget and {"equal_ms": comparison.equal_ms, "calibrated_ms": budget["calibrated_ms"]}
             for seed in range(comparison.seed, comparison.seed + comparison.repeats):
                 run = folder / "runs" / f"{name}_{spec.slug}_{seed}"
-                plans.append(PlannedRun(str(run), source, spec.label, spec.config.name, options, seed, told))
+                plans.append(PlannedRun(str(run), source, spec.label, spec.config.name, options, seed, reported))
     return plans
 
 
 def _budgets(
     comparison: Comparison, folder: Path, workers: Workers, listener: Listener
 ) -> dict[tuple[int, int], dict[str, Any]]:
-    """The work of every contender on every recording (by their numbers), for equal time; none without.
+    """Return the budgets by the numbers of recording and tracker; none without equal time.
 
-    Measured once and written down: another measurement would find slightly other budgets, and the runs not theirs.
+    They are measured once and stored, since another measurement would differ and invalidate the runs.
     """
     if comparison.equal_ms is None:
         return {}
@@ -109,13 +128,13 @@ def _budgets(
         }
         for s, c in numbers
     ]
-    listener(ComparisonProgress(f"finding the work that takes {comparison.equal_ms:g} ms of CPU time a frame"))
+    listener(ComparisonProgress(f"scaling the work to {comparison.equal_ms:g} ms of CPU time per frame"))
     with Journal(folder / "budgets.jsonl", list(cells[0])) as journal:
         return dict(zip(numbers, run_sweep(calibrate_cell, cells, journal, workers), strict=True))
 
 
 def _unique_names(paths: Sequence[Path]) -> list[str]:
-    """A name for every recording: its folder's, with a number where several have the same."""
+    """Return a name for each recording: that of its folder, with a number if it occurs again."""
     names: list[str] = []
     for path in paths:
         name = path.resolve().name
@@ -125,12 +144,12 @@ def _unique_names(paths: Sequence[Path]) -> list[str]:
 
 
 @contextmanager
-def _watching(folders: Sequence[Path], total: int, listener: Listener) -> Iterator[None]:
-    """Tell the listener from time to time how many frames the run folders hold, wherever their workers are."""
+def _reported(folders: Sequence[Path], total: int, listener: Listener) -> Iterator[None]:
+    """Report the number of frames in the run folders at intervals, for workers on any machine."""
     finished, count = Event(), FrameCount(folders)
 
     def watch() -> None:
-        while not finished.wait(_LOOK_EVERY):
+        while not finished.wait(_INTERVAL):
             listener(ComparisonProgress("tracking", count(), total))
 
     listener(ComparisonProgress("tracking", count(), total))

@@ -1,4 +1,4 @@
-"""A tracker timed by the processor instead of the clock on the wall: runs that share a machine compare fairly."""
+"""Time a tracker by CPU time, so that runs that share a machine compare fairly."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -12,9 +12,9 @@ from depthtrack.types import Array
 
 
 class CpuTimed:
-    """A tracker as it is, but its stages' times are CPU milliseconds of this process, all of its threads together.
+    """Tracker whose stage times are CPU milliseconds of all threads of this process.
 
-    How a frame's time falls to the stages is as the tracker says; their sum is the processor's.
+    The sum over the stages is the CPU time; the shares of the stages are those of the wrapped tracker.
     """
 
     def __init__(self, tracker: Tracker) -> None:
@@ -42,7 +42,7 @@ def _timed(call: Callable[[], Estimate]) -> Estimate:
     begun = time.process_time()
     estimate = call()
     spent = 1e3 * (time.process_time() - begun)
-    told = sum(estimate.stage_ms.values())
-    if told <= 0:
+    reported = sum(estimate.stage_ms.values())
+    if reported <= 0:
         return estimate
-    return replace(estimate, stage_ms={stage: ms * spent / told for stage, ms in estimate.stage_ms.items()})
+    return replace(estimate, stage_ms={stage: ms * spent / reported for stage, ms in estimate.stage_ms.items()})

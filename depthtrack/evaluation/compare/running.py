@@ -1,10 +1,10 @@
-"""One run of a comparison: a contender on a recording with a seed, into its own run folder; goes on where it stood."""
+"""Runs of a comparison: a tracker on a recording with a seed, in its own run folder."""
 
 import json
 import math
 import time
 from collections.abc import Sequence as Rows
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +29,17 @@ from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
 
 DONE = "done.json"
-"""Stands in a run folder once all of its frames are tracked."""
+"""File in a run folder that is written after its last frame."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """A recording and how to track it.
+    """A recording to track, as plain values.
 
-    `camera`: its own if None.
-    `hand`, `side`: see `recording.hand_choice.chosen_hand`.
-    `frames`: number of frames; all if None.
+    camera: contents of a `camera.json`; the recording's own if None.
+    hand, side: see `recording.hand_choice.chosen_hand`.
+    skin_model: path of a skin colour model; published statistics if None.
+    frames: number of frames; all if None.
     """
 
     path: str
@@ -50,6 +51,11 @@ class Source:
     side: Side | None = None
 
     def open(self) -> Sequence:
+        """Return the opened recording.
+
+        Raises:
+            InputError: if it is unusable.
+        """
         camera = None if self.camera is None else Camera(**self.camera)
         return open_sequence(self.path, camera, self.on_damage)
 
@@ -67,33 +73,41 @@ class Source:
         return Segmenter.for_sequence(sequence, self.segmentation)
 
     def count(self, sequence: Sequence) -> int:
-        """Frames to track."""
+        """Return the number of frames to track."""
         return len(sequence) if self.frames is None else min(self.frames, len(sequence))
 
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """A run to make in `folder`. `label` of the contender; `budget` tells how equal time was reached, where asked."""
+    """A run to make, as plain values.
+
+    folder: path of the run folder.
+    label: label of the tracker.
+    tracker: name of the tracker.
+    options: nested options of the tracker, as `options.to_data` returns them.
+    budget: given and measured milliseconds at equal time; None otherwise.
+    """
 
     folder: str
     source: Source
     label: str
     tracker: str
     options: dict[str, Any]
-    """Nested options of the tracker, as `options.to_data` gives them."""
     seed: int
-    budget: dict[str, Any] | None = field(default=None)
+    budget: dict[str, Any] | None = None
 
     def to_cell(self) -> Cell:
+        """Return the run as a cell of a sweep."""
         return asdict(self)
 
     @classmethod
     def from_cell(cls, cell: Cell) -> "PlannedRun":
+        """Return the run of a cell."""
         return cls(**{**cell, "source": Source(**cell["source"])})
 
     @property
     def config(self) -> TrackerConfig:
-        """Configuration of the tracker with this run's seed."""
+        """Configuration of the tracker with the seed of this run."""
         return replace(from_data(CONFIGURATIONS[self.tracker], self.options, "options"), seed=self.seed)
 
     def configuration(self, sequence: Sequence) -> RunConfiguration:
@@ -117,20 +131,24 @@ class PlannedRun:
         )
 
     def state(self) -> str:
-        """`new`, `begun` or `done`. Raises InputError where the folder holds another run."""
+        """Return `new`, `begun` or `done`.
+
+        Raises:
+            InputError: if the folder contains another run.
+        """
         folder = Path(self.folder)
         if not (folder / "run.json").exists():
             return "new"
-        # As JSON would give it back.
-        wanted = json.loads(json.dumps(self.configuration(self.source.open()).to_fields()))
-        check_same(read_configuration(folder), wanted, folder)
+        # The round trip turns tuples into lists, as in the stored file.
+        expected = json.loads(json.dumps(self.configuration(self.source.open()).to_fields()))
+        check_same(read_configuration(folder), expected, folder)
         return "done" if (folder / DONE).exists() else "begun"
 
 
 def track_cell(cell: Cell) -> Row:
-    """Track a planned run to its end, from where it stands; tells how many frames it has now."""
+    """Track a planned run from its last frame to its end; return the number of its frames."""
     plan = PlannedRun.from_cell(cell)
-    # A run is worth one core: others run beside it.
+    # Other runs use the other cores.
     cv2.setNumThreads(1)
     sequence, folder = plan.source.open(), Path(plan.folder)
     with TrackingRun(plan.configuration(sequence), sequence, wrap=CpuTimed, clock=time.process_time) as run:
@@ -141,25 +159,26 @@ def track_cell(cell: Cell) -> Row:
 
 
 def calibrate_cell(cell: Cell) -> Row:
-    """Return the options that take the given time on a recording, and the CPU milliseconds that they took."""
+    """Return the options that take the given time on a recording, and their CPU milliseconds."""
     source = Source(**cell["source"])
     cv2.setNumThreads(1)
     sequence, config = source.open(), from_data(CONFIGURATIONS[cell["tracker"]], cell["options"], "options")
     hand, segmenter = source.hand_of(sequence), source.segmenter(sequence)
     budget = calibrate(sequence, source.count(sequence), segmenter, hand, config, cell["ms"])
-    # JSON has no infinity: no hand was followed anywhere.
+    # JSON has no NaN, which stands for a hand that was found nowhere.
     ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
     return {"chosen": to_data(budget.config), "calibrated_ms": ms}
 
 
 class FrameCount:
-    """Counts the frames that run folders hold, reading only what was written since it was last asked."""
+    """Count the frames in run folders; each call reads only the new rows."""
 
     def __init__(self, folders: Rows[Path]) -> None:
         self._lines = {folder / "poses.csv": 0 for folder in folders}
         self._read = dict.fromkeys(self._lines, 0)
 
     def __call__(self) -> int:
+        """Return the number of frames."""
         for path, read in self._read.items():
             try:
                 if path.stat().st_size <= read:

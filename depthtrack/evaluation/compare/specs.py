@@ -1,4 +1,4 @@
-"""The trackers of a comparison with their options, from the command line or a small TOML file."""
+"""Read the trackers of a comparison and their options from text or a TOML file."""
 
 import re
 import tomllib
@@ -16,7 +16,7 @@ from depthtrack.tracking.registry import tracker_config
 
 @dataclass(frozen=True)
 class TrackerSpec:
-    """A tracker of a comparison: its configuration under a label."""
+    """Label and configuration of a tracker in a comparison."""
 
     label: str
     config: TrackerConfig
@@ -28,12 +28,12 @@ class TrackerSpec:
 
 
 def read_specs(texts: Sequence[str]) -> list[TrackerSpec]:
-    """Return the trackers that people wrote: `pso,ik:icp_iterations=3`, or the path of a TOML file.
+    """Return the trackers in texts such as `pso,ik:icp_iterations=3`, or in TOML files.
 
-    The file has one table per tracker: its heading is the label, `tracker` names the tracker, the rest are options.
+    A file has one table per tracker. Its heading is the label, `tracker` names the tracker, and the rest are options.
 
     Raises:
-        InputError: a tracker or an option does not exist, a value has the wrong type, or two labels are equal.
+        InputError: if a tracker or option does not exist, a value has the wrong type, or two labels are equal.
     """
     found: list[TrackerSpec] = []
     for text in texts:
@@ -42,28 +42,28 @@ def read_specs(texts: Sequence[str]) -> list[TrackerSpec]:
         raise InputError(f"name at least one tracker: {', '.join(CONFIGURATIONS)}")
     for number, spec in enumerate(found):
         if spec.slug in {other.slug for other in found[:number]}:
-            raise InputError(f"two trackers are called '{spec.label}': give them different labels or options")
+            raise InputError(f"two trackers have the label '{spec.label}': give them different labels or options")
     return found
 
 
 def label_of(config: TrackerConfig) -> str:
-    """Return the tracker's name and the options that differ from their defaults; the seed is left out."""
-    usual = {each.path: each.default for each in parameters(CONFIGURATIONS[config.name]())}
-    changed = [each for each in parameters(config) if each.default != usual[each.path] and each.path != "seed"]
+    """Return the name of a tracker and its options that differ from the defaults, without seed."""
+    defaults = {each.path: each.default for each in parameters(CONFIGURATIONS[config.name]())}
+    changed = [each for each in parameters(config) if each.default != defaults[each.path] and each.path != "seed"]
     return " ".join([config.name.upper(), *(f"{each.name}={each.default}" for each in changed)])
 
 
 def _from_text(text: str) -> list[TrackerSpec]:
     parts: list[tuple[str, dict[str, Any]]] = []
     for piece in filter(None, (piece.strip() for piece in text.split(","))):
-        # A comma also separates options: what names no tracker belongs to the tracker before it.
+        # A comma also separates options: a piece without tracker belongs to the tracker before it.
         name, colon, option = piece.partition(":") if "=" not in piece.partition(":")[0] else ("", ":", piece)
         if name:
             parts.append((name.strip(), {}))
         if colon:
             key, equals, value = option.partition("=")
             if not equals or not parts:
-                raise InputError(f"write a tracker's options as in ik:icp_iterations=3,subsample=2; found '{piece}'")
+                raise InputError(f"expected options as in ik:icp_iterations=3,subsample=2, found '{piece}'")
             parts[-1][1][key.strip()] = _value(value.strip())
     return [
         TrackerSpec(" ".join([name.upper(), *(f"{k}={v}" for k, v in o.items())]), _config(name, o))
@@ -86,7 +86,7 @@ def _from_file(path: Path) -> list[TrackerSpec]:
 
 
 def _value(text: str) -> Any:
-    """Return the value of TOML text; text that is no TOML stands for itself, so that strings need no quotes."""
+    """Return the value of TOML text, or the text itself, so that strings need no quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -95,5 +95,5 @@ def _value(text: str) -> Any:
 
 def _config(tracker: str, options: dict[str, Any]) -> TrackerConfig:
     if "seed" in options:
-        raise InputError("the comparison chooses the seeds: use --seed and --repeats instead of the option 'seed'")
+        raise InputError("the option 'seed' is not for trackers of a comparison: use --seed and --repeats")
     return tracker_config(tracker, **options)

@@ -1,6 +1,6 @@
-"""Metrics, one file a family. Every metric knows its unit; arrays have a row a frame.
+"""Metrics with their units, one file per family; arrays have one row per frame.
 
-A row is NaN where a frame cannot be judged: no pose, no truth, or no hand observed.
+A row is NaN if the frame has no pose, no ground truth, or no observed hand.
 """
 
 from depthtrack.evaluation.metrics.jitter import added_jitter, jitter

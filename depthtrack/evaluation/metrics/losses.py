@@ -1,4 +1,4 @@
-"""When a track was lost, and how long it took to find the hand again."""
+"""Losses of a track and the time to recovery."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +13,12 @@ from depthtrack.types import Array, Mask
 
 @dataclass(frozen=True)
 class Loss:
-    """An unbroken stretch of frames without a trusted pose, after one that had it.
+    """Consecutive frames without a trusted pose, after a frame with one.
 
-    `first` row of the run, `frames` how many; `seconds` from the last trusted frame to the next one, None where the
-    hand was not found again. `seen` says whether a hand was observed in any of the frames: else it had gone.
+    first: row of the first of them.
+    frames: number of frames.
+    seconds: time from the last trusted frame to the next one; None without a next one.
+    seen: whether a hand was observed in any of the frames.
     """
 
     first: int
@@ -27,11 +29,14 @@ class Loss:
 
 @dataclass(frozen=True)
 class Losses:
-    """`lost` (T,) frames whose pose does not explain the observation, `absent` (T,) those without any observed hand;
-    `losses` in order; `first_trusted` row, before which the track had not begun (None: it never did).
+    """Losses of a run, as the tracker reported them.
 
-    The tracker itself says so, from the recording alone: a track that is wrong and sure of it is not counted here, but
-    by the share of frames within 10 to 40 mm.
+    lost: (T,) frames whose pose does not fit the observation.
+    absent: (T,) frames without an observed hand.
+    losses: losses in order of time.
+    first_trusted: row of the first trusted pose; None without one.
+
+    Ground truth is not used. Wrong poses that the tracker trusts are counted by the share of frames within 10 to 40 mm.
     """
 
     lost: Mask
@@ -41,16 +46,16 @@ class Losses:
 
     @property
     def recovered(self) -> int:
-        """How many losses ended."""
+        """Number of losses that ended."""
         return sum(loss.seconds is not None for loss in self.losses)
 
     def time_to_recovery(self) -> Metric:
-        """Seconds of every loss, in place of frames; NaN for one without end."""
+        """Return the duration of each loss, s; NaN for a loss without end."""
         seconds = [np.nan if loss.seconds is None else loss.seconds for loss in self.losses]
         return Metric("time_to_recovery_s", "s", np.array(seconds, dtype=np.float64))
 
     def to_json(self) -> dict[str, Any]:
-        """Counts and the statistics of the time to recovery."""
+        """Return the counts and the statistics of the time to recovery as JSON values."""
         return {
             "lost_frames": int(self.lost.sum()),
             "absent_frames": int(self.absent.sum()),
@@ -61,7 +66,11 @@ class Losses:
 
 
 def find_losses(status: Sequence[Status], timestamps: Array) -> Losses:
-    """The losses of a run with a `status` (T,) at each of `timestamps` (T,), seconds."""
+    """Return the losses of a run.
+
+    status: (T,).
+    timestamps: (T,), s.
+    """
     lost = np.array([s is Status.LOST for s in status], dtype=np.bool_)
     absent = np.array([s is Status.ABSENT for s in status], dtype=np.bool_)
     trusted = [row for row, s in enumerate(status) if s.is_trusted]

@@ -1,4 +1,4 @@
-"""A figure a frame, with its unit and its statistics."""
+"""A metric with one value per frame, its unit and its statistics."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,17 @@ import numpy as np
 from depthtrack.types import Array
 
 Statistics = dict[str, float | None]
-"""Keys "mean", "median", "p95" and "max", or "p05" and "min" where higher is better; None without a judged frame."""
+"""Values by name: "mean", "median", "p95" and "max", or "p05" and "min" if higher is better; None without a frame."""
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure a frame: `values` (T,) in `unit`; `name` as it stands in JSON, with the unit in it.
+    """A metric with one value per frame.
 
-    `unit` is "" for a ratio. `higher_is_better` where a perfect tracker has the largest value.
+    name: key in JSON, which contains the unit.
+    unit: unit of the values; "" for a ratio.
+    values: (T,); NaN if the frame has no value.
+    higher_is_better: whether a perfect tracker has the largest value.
     """
 
     name: str
@@ -23,7 +26,7 @@ class Metric:
     higher_is_better: bool = False
 
     def statistics(self) -> Statistics:
-        """Mean, median, and what the worst 5 % of the frames begin and end with; None without a judged frame."""
+        """Return mean, median, 95th percentile and maximum, or 5th percentile and minimum."""
         judged = self.judged
         tail, worst, percent = ("p05", "min", 5) if self.higher_is_better else ("p95", "max", 95)
         if len(judged) == 0:
@@ -37,5 +40,5 @@ class Metric:
 
     @property
     def judged(self) -> Array:
-        """The values (N,) of the frames that could be judged."""
+        """Finite values (N,)."""
         return self.values[np.isfinite(self.values)]

@@ -1,4 +1,4 @@
-"""How well a pose explains what the sensor saw, without any annotation: E3D, E2D and the silhouettes' overlap."""
+"""Residuals between observation and posed model, without ground truth: E3D, E2D, IoU."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,19 @@ from depthtrack.types import Array, Mask
 
 @dataclass(frozen=True)
 class Residuals:
-    """The label-free metrics of a run, each (T,); NaN where a frame has no pose or no observed hand."""
+    """Residuals of a run; NaN if a frame has no pose or no observed hand.
+
+    e3d: (T,), mm.
+    e2d: (T,), pixels.
+    iou: (T,).
+    """
 
     e3d: Array
     e2d: Array
     iou: Array
 
     def metrics(self) -> tuple[Metric, Metric, Metric]:
-        """With their names and units."""
+        """Return the residuals with names and units."""
         return (
             Metric("e3d_mm", "mm", self.e3d),
             Metric("e2d_px", "px", self.e2d),
@@ -28,26 +33,31 @@ class Residuals:
 
 
 def e3d(points: Array, model_points: Array) -> float:
-    """Mean distance of observed points (N, 3) to the nearest of the model's visible surface (M, 3): mm, from metres.
+    """Return the mean distance of observed points from the nearest model point, mm.
 
-    E3D of Tkach, Pauly and Tagliasacchi, "Sphere-meshes for real-time hand modeling and tracking", SIGGRAPH Asia
-    2016. NaN without observed points, infinite without a visible model.
+    points: (N, 3) observed, m.
+    model_points: (M, 3) on the visible surface of the model, m.
+
+    The result is NaN without observed points, and infinite without model points. This is E3D of Tkach, Pauly and
+    Tagliasacchi, "Sphere-meshes for real-time hand modeling and tracking", SIGGRAPH Asia 2016.
     """
     if len(points) == 0:
         return float("nan")
     if len(model_points) == 0:
         return float("inf")
-    # A tidy tree would not pay for one pass over the points.
+    # Balancing the tree costs more than it saves in one pass over the points.
     tree = cKDTree(model_points, balanced_tree=False, compact_nodes=False)
     distances, _ = tree.query(points)
     return float(1000 * np.mean(distances))
 
 
 def e2d(rendered: Mask, observed: Mask) -> float:
-    """Mean distance of the rendered pixels outside the observed silhouette to it, pixels; maps (h, w).
+    """Return the mean distance of pixels rendered outside the observed silhouette from it.
 
-    E2D of Tkach et al. 2016, as Euclidean distance; their code takes half the city-block distance. 0 where none lies
-    outside, NaN without an observed silhouette.
+    rendered, observed: (h, w) silhouettes.
+
+    The unit is pixels. The result is 0 if no pixel is outside, and NaN without an observed silhouette. This is E2D of
+    Tkach et al. 2016 with the Euclidean distance; their code uses half the city-block distance.
     """
     if not observed.any():
         return float("nan")
@@ -59,9 +69,9 @@ def e2d(rendered: Mask, observed: Mask) -> float:
 
 
 def silhouette_iou(first: Mask, second: Mask) -> float:
-    """Return the intersection over union of two silhouettes (h, w), the index of Jaccard 1912.
+    """Return the intersection over union of two silhouettes, the index of Jaccard 1912.
 
-    Two empty silhouettes agree: their IoU is 1.
+    first, second: (h, w). The IoU of two empty silhouettes is 1.
     """
     union = int(np.count_nonzero(first | second))
     return np.count_nonzero(first & second) / union if union else 1.0

@@ -1,4 +1,4 @@
-"""The share of frames that are good enough, for every idea of good enough."""
+"""Success curve: the share of frames below each error threshold."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -9,17 +9,20 @@ from depthtrack.evaluation.metrics.points import PointErrors
 from depthtrack.types import Array
 
 LIMIT_MM = 50.0
-"""Upper end of the curve, and of the area under it."""
+"""Upper end of the curve and of the area under it, mm."""
 REPORTED_MM = (10, 20, 30, 40)
+"""Thresholds to report, mm."""
 
 
 @dataclass(frozen=True)
 class SuccessCurve:
-    """Share of the frames whose largest error is under each threshold (Taylor et al., CVPR 2012).
+    """Share of frames whose largest error is below each threshold (Taylor et al., CVPR 2012).
 
-    `thresholds_mm`, `shares` (K,), from 0 to LIMIT_MM; `auc` the area under the curve there, 1 for a perfect tracker;
-    `frames` judged, of which those with a truth but without an estimate never succeed. `errors_mm` (frames,) are the
-    largest errors themselves, infinite without an estimate.
+    thresholds_mm: (K,) from 0 to LIMIT_MM.
+    shares: (K,).
+    auc: area under the curve up to LIMIT_MM; 1 for a perfect tracker.
+    frames: number of frames with ground truth.
+    errors_mm: (frames,) largest error of each frame; infinite without an estimate.
     """
 
     thresholds_mm: Array
@@ -30,23 +33,23 @@ class SuccessCurve:
 
     @classmethod
     def of(cls, errors: PointErrors) -> Self | None:
-        """The curve of a track; None without a frame to judge."""
+        """Return the curve of a track; None without ground truth."""
         largest = errors.largest().values[errors.known]
         if len(largest) == 0:
             return None
         largest = np.where(np.isfinite(largest), largest, np.inf)
         thresholds = np.arange(LIMIT_MM + 1)
         shares = np.array([share_within(largest, threshold) for threshold in thresholds])
-        # The share is a staircase that rises by 1 / frames at each error: its area is exact without sampling.
+        # The share is a step function that rises by 1 / frames at each error, so its area is exact.
         auc = float(np.clip(1 - largest / LIMIT_MM, 0, 1).mean())
         return cls(thresholds, shares, auc, len(largest), largest)
 
     def within(self, threshold_mm: float) -> float:
-        """Share of the frames whose largest error is under `threshold_mm`."""
+        """Return the share of the frames whose largest error is below `threshold_mm`."""
         return share_within(self.errors_mm, threshold_mm)
 
     def to_json(self) -> dict[str, Any]:
-        """Shares at the usual thresholds, the area, and up to where it is taken."""
+        """Return the shares at REPORTED_MM, the area and its limit as JSON values."""
         return {
             "frames_within_mm": {str(threshold): self.within(threshold) for threshold in REPORTED_MM},
             "frames_within_auc": self.auc,
@@ -55,5 +58,5 @@ class SuccessCurve:
 
 
 def share_within(errors: Array, threshold: float) -> float:
-    """Share of `errors` (N,) under `threshold`."""
+    """Return the share of `errors` (N,) below `threshold`."""
     return float(np.mean(errors < threshold))

@@ -1,1 +1,1 @@
-"""Many independent measurements, on all cores or on a cluster, written down as they come and never done twice."""
+"""Sweeps of independent measurements, on all cores or a cluster, stored in a journal."""

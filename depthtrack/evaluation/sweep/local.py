@@ -1,4 +1,4 @@
-"""Workers on this machine: one process a core, through joblib."""
+"""Workers on this machine: processes of joblib."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
@@ -8,18 +8,27 @@ from joblib import Parallel, delayed, parallel_config
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Measure, SweepError, timed
 
-PATIENCE = 3
-"""So often in a row may workers die before any of them has given a result."""
+MOST_DEATHS = 3
+"""Number of consecutive deaths of workers without a result between them at which the sweep stops."""
 
 
 class LocalWorkers:
-    """`jobs` processes of one thread each."""
+    """Processes of one thread each.
+
+    jobs: number of processes.
+    """
 
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
 
     def measure(self, function: Measure, cells: Sequence[Cell]) -> Iterator[tuple[int, Row]]:
-        """See `Workers`. When a worker is killed, what was not yet delivered is measured again by fresh ones."""
+        """Yield numbers and results of the cells; see `Workers`.
+
+        If a worker is killed, new workers measure the cells without a result.
+
+        Raises:
+            SweepError: if a cell fails, or workers are killed repeatedly.
+        """
         left, deaths = dict(enumerate(cells)), 0
         while left:
             try:
@@ -29,9 +38,9 @@ class LocalWorkers:
                     yield number, row
             except BrokenProcessPool as error:
                 deaths += 1
-                if deaths == PATIENCE:
+                if deaths == MOST_DEATHS:
                     raise SweepError(
-                        f"workers were killed {PATIENCE} times in a row: is memory short? try fewer --jobs"
+                        f"workers were killed {MOST_DEATHS} times in a row: check the memory, or use fewer --jobs"
                     ) from error
 
     def _round(self, function: Measure, cells: dict[int, Cell]) -> Iterator[tuple[int, Row]]:

@@ -1,4 +1,4 @@
-"""The journal of a sweep: a JSON object a line, appended as results come, readable after a kill at any moment."""
+"""Journal of a sweep: one JSON object per line, readable after a kill at any time."""
 
 import json
 from collections.abc import Sequence
@@ -9,19 +9,22 @@ from typing import Any, Self
 from depthtrack.errors import InputError
 
 Cell = dict[str, Any]
-"""What one measurement depends on: plain JSON values by name."""
+"""Parameters of one measurement: plain JSON values by name."""
 
 Row = dict[str, Any]
-"""A cell and what was measured in it: plain JSON values by name."""
+"""A cell and its measured values: plain JSON values by name."""
 
 
 class Journal:
-    """Rows on disk. A row answers a cell when it holds the same value under every name of the cell."""
+    """Rows on disk. A row belongs to a cell if all values of the cell are equal."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
-        """Open or begin the file; `names` are the keys that all cells have. Raises InputError for a damaged file.
+        """Open or create the file; an incomplete last line is dropped.
 
-        A last line that a kill cut short is dropped.
+        names: keys of all cells.
+
+        Raises:
+            InputError: if a line is no JSON object.
         """
         self._names, self._rows = tuple(names), dict[str, Row]()
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,21 +37,22 @@ class Journal:
             row = _parse(line)
             if row is None:
                 self._file.close()
-                raise InputError(f"{path}, line {number}: expected a JSON object; mend the line or remove the file")
+                raise InputError(f"{path}, line {number}: expected a JSON object: correct the line or remove the file")
             self._rows[self._key(row)] = row
 
     def get(self, cell: Cell) -> Row | None:
-        """The row that answers a cell, if there is one."""
+        """Return the row of a cell; None without one."""
         return self._rows.get(self._key(cell))
 
     def append(self, row: Row) -> None:
-        """Add a row; it is on its way to the disk when this returns."""
+        """Add a row and flush it to the operating system."""
         self._file.write(json.dumps(row).encode() + b"\n")
         self._file.flush()
-        # As it will be read again: tuples as lists.
+        # The round trip turns tuples into lists, as in the file.
         self._rows[self._key(row)] = json.loads(json.dumps(row))
 
     def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""Running the cells of a sweep that have no row yet, wherever the workers are."""
+"""Run the cells of a sweep that have no row in its journal."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from time import perf_counter
@@ -8,19 +8,22 @@ from depthtrack.errors import DepthtrackError
 from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 
 Measure = Callable[[Cell], Row]
-"""Measures one cell; a module-level function, so that other processes can find it. The row leaves out the cell."""
+"""Measures one cell and returns the measured values. A module-level function, so that other processes can import it."""
 
 
 class SweepError(DepthtrackError):
-    """A cell could not be measured; the message says why."""
+    """A cell could not be measured; the message contains the reason."""
 
 
 class Workers(Protocol):
-    """Where cells are measured."""
+    """Processes that measure cells."""
 
     def measure(self, function: Measure, cells: Sequence[Cell]) -> Iterator[tuple[int, Row]]:
-        """Numbers of cells and their results, as they come, in any order; every cell once, whatever becomes of
-        single workers. Raises SweepError where a cell fails, or no worker survives."""
+        """Yield the number and result of each cell once, in any order, even if single workers die.
+
+        Raises:
+            SweepError: if a cell fails, or no worker survives.
+        """
         ...
 
 
@@ -31,9 +34,11 @@ def run_sweep(
     workers: Workers,
     progress: Callable[[Iterator[Row]], Iterable[Row]] = iter,
 ) -> list[Row]:
-    """Rows of all cells, in their order: those of the journal, and those measured now, which it receives as they come.
+    """Return the rows of all cells in order; measure and store those missing in the journal.
 
-    `progress` may watch the new rows go by. Each has `seconds`, what the cell took.
+    progress: wraps the new rows, as a progress bar does.
+
+    Each row contains `seconds`, the time of its cell.
     """
     missing = [cell for cell in cells if journal.get(cell) is None]
     for row in progress(_measured(measure, missing, workers)):
@@ -48,7 +53,11 @@ def _measured(measure: Measure, cells: Sequence[Cell], workers: Workers) -> Iter
 
 
 def timed(measure: Measure, cell: Cell) -> Row:
-    """What `measure` gives, and the `seconds` it took. Raises SweepError, which any process can pass on."""
+    """Return the measured values of a cell and the `seconds` that they took.
+
+    Raises:
+        SweepError: if the measurement fails; unlike other errors, it can be pickled.
+    """
     begun = perf_counter()
     try:
         row = measure(cell)

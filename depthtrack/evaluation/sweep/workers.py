@@ -1,4 +1,4 @@
-"""Which workers a user asked for."""
+"""Choose the workers of a sweep."""
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.cluster import DaskWorkers
@@ -8,13 +8,18 @@ from depthtrack.machine import usable_cores
 
 
 def chosen_workers(jobs: int | None, scheduler: str | None = None) -> Workers:
-    """A Dask cluster where its scheduler is named, else processes of this machine, one a core unless told.
+    """Return the workers of a Dask scheduler, or processes of this machine.
 
-    Raises InputError.
+    jobs: number of processes; one per core if None.
+    scheduler: address of a Dask scheduler; None for this machine.
+
+    Raises:
+        InputError: if the number of processes is out of range.
+        MissingExtraError: if Dask is needed but not installed.
     """
     if scheduler is not None:
         return DaskWorkers(scheduler)
     jobs = usable_cores() if jobs is None else jobs
     if not 1 <= jobs <= 1024:
-        raise InputError(f"--jobs must lie between 1 and 1024, found {jobs}")
+        raise InputError(f"--jobs must be from 1 to 1024, found {jobs}")
     return LocalWorkers(jobs)
