@@ -14,7 +14,7 @@ from depthtrack.types import Array, Array32
 
 @cache
 def bin_middles(options: BreadthOptions) -> Array:
-    """Return the distances (bins,) from the palm's centre at which the breadth is sampled, metres."""
+    """Return the distances (bins,) of samples of the breadth from the palm's centre, metres."""
     middles = options.bin_width * (np.arange(options.bins, dtype=np.float64) + 0.5)
     middles.setflags(write=False)
     return middles
@@ -29,7 +29,7 @@ def _smoothing_kernel(options: BreadthOptions) -> Array:
 
 
 def breadth_profile(grid: Grid, palm: Palm, arm: Arm, options: BreadthOptions) -> Array:
-    """Return the visible breadth (bins,) of an arm at `bin_middles` from the palm's centre, metres."""
+    """Return the visible breadth (bins,) of an arm at the distances of `bin_middles`, metres."""
     margin = options.margin_bins
     total = np.zeros(options.bins + 4 * margin)
     reached, areas = palm.paths.distance.ravel(), grid.areas.ravel()
@@ -83,7 +83,9 @@ def accumulate_areas(
 def cross_section_centre(
     grid: Grid, palm: Palm, arm: Arm, distance: float, half_length: float, options: BreadthOptions
 ) -> Array | None:
-    """Return the centroid (3,) of an arm's nodes at a distance from the palm, metres, camera frame; None without any.
+    """Return the centroid (3,) of an arm's nodes at a distance from the palm, or None.
+
+    It is in metres, camera frame.
 
     distance: along the arm from the palm's centre, metres.
     half_length: largest difference of a node's distance, metres.
@@ -107,7 +109,7 @@ def section_centroid(
     half_breadth: float,
     middle: Array,
 ) -> bool:
-    """Compute the centroid of the points near an axis at a distance from its origin; return whether there are any.
+    """Compute the centroid of points near an axis; return whether there are any.
 
     points, reached, centre, direction, half_breadth: as in `accumulate_areas`.
     distance, half_length: middle and half extent of the section along the axis, metres.

@@ -1,4 +1,7 @@
-"""Chroma bins: U and V of YUV index the colour statistics, because luminance changes most with the light."""
+"""Chroma bins: U and V of YUV index the colour statistics.
+
+Luminance is left out, because it changes most with the light.
+"""
 
 from functools import cache
 
@@ -19,7 +22,9 @@ CHROMA = np.array([[-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]])
 
 @cache
 def bins_of_colours(darkest: float, brightest: float) -> NDArray[np.int16]:
-    """Return the flat U and V bin (32768,) of each quantised colour; -1 if its luminance is out of range.
+    """Return the flat U and V bin (32768,) of each quantised colour.
+
+    It is -1 if the luminance is out of range.
 
     darkest, brightest: range of luminances with a meaningful chroma.
     """
@@ -34,12 +39,13 @@ def bins_of_colours(darkest: float, brightest: float) -> NDArray[np.int16]:
 def count_chroma(
     image: Image, region: Rect, skin: Labels, hand: Mask, step: int, bin_of_colour: NDArray[np.int16]
 ) -> Array:
-    """Return the counts (2, 64, 64) by U and V bin of pixels in neither skin nor hand, and of pixels in both.
+    """Return the counts of pixels in neither of two masks and in both, by U and V bin.
 
     image: (H, W, 3), RGB.
     skin, hand: (h, w) over the region.
     step: subsampling of rows and columns.
     bin_of_colour: from `bins_of_colours`.
+    counts: (2, 64, 64).
     """
     counts = np.zeros((2, BINS * BINS))
     count_colours(image, tuple(region), skin, hand, step, bin_of_colour, counts)

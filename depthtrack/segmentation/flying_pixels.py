@@ -1,7 +1,9 @@
-"""Flying pixels: readings between a surface and its background, at pixels that receive light from both.
+"""Flying pixels: readings between a surface and its background.
 
-Time-of-flight sensors mix both distances into one (Foix, Alenya and Torras, "Lock-in time-of-flight (ToF) cameras: a
-survey", IEEE Sensors Journal 2011). Fingers get rims, and streaks extend from their tips.
+Time-of-flight sensors mix both distances at a pixel that receives light from both. Fingers get rims, and streaks extend
+from their tips.
+
+Source: Foix, Alenya and Torras, "Lock-in time-of-flight (ToF) cameras: a survey", IEEE Sensors Journal 2011.
 """
 
 import numba

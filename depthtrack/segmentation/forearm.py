@@ -1,4 +1,4 @@
-"""The forearm behind a hand: the limb farther from the palm, along the surface, than a hand reaches.
+"""The forearm: the limb farther from the palm, along the surface, than a hand reaches.
 
 The path from there to the palm gives its direction in 3D, even if it is foreshortened.
 """
@@ -46,7 +46,7 @@ def find_arm(
 def find_vanishing_arm(
     grid: Grid, palm: Palm, wrist_distance: float, blind: Mask, options: ForearmOptions, expected: Array | None = None
 ) -> Arm | None:
-    """Return the forearm that comes from beside the camera, nearer than the sensor's range, or None.
+    """Return the forearm that vanishes nearer than the sensor's range, or None.
 
     wrist_distance, expected: as in `find_arm`.
     blind: (rows, columns) nodes of skin without readings.
@@ -58,9 +58,11 @@ def find_vanishing_arm(
 
 
 def _border_crossings(grid: Grid, palm: Palm, border: Mask, options: ForearmOptions) -> list[Index]:
-    """Return the flat indices (N,) of each place where the palm's surface crosses `border` (rows, columns).
+    """Return the flat indices (N,) of each place where the palm's surface crosses a border.
 
     It happens before the arm has left the hand's reach.
+
+    border: (rows, columns).
     """
     crossing = border & palm.paths.reached() & (palm.paths.distance > options.nearest_border)
     labels, areas = grid.within(crossing).surfaces()
@@ -86,7 +88,10 @@ def _best_arm(
 
 
 def _direction(grid: Grid, palm: Palm, exits: Index, start: float) -> Array:
-    """Return the unit vector (3,) from the palm's centre to the forearm `start` metres away on the paths to `exits`."""
+    """Return the unit vector (3,) from the palm's centre to the forearm, camera frame.
+
+    start: geodesic distance of the forearm on the paths to `exits`, metres.
+    """
     forearm = np.empty(exits.size, dtype=np.int64)
     backtrack(palm.paths.distance, palm.paths.parent, exits, start, forearm)
     towards = grid.points[forearm].mean(axis=0) - palm.centre

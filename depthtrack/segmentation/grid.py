@@ -100,14 +100,22 @@ class Grid:
         return replace(self, depth=np.where(mask, self.depth, np.float32(0)))
 
     def surfaces(self) -> tuple[NDArray[np.int32], Array]:
-        """Return the label (rows, columns) of each node's connected surface, -1 for none, and their areas (S,), m^2."""
+        """Return the connected surface of each node, and the areas of the surfaces.
+
+        labels: (rows, columns), -1 without a surface.
+        areas: (S,), m^2.
+        """
         labels = np.empty(self.depth.shape, dtype=np.int32)
         squares = np.empty(self.depth.size)
         count = label_surfaces(self.depth, self.max_jump, labels, squares)
         return labels, squares[:count] / (self.focal[0] * self.focal[1])
 
     def paths(self, sources: ArrayLike, limit: float) -> Paths:
-        """Return the shortest paths along the surface from `sources` (flat indices), up to `limit` metres."""
+        """Return the shortest paths along the surface from nodes.
+
+        sources: flat indices.
+        limit: length of the longest path, metres.
+        """
         paths = Paths(np.full(self.depth.shape, np.inf, np.float32), np.full(self.depth.shape, -1, np.int32))
         self.extend(paths, sources, limit)
         return paths
@@ -118,7 +126,7 @@ class Grid:
         shortest_paths(self.depth, self.points, self.max_jump, nodes, limit, paths.distance, paths.parent)
 
     def inscribed(self, mask: Mask) -> Depth:
-        """Return the radius (rows, columns), metres, of the largest circle around each node within `mask`.
+        """Return the radius of the largest circle around each node within a mask, metres.
 
         It is measured across the line of sight; the region's edge bounds circles too.
         """

@@ -1,4 +1,4 @@
-"""Detection of the hand among palm candidates: anywhere in the image at first, then near its last position."""
+"""Detection of the hand among palm candidates, anywhere or near its last position."""
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class HandDetector:
         self._options, self.hand = options, hand
 
     def detect(self, grid: Grid, candidates: Grid, lost: Array | None = None) -> Array | None:
-        """Return the palm's centre (3,) of a hand anywhere on a grid, or None; nearest surfaces first.
+        """Return the palm's centre (3,) of the nearest hand on a grid, or None.
 
         candidates: the grid with only the nodes that may be hand.
         lost: (3,) last position of the hand, if it is recent, metres, camera frame.
@@ -44,7 +44,7 @@ class HandDetector:
         return None
 
     def start_cost(self, grid: Grid, candidates: Grid, palm: Palm, lost: Array | None) -> float:
-        """Return the distance of a palm less the bonuses for breadth, fingers and a wrist right behind it, metres."""
+        """Return the distance of a palm, plus its wrist's cost, less bonuses, metres."""
         options = self._options.detection
         finger_area = visible_finger_area(candidates, palm, self._options.palm)
         fingers = options.finger_bonus * min(finger_area / options.all_fingers_area, 1)
@@ -76,7 +76,7 @@ class HandDetector:
         return nearest
 
     def _wrist_cost(self, grid: Grid, palm: Palm) -> float:
-        """Return the cost of a distant narrowest place, metres: an elbow has no wrist right behind it."""
+        """Return the cost of a narrowest place that is too far away for a wrist, metres."""
         options = self._options
         guess = anatomical_guess(palm, options.wrist_filter, self.hand)
         arm = find_arm(grid, palm, guess, options.forearm)

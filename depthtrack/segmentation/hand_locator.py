@@ -1,4 +1,4 @@
-"""Localisation of the hand without a prior: detect it anywhere, then follow it from its last position.
+"""Localisation of the hand without a prior: detect it, then follow it.
 
 Source: Oikonomidis et al. 2011, Sec. 2.1.
 """
@@ -115,7 +115,7 @@ class HandLocator:
         return LocatedHand(masks, centre, palm.radius, None if arm is None else arm.direction, wrist)
 
     def _find_arm(self, surface: SurfaceGrid, palm: Palm) -> tuple[Arm | None, Array, WristPlane | None]:
-        """Return the forearm, the corrected centre of the palm (3,), metres, camera frame, and the wrist."""
+        """Return the forearm, the corrected centre of the palm (3,), and the wrist."""
         grid, options, to_palm = surface.grid, self._options, self._wrist.hand.wrist_to_palm
         guess, expected = self._wrist.guess(palm), self._arm_direction
         arm = find_arm(grid, palm, guess, options.forearm, expected)

@@ -1,4 +1,4 @@
-"""Images with skin labels, to train a skin colour model: two folders of files, or a recording with true masks."""
+"""Images with skin labels, to train a skin colour model."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,7 +34,7 @@ def from_folders(images: Path, masks: Path) -> Iterator[Labelled]:
 
 
 def from_recording(path: Path) -> Iterator[Labelled]:
-    """Yield the RGB image (h, w, 3) and true silhouette (h, w) of each frame of a recording that has both.
+    """Yield the RGB image (h, w, 3) and true silhouette (h, w) of each frame with both.
 
     Raises:
         InputError: no frame has both.

@@ -24,9 +24,9 @@ def dilated(mask: Mask, radius: int) -> Mask:
 
 
 def eroded(mask: Mask, radius: int) -> Mask:
-    """Return the pixels of a mask (h, w) farther than `radius` pixels, at least 1, from its complement.
+    """Return the pixels of a mask (h, w) farther than `radius` pixels from its complement.
 
-    The image's border does not erode.
+    The radius is at least 1. The image's border does not erode.
     """
     square, diamond = _square_and_diamond(radius)
     return cv2.erode(cv2.erode(mask.view(np.uint8), square), diamond).view(np.bool_)
@@ -54,7 +54,7 @@ def bounding_box(mask: Mask, margin: int) -> Rect:
 
 
 def without_small_components(mask: Mask, share: float) -> Mask:
-    """Return a mask (h, w) without 8-connected components smaller than `share` of the largest one."""
+    """Return a mask (h, w) without 8-connected components below `share` of the largest one."""
     count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     if count <= 2:
         return mask

@@ -1,4 +1,4 @@
-"""The observation of a frame: the hand's silhouette and depth over a region of interest, and its point cloud."""
+"""The observation of a frame: silhouette, depth and point cloud of the hand."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +13,7 @@ from depthtrack.types import Array, Mask
 
 @dataclass(frozen=True)
 class Observation(Target):
-    """The hand in a frame: a target for scorers, with its position, its palm and its point cloud.
+    """The hand in a frame: a target for scorers with position, palm and point cloud.
 
     It is made once per frame and shared by all trackers.
 

@@ -50,10 +50,10 @@ def find_palms(grid: Grid, candidates: Grid, options: PalmOptions) -> Iterator[P
 
 
 def geodesic_extrema(candidates: Grid, options: PalmOptions) -> Iterator[int]:
-    """Yield the flat indices of the free ends of each surface as large as a hand, farthest first.
+    """Yield the flat indices of the free ends of surfaces as large as a hand.
 
-    An extremum is the node farthest from the roots of its surface and from the paths to earlier extrema. The roots are
-    where the surface leaves the image, or else its widest place.
+    The farthest come first. An extremum is the node farthest from the roots of its surface and from the paths to
+    earlier extrema. The roots are where the surface leaves the image, or else its widest place.
 
     Source: Plagemann et al., "Real-time identification and localization of body parts from depth images", ICRA 2010.
     """
@@ -75,7 +75,7 @@ def geodesic_extrema(candidates: Grid, options: PalmOptions) -> Iterator[int]:
 
 
 def palm_near_tip(grid: Grid, candidates: Grid, tip: int, options: PalmOptions) -> Palm | None:
-    """Return the widest place within a hand's length of a tip (flat index), or None if it is no palm."""
+    """Return the widest place near a tip (flat index), or None if it is no palm."""
     from_tip = candidates.paths([tip], options.tip_to_wrist)
     radius = np.where(from_tip.distance < options.tip_to_palm, candidates.inscribed(from_tip.reached()), 0)
     widest = float(radius.max())
@@ -126,7 +126,7 @@ def _limbs(grid: Grid, paths: Paths, options: PalmOptions) -> tuple[Index, ...] 
 
 
 def visible_finger_area(candidates: Grid, palm: Palm, options: PalmOptions) -> float:
-    """Return the area, m^2, of the parts of a hand as narrow as fingers: its opening by a disc removes them."""
+    """Return the area, m^2, of the parts of a hand that an opening by a disc removes."""
     hand = (candidates.depth > 0) & palm.paths.reached(options.hand_reach)
     core = candidates.inscribed(hand) > options.finger_half_breadth
     cells = cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)

@@ -101,7 +101,10 @@ def _enclosed(mask: Mask) -> Mask:
 
 
 def _majority(mask: Mask, radius: int, least: int) -> Mask:
-    """Return the pixels (h, w) around which more than `least` of 200 are set: sensors' outlines waver by a pixel."""
+    """Return the pixels (h, w) with more than `least` of 200 pixels set around them.
+
+    It smooths outlines, which waver by a pixel.
+    """
     side = 2 * radius + 1
     share = cv2.boxFilter(mask.view(np.uint8) * np.uint8(200), -1, (side, side), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(share > least)

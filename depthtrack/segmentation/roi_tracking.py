@@ -1,4 +1,4 @@
-"""Segmentation near the hand that a tracker predicts: a ball up to the wrist, and the skin in it; no search.
+"""Segmentation near the hand that a tracker predicts, without a search.
 
 Oikonomidis et al. 2011, Sec. 2.1, keep the skin-coloured points near the hand's last position. A trusted pose also
 gives the reach of the hand and the plane of its wrist.

@@ -1,4 +1,4 @@
-"""The segmenter: from a frame to the observation of its hand, near a tracker's prediction or by a search."""
+"""The segmenter: from a frame to the observation of its hand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ class Segmenter:
 
     @classmethod
     def from_options(cls, options: SegmentationOptions, has_colour: bool) -> Self:
-        """Return a segmenter that uses skin colour if the frames have colour and the options allow it.
+        """Return a segmenter that uses skin colour if frames have it and the options allow it.
 
         Raises:
             InputError: the file of skin colours cannot be read.

@@ -1,4 +1,4 @@
-"""Skin segmentation by colour that adapts to the light of the scene: hysteresis thresholds on P(skin | colour).
+"""Skin segmentation by colour that adapts to the light of the scene.
 
 Argyros and Lourakis, "Real-time tracking of multiple skin-colored objects with a possibly moving camera", ECCV 2004.
 """
@@ -22,7 +22,7 @@ NOT_SKIN, MAYBE_SKIN, SURELY_SKIN = 0, 1, 2
 
 
 class AdaptiveSkin:
-    """P(skin | colour) adapted to the light: the offline model blended with the statistics of the last frames."""
+    """P(skin | colour): an offline model blended with the statistics of the last frames."""
 
     def __init__(self, model: SkinColourModel, options: SkinColourOptions | None = None) -> None:
         self._options = options or SkinColourOptions()
@@ -51,7 +51,10 @@ class AdaptiveSkin:
         self._classes = classes_of_colours(self.posterior(), self._options)
 
     def posterior(self) -> Array:
-        """Return P = gamma P_model + (1 - gamma) P_recent (64, 64); P_model for colours without recent pixels."""
+        """Return P = gamma P_model + (1 - gamma) P_recent (64, 64) by U and V bin.
+
+        Colours without recent pixels keep P_model.
+        """
         other, skin = self._total
         count = other + skin
         known = count > 0
@@ -89,7 +92,7 @@ def classes_of_colours(posterior: Array, options: SkinColourOptions) -> Labels:
 
 @cache
 def _class_indices(darkest: float, brightest: float) -> NDArray[np.intp]:
-    """Return `bins_of_colours` (32768,) with the index after the last bin if the luminance is out of range."""
+    """Return `bins_of_colours` (32768,) with the index after the last bin in place of -1."""
     bins = bins_of_colours(darkest, brightest).astype(np.intp)
     return np.where(bins < 0, BINS * BINS, bins)
 
@@ -126,7 +129,7 @@ def classify(
 
 
 def grow_skin(classes: Labels) -> Labels:
-    """Return 1 (h, w) on the 8-connected components of MAYBE_SKIN and SURELY_SKIN that hold a SURELY_SKIN pixel."""
+    """Return 1 (h, w) on 8-connected components of skin that hold a SURELY_SKIN pixel."""
     count, components = cv2.connectedComponents((classes != NOT_SKIN).view(np.uint8), connectivity=8)
     is_skin = np.zeros(count, dtype=np.uint8)
     is_skin[components[classes == SURELY_SKIN]] = 1

@@ -78,7 +78,7 @@ class SkinColourModel:
         return cls(skin, other, float(skin.sum() / counts.sum()))
 
     def posterior(self) -> Array:
-        """Return P(skin | colour) (64, 64) by U and V bin, from Bayes' rule; 0 for colours in neither table."""
+        """Return P(skin | colour) (64, 64) by U and V bin; 0 for colours in neither table."""
         joint = self.skin * self.prior
         evidence = joint + self.other * (1 - self.prior)
         # Rarer colours than this are the tails of a fitted curve.

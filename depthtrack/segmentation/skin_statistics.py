@@ -1,4 +1,6 @@
-"""Published colour statistics of skin and of other surfaces: two mixtures of 16 Gaussians in RGB.
+"""Published colour statistics of skin and of other surfaces.
+
+They are two mixtures of 16 Gaussians in RGB.
 
 Jones and Rehg, "Statistical color models with application to skin detection", Cambridge Research Laboratory
 CRL 98/11, 1998 (IJCV 46, 2002): fitted to about 80 million skin and 850 million other pixels of 13,640 web pictures.

@@ -57,7 +57,10 @@ def build_grid(
 
 
 def blind_skin(surface: SurfaceGrid, skin: AdaptiveSkin, options: GridOptions) -> Mask:
-    """Return the nodes (rows, columns) of skin without readings, as if an object is nearer than the sensor's range."""
+    """Return the nodes (rows, columns) of skin without readings.
+
+    An arm nearer than the sensor's range has none.
+    """
     frame, grid, share = surface.frame, surface.grid, options.least_blind_share
     if frame.colour is None:
         return np.zeros(grid.depth.shape, dtype=np.bool_)
@@ -68,7 +71,7 @@ def blind_skin(surface: SurfaceGrid, skin: AdaptiveSkin, options: GridOptions) -
 
 
 def _covered(mask: Labels, stride: int, share: float, blocks: Labels) -> Mask:
-    """Return the blocks (rows, columns; not 0) of which `mask` (h, w) covers at least `share`."""
+    """Return the blocks (rows, columns; not 0) that `mask` (h, w) covers by at least `share`."""
     shares = np.zeros(blocks.shape, dtype=np.float32)
     share_of_blocks(mask, stride, blocks, shares)
     return shares >= share

@@ -1,4 +1,4 @@
-"""The wrist, where the hand ends: behind it, the forearm is narrowest. No wristband is needed."""
+"""The wrist: the hand ends where the forearm is narrowest. No wristband is needed."""
 
 import math
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ def most_likely_wrist(
     ratios: tuple[float, float, float],
     scores: tuple[float, float, float],
 ) -> float:
-    """Return the distance of the most likely wrist in a profile of breadths, metres, or NaN without any.
+    """Return the distance of the most likely wrist in a profile, metres, or NaN.
 
     profile: (bins,) breadth of the arm, metres.
     visible: number of first bins that are visible.
@@ -84,9 +84,10 @@ def most_likely_wrist(
 
 
 def narrowest_distance(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) -> float:
-    """Return the distance of the arm's narrowest place from the palm's centre, metres; 0 without a visible arm.
+    """Return the distance of the arm's narrowest place from the palm's centre, metres.
 
-    It is small for a hand. An elbow can resemble a fist, but its narrowest place is a forearm away.
+    It is 0 without a visible arm, and small for a hand. An elbow can resemble a fist, but its narrowest place is a
+    forearm away.
     """
     profile, middles = breadth_profile(grid, palm, arm, options.breadth), bin_middles(options.breadth)
     forearm = (options.forearm_from < middles) & (_visible_end(grid, palm, arm, options) > middles)
@@ -94,16 +95,17 @@ def narrowest_distance(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) 
 
 
 def _visible_end(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) -> float:
-    """Return the distance along the arm from the palm's centre beyond which its breadth is unreliable, metres."""
+    """Return the distance from the palm's centre of the end of the reliable breadth, metres."""
     return float(((grid.points[arm.exits] - palm.centre) @ arm.direction).mean()) - options.fade_out
 
 
 def palm_centre(
     grid: Grid, palm: Palm, arm: Arm, wrist_distance: float, wrist_to_palm: float, options: WristOptions
 ) -> Array:
-    """Return the palm's centre (3,) on the visible surface by its distance from the wrist, metres, camera frame.
+    """Return the palm's centre (3,) by its distance from the wrist, metres, camera frame.
 
-    It is the middle of the hand's cross-section there, because the widest place may be outside the palm.
+    It is on the visible surface: the middle of the hand's cross-section there. The widest place may be outside the
+    palm.
 
     wrist_distance: of the wrist from `palm.centre`, metres.
     wrist_to_palm: of the wrist from the palm's centre in the hand model, metres.
@@ -116,7 +118,7 @@ def palm_centre(
 def hand_axis(
     grid: Grid, palm: Palm, arm: Arm, wrist_distance: float, wrist_to_palm: float, options: WristOptions
 ) -> Arm:
-    """Return the arm with the direction from palm to wrist in place of the forearm's, if it is visible.
+    """Return the arm with the direction from palm to wrist, if it is visible.
 
     A bent wrist is then cut across the palm, as in `HandShape`.
 
@@ -136,9 +138,10 @@ def hand_axis(
 
 
 def arm_nodes(grid: Grid, palm: Palm, arm: Arm, plane: WristPlane) -> Mask:
-    """Return the nodes (rows, columns) of the arm: those beyond the plane that are connected to its exits.
+    """Return the nodes (rows, columns) of the arm.
 
-    Fingers that extend past the plane beside the arm are not connected to it there, and stay.
+    They are beyond the plane and connected to the exits. Fingers that extend past the plane beside the arm are not
+    connected to it there, and stay.
     """
     beyond = (grid.points @ plane.normal > float(plane.point @ plane.normal)).reshape(grid.depth.shape)
     mask = palm.paths.reached() & beyond

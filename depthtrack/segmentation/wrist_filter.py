@@ -35,7 +35,7 @@ class WristFilter:
         self._point, self._variance = point, self._options.measurement_sigma**2
 
     def guess(self, palm: Palm) -> float:
-        """Return the expected distance of the wrist from the palm's centre before the arm is known, metres."""
+        """Return the expected distance of the wrist from the palm's centre, metres."""
         if self._point is None:
             return anatomical_guess(palm, self._options, self.hand)
         return float(np.linalg.norm(self._point - palm.centre))

@@ -17,7 +17,7 @@ BIN, MARGIN, ARM_HALF_BREADTH = OPTIONS.bin_width, OPTIONS.margin_bins, OPTIONS.
 
 
 def _slanted_palm(seed: int) -> tuple[Grid, Palm, Arm, np.ndarray]:
-    """Return a random grid, its palm, a random axis, and the reached points (N, 3) relative to the palm."""
+    """Return a random grid, its palm, an axis, and the points (N, 3) relative to the palm."""
     rng = np.random.default_rng(seed)
     depth = np.where(rng.random((48, 64)) < 0.2, 0, 0.5 + 0.01 * rng.random((48, 64))).astype(np.float32)
     grid = Grid.over(depth, Camera(64, 48, 100, 100, 31.5, 23.5), Rect(0, 0, 64, 48), (0.3, 0.9), 2)

@@ -12,7 +12,7 @@ DARKEST, BRIGHTEST = SkinColourOptions().darkest, SkinColourOptions().brightest
 
 
 def slow_bin(r: int, g: int, b: int) -> int:
-    """Return the flat bin of the quantised colour of (r, g, b); -1 if its luminance is out of range."""
+    """Return the flat bin of the quantised colour; -1 if its luminance is out of range."""
     red, green, blue = (8 * (level // 8) + 3.5 for level in (r, g, b))
     y = 0.299 * red + 0.587 * green + 0.114 * blue
     u = 128 - 0.168736 * red - 0.331264 * green + 0.5 * blue

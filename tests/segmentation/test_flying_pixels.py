@@ -1,4 +1,4 @@
-"""Flying pixels: found where time-of-flight sensors mix two depths, and not on visible surfaces."""
+"""Flying pixels: found where sensors mix two depths, and not on visible surfaces."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_kernel_equals_the_definition(seed: int) -> None:
 
 
 def test_rims_and_streaks_are_flying_pixels_and_a_finger_is_not() -> None:
-    """A finger of 9 pixels is before a wall, with a rim half way between and a streak beyond its tip."""
+    """A finger is before a wall, with a rim half way between and a streak beyond its tip."""
     depth = np.full((60, 40), 1.2, np.float32)
     across = np.arange(-4, 5) * 0.6 / FOCAL
     depth[20:60, 15:24] = 0.6 - np.sqrt(0.008**2 - np.minimum(np.abs(across), 0.0079) ** 2)
@@ -50,7 +50,7 @@ def test_rims_and_streaks_are_flying_pixels_and_a_finger_is_not() -> None:
 
 @pytest.mark.parametrize("coloured", [False, True])
 def test_observations_by_depth_alone_have_no_flying_pixels(coloured: bool) -> None:
-    """Half of the readings beside the outline become flying pixels; less than 5 % of them are observed.
+    """Half of the readings beside the outline are flying pixels; few of them remain.
 
     The segmenter has no skin colours, whether the frame has colour or not.
     """

@@ -1,4 +1,4 @@
-"""Point clouds: points project to their pixels; normals equal exact surfaces and a least-squares fit."""
+"""Point clouds against pixels, exact surfaces and a least-squares fit."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Segmentation near a prior: reach, wrist, skin, missing readings, and the hand-over to the search."""
+"""Segmentation near a prior: reach, wrist, skin, and the change to the search."""
 
 import numpy as np
 import pytest
@@ -109,7 +109,7 @@ def test_a_search_continues_from_the_last_prior(made: Synthesiser) -> None:
 
 
 def test_sizes_are_those_of_the_last_prior(made: Synthesiser) -> None:
-    """The centre is half a palm behind the surface; the average palm is used without a prior and after a reset."""
+    """The centre is half a palm behind the surface; a reset restores the average palm."""
     thick, frame = HandSize(0.03, 0.046, 0.16), frame_of(made, 0)
     prior = prior_of(made, 0)
 

@@ -1,4 +1,4 @@
-"""Segmentation of synthetic frames: silhouette, wrist, other objects, and borders of the image."""
+"""Segmentation of synthetic frames: silhouette, wrist, other objects, and borders."""
 
 from dataclasses import replace
 from functools import cache

@@ -28,7 +28,7 @@ def test_posterior_is_bayes_rule() -> None:
 
 
 def painted() -> np.ndarray:
-    """Return an image (20, 30, 3): a patch of skin (rows 4 to 12, columns 6 to 18) on leaves and sky."""
+    """Return an image (20, 30, 3) of skin (rows 4 to 12, columns 6 to 18) on leaves and sky."""
     image = np.empty((20, 30, 3), np.uint8)
     image[:10], image[10:] = BLUE_RGB, LEAF_RGB
     image[4:12, 6:18] = SKIN_RGB

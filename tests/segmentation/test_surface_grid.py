@@ -1,4 +1,4 @@
-"""The surface grid: kernels against scipy's graphs and slow loops, geometry against known shapes."""
+"""The surface grid: kernels against scipy and slow loops, geometry against shapes."""
 
 import numpy as np
 import pytest

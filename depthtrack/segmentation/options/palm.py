@@ -55,7 +55,7 @@ class PalmOptions:
 
 @dataclass(frozen=True)
 class DetectionOptions:
-    """Weights of the choice among palm candidates, in metres of distance that a property offsets.
+    """Weights of the choice among palm candidates, in metres of distance.
 
     A start chooses among all candidates of the nearest slice of depth; following chooses near the last position.
     """

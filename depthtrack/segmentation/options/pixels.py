@@ -1,4 +1,4 @@
-"""Options of the steps that label single pixels: ROI, outline, skin colour, flying pixels and point cloud."""
+"""Options of the steps that label single pixels."""
 
 from dataclasses import dataclass
 
@@ -50,7 +50,7 @@ class OutlineOptions:
 
 @dataclass(frozen=True)
 class SkinColourOptions:
-    """Classification of pixels by P(skin | colour) with hysteresis, and its adaptation to the light."""
+    """Hysteresis thresholds on P(skin | colour), and its adaptation to the light."""
 
     prior: float = option(
         0.4,
