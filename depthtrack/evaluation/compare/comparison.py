@@ -83,12 +83,12 @@ def compare(
     """
     # Workers may have another current folder.
     folder = folder.resolve()
-    totals = {source: source.count(source.open()) for source in comparison.sources}
+    frames = sum(source.count(source.open()) for source in comparison.sources)
     budgets = _budgets(comparison, folder, workers, listener)
     plans = _plans(comparison, folder, budgets)
     missing = [plan for plan in plans if plan.state() != "done"]
     folders = [Path(plan.folder) for plan in plans]
-    total = sum(totals[plan.source] for plan in plans)
+    total = frames * len(comparison.specs) * comparison.repeats
     with _reported(folders, total, listener):
         for _ in workers.measure(track_cell, [plan.to_cell() for plan in missing]):
             pass
