@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from depthtrack.api.choices import open_recording as open_recording
     from depthtrack.api.comparing import compare as compare
     from depthtrack.api.comparing import comparison_table as comparison_table
-    from depthtrack.api.comparing import evaluate as evaluate
     from depthtrack.api.live import HandTracker as HandTracker
     from depthtrack.api.measuring import calibrate as calibrate
     from depthtrack.api.measuring import calibrate_rig as calibrate_rig
+    from depthtrack.api.runs import evaluate as evaluate
     from depthtrack.api.runs import export_run as export_run
     from depthtrack.api.runs import joint_track as joint_track
     from depthtrack.api.runs import read_run as read_run
@@ -50,10 +50,10 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "api.choices": ("open_hand", "open_recording"),
-    "api.comparing": ("compare", "comparison_table", "evaluate"),
+    "api.comparing": ("compare", "comparison_table"),
     "api.live": ("HandTracker",),
     "api.measuring": ("calibrate", "calibrate_rig"),
-    "api.runs": ("export_run", "joint_track", "read_run", "track"),
+    "api.runs": ("evaluate", "export_run", "joint_track", "read_run", "track"),
     "api.synthetic": ("synthesise",),
     "calibration.calibrate": ("Calibration",),
     "calibration.rig_calibration": ("RigCalibration",),

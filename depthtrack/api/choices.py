@@ -53,8 +53,16 @@ def path_of(recording: Sequence) -> Path:
         InputError: the recording was not read from a path.
     """
     if not isinstance(recording, BaseSequence):
-        raise InputError(f"the recording {recording.name} must have a path, found {type(recording).__name__}: open one")
+        raise InputError(
+            f"expected a recording that was opened from a path, found {type(recording).__name__}: "
+            "push its frames to a HandTracker"
+        )
     return recording.path
+
+
+def on_damage_of(recording: Sequence) -> OnDamage:
+    """Return what an opened recording does at a frame that cannot be read."""
+    return recording.on_damage if isinstance(recording, BaseSequence) else "refuse"
 
 
 def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShape:

@@ -1,41 +1,20 @@
-"""Evaluate runs, and compare trackers on the same recordings."""
+"""Compare trackers on the same recordings."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
-from depthtrack.api.choices import Recording, as_recording, path_of
+from depthtrack.api.choices import Recording, on_damage_of, path_of
 from depthtrack.evaluation.compare.comparison import Comparison
 from depthtrack.evaluation.compare.comparison import compare as compare_runs
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, tracker_results, write_results
 from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
 from depthtrack.evaluation.evaluate import Evaluation
-from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
-from depthtrack.evaluation.replay import Replay
 from depthtrack.evaluation.sweep.workers import chosen_workers
-from depthtrack.recording.run_folder import Run
+from depthtrack.recording.hand_choice import TRUTH
 from depthtrack.report.build import write_report
 from depthtrack.tracking.configuration import TrackerConfig
-
-
-def evaluate(run: Run | Path | str, recording: Path | str | None = None, *, residuals: bool = True) -> Evaluation:
-    """Compare a run with its recording.
-
-    The figures are errors against ground truth, residuals, losses, jitter and time.
-
-    recording: where the recording is, if it was moved since.
-    residuals: segment each frame again, for the metrics that need no ground truth.
-
-    Raises:
-        InputError: the run or its recording cannot be read, or they do not belong together.
-
-    Example:
-        evaluation = depthtrack.evaluate("my-run")
-        for metric in evaluation.metrics:
-            print(metric.name, metric.statistics())
-    """
-    run = run if isinstance(run, Run) else Run.load(Path(run))
-    return evaluate_replay(Replay.open(run, None if recording is None else Path(recording)), residuals)
 
 
 def compare(
@@ -76,8 +55,8 @@ def compare(
         specs = [TrackerSpec(label, config) for label, config in trackers.items()]
     else:
         specs = read_specs(trackers)
-    name = None if hand is None else str(hand)
-    sources = tuple(Source(str(_path(each)), hand=name, frames=frames) for each in recordings)
+    name = None if hand is None else TRUTH if hand == TRUTH else str(Path(hand).resolve())
+    sources = tuple(_source(each, name, frames) for each in recordings)
     runs = compare_runs(Comparison(sources, tuple(specs), repeats, seed, equal_ms), folder, workers)
     evaluations = list(evaluate_runs([Path(run.folder) for run in runs], workers))
     write_results(evaluations, folder)
@@ -93,5 +72,9 @@ def comparison_table(evaluations: Sequence[Evaluation]) -> str:
     return as_table(tracker_results(evaluations))
 
 
-def _path(recording: Recording) -> Path:
-    return Path(recording) if isinstance(recording, Path | str) else path_of(as_recording(recording))
+def _source(recording: Recording, hand: str | None, frames: int | None) -> Source:
+    """Return the recording as workers open it, with its camera and treatment of damage."""
+    if isinstance(recording, Path | str):
+        return Source(str(Path(recording).resolve()), hand=hand, frames=frames)
+    path, camera = str(path_of(recording).resolve()), asdict(recording.camera)
+    return Source(path, camera, on_damage_of(recording), hand, frames=frames)

@@ -27,6 +27,7 @@ class HandTracker:
     """Tracks a hand in frames that come from any source: a sensor, a network, a program.
 
     Equal frames give equal bits. All frames of a recording give the poses that `depthtrack track` writes.
+    Frames are numbered from 0 as they arrive; the random numbers of a frame depend on its number.
     The segmentation uses colour if the first frame has colour.
 
     Example:

@@ -1,11 +1,13 @@
-"""Track recordings into run folders, and read and export runs."""
+"""Track recordings into run folders, and read, evaluate and export runs."""
 
 from collections.abc import Iterator
 from pathlib import Path
 from typing import overload
 
-from depthtrack.api.choices import Hand, Recording, as_config, as_recording, open_hand, path_of
-from depthtrack.evaluation.replay import run_hand
+from depthtrack.api.choices import Hand, Recording, as_config, as_recording, on_damage_of, open_hand, path_of
+from depthtrack.evaluation.evaluate import Evaluation
+from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
+from depthtrack.evaluation.replay import Replay, run_hand
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.export.registry import export_joints
 from depthtrack.machine import usable_cores
@@ -91,7 +93,7 @@ def track(
         segmentation,
         start=start,
         frames=frames,
-        on_damage=getattr(sequence, "on_damage", "refuse"),
+        on_damage=on_damage_of(sequence),
     )
     run = TrackingRun(configuration, sequence, threads or usable_cores())
     if out is None:
@@ -118,6 +120,26 @@ def read_run(folder: Path | str) -> Run:
         print(run.timestamps.shape, run.poses.shape, run.status.count("lost"))
     """
     return Run.load(Path(folder))
+
+
+def evaluate(run: Run | Path | str, recording: Path | str | None = None, *, residuals: bool = True) -> Evaluation:
+    """Compare a run with its recording.
+
+    The figures are errors against ground truth, residuals, losses, jitter and time.
+
+    recording: where the recording is, if it was moved since.
+    residuals: segment each frame again, for the metrics that need no ground truth.
+
+    Raises:
+        InputError: the run or its recording cannot be read, or they do not belong together.
+
+    Example:
+        evaluation = depthtrack.evaluate("my-run")
+        for metric in evaluation.metrics:
+            print(metric.name, metric.statistics())
+    """
+    run = run if isinstance(run, Run) else read_run(run)
+    return evaluate_replay(Replay.open(run, None if recording is None else Path(recording)), residuals)
 
 
 def joint_track(run: Run | Path | str) -> JointTrack:

@@ -1,6 +1,7 @@
 """Evaluation and comparison from Python."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,3 +34,25 @@ def test_trackers_are_compared_by_name_or_configuration(path: Path, tmp_path: Pa
 def test_a_comparison_needs_a_recording(tmp_path: Path) -> None:
     with pytest.raises(dt.InputError, match="at least one recording"):
         dt.compare([], tmp_path)
+
+
+def test_a_recording_is_compared_with_the_camera_that_it_was_opened_with(path: Path, tmp_path: Path) -> None:
+    camera = dt.open_recording(path).camera
+    recording = dt.open_recording(path, dt.Camera(camera.width, camera.height, 500, 500, 320, 240), on_damage="skip")
+    config = dt.tracker_config("ik", resolution=64, subsample=9)
+    (evaluation,) = dt.compare([recording], tmp_path, {"ik": config}, frames=1, jobs=1)
+    assert evaluation.run.configuration["camera"]["fx"] == 500
+    assert evaluation.run.configuration["on_damage"] == "skip"
+
+
+def test_recordings_without_a_path_are_refused(path: Path, tmp_path: Path) -> None:
+    class InMemory(list[dt.Frame]):
+        """A recording that was never a file."""
+
+        camera = dt.open_recording(path).camera
+        name = "in memory"
+
+    recording: Any = InMemory(dt.open_recording(path))
+    for use in (lambda: dt.track(recording), lambda: dt.compare([recording], tmp_path)):
+        with pytest.raises(dt.InputError, match="HandTracker"):
+            use()
