@@ -86,12 +86,12 @@ class Command:
         """Yield the row of each frame, and write video, table and contact sheet."""
         import csv
 
-        from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, sequence_depth_range
+        from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_spaced, sequence_depth_range
         from depthtrack.viewing.contact_sheet import contact_sheet, describe, frame_rate, save_picture
         from depthtrack.viewing.panels import panel
         from depthtrack.viewing.video import VideoWriter
 
-        chosen, shown = set(evenly_chosen(len(sequence), 12)), []
+        chosen, shown = set(evenly_spaced(len(sequence), 12)), []
         near, far = sequence_depth_range(sequence)
         with (
             replace_atomically(folder / "segments.csv") as table,

@@ -33,7 +33,7 @@ class Command:
     def run(self) -> None:
         from depthtrack.evaluation.replay import Replay
         from depthtrack.recording.run_folder import Run
-        from depthtrack.viewing.run_film import write_run_film
+        from depthtrack.viewing.run_video import write_run_video
         from depthtrack.viewing.video import WEB_CODECS
 
         if not 48 <= self.height <= 1080:
@@ -42,7 +42,7 @@ class Command:
             raise InputError(f"--speed must be from 0.01 to 100, found {self.speed}")
         replay = Replay.open(Run.load(self.path), self.sequence)
         codecs = WEB_CODECS if self.codec == "web" else None
-        count = write_run_film(replay, self.out, codecs, self.height, bar, self.speed)
+        count = write_run_video(replay, self.out, codecs, self.height, bar, self.speed)
         if count == 0:
             raise InputError(f"the run {self.path} has no frame to show: choose another run")
         print(f"wrote the video {self.out}: {count} frames")

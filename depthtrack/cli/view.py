@@ -118,17 +118,17 @@ class Command(ViewOptions):
 
     def _all_frames(self, sequence: "Sequence") -> "Iterator[AnnotatedFrame]":
         """Yield every frame, with a progress bar on a terminal."""
-        from depthtrack.viewing.annotated_frame import moments
+        from depthtrack.viewing.annotated_frame import annotated_frames
 
-        yield from bar(moments(sequence, None, self._estimator()), total=len(sequence))
+        yield from bar(annotated_frames(sequence, None, self._estimator()), total=len(sequence))
 
     def _chosen_frames(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
-        from depthtrack.viewing.annotated_frame import evenly_chosen, moments
+        from depthtrack.viewing.annotated_frame import evenly_spaced, annotated_frames
 
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
         if outside:
             raise InputError(f"--frames must be from 0 to {len(sequence) - 1} in {sequence.name}, found {outside[0]}")
-        return moments(sequence, self.frames or evenly_chosen(len(sequence), count), self._estimator())
+        return annotated_frames(sequence, self.frames or evenly_spaced(len(sequence), count), self._estimator())
 
     def _estimator(self) -> "MaskEstimator | None":
         """Return a new mask estimator for one pass over the recording; None if not wanted."""

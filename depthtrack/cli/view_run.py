@@ -79,7 +79,7 @@ def _serve(replay: "Replay") -> None:
 
 
 def _write_sheet(replay: "Replay", options: ViewOptions, path: Path) -> None:
-    from depthtrack.viewing.annotated_frame import evenly_chosen
+    from depthtrack.viewing.annotated_frame import evenly_spaced
     from depthtrack.viewing.contact_sheet import save_picture
     from depthtrack.viewing.run_sheet import run_sheet
 
@@ -89,15 +89,15 @@ def _write_sheet(replay: "Replay", options: ViewOptions, path: Path) -> None:
         raise InputError(
             f"--frames must be frames of the run {replay.run.folder}, found {outside[0]}: choose among its frames"
         )
-    rows = [row_of[index] for index in options.frames] or evenly_chosen(len(replay), options.count or 12)
+    rows = [row_of[index] for index in options.frames] or evenly_spaced(len(replay), options.count or 12)
     save_picture(run_sheet(replay, rows), path)
     print(f"wrote the contact sheet {path}")
 
 
 def _write_video(replay: "Replay", options: ViewOptions, path: Path) -> None:
-    from depthtrack.viewing.run_film import write_run_film
+    from depthtrack.viewing.run_video import write_run_video
     from depthtrack.viewing.video import WEB_CODECS
 
     codecs = WEB_CODECS if options.codec == "web" else None
-    count = write_run_film(replay, path, codecs, progress=bar)
+    count = write_run_video(replay, path, codecs, progress=bar)
     print(f"wrote the video {path}: {count} frames")

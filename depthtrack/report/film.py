@@ -14,7 +14,7 @@ from PIL import Image as Pictures
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.pictures import SideBySide
 from depthtrack.types import Image
-from depthtrack.viewing.annotated_frame import evenly_chosen
+from depthtrack.viewing.annotated_frame import evenly_spaced
 
 FASTEST = 15.0
 """Pictures a second: more would show little more."""
@@ -41,7 +41,7 @@ def film_of(painter: SideBySide, most_bytes: int, progress: Progress = lambda fr
     """The film of a recording with its trackers; evenly fewer frames, where all would take more than `most_bytes`."""
     indices = painter.indices
     times = painter.sequence.timestamps[indices]
-    chosen = [indices[k] for k in evenly_chosen(len(indices), _count(painter, times, most_bytes))]
+    chosen = [indices[k] for k in evenly_spaced(len(indices), _count(painter, times, most_bytes))]
     pictures, seconds, shape = [], [], (0, 0)
     for frame in progress(painter.sequence.frames(chosen), len(chosen)):
         picture = painter.picture(frame)
@@ -61,7 +61,7 @@ def as_webp(image: Image, quality: int = _QUALITY) -> str:
 def _count(painter: SideBySide, times: np.ndarray, most_bytes: int) -> int:
     """How many frames to show: as many as are seen, unless a few samples say that they take too much."""
     wanted = min(len(times), max(1, round(FASTEST * float(times[-1] - times[0]))), MOST_PICTURES)
-    samples = [painter.indices[k] for k in evenly_chosen(len(times), _SAMPLES)]
+    samples = [painter.indices[k] for k in evenly_spaced(len(times), _SAMPLES)]
     sizes = [len(as_webp(painter.picture(frame))) for frame in painter.sequence.frames(samples)]
     affordable = int(most_bytes / np.mean(sizes))
     return min(len(times), max(min(wanted, affordable), min(wanted, LEAST_PICTURES)))

@@ -20,10 +20,10 @@ from depthtrack.report.colours import tracker_colour
 from depthtrack.report.series import TrackerSeries
 from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
-from depthtrack.viewing.close_ups import close_ups
+from depthtrack.viewing.close_ups import close_up_regions
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
-from depthtrack.viewing.panels import captioned, paint, tile_grid
+from depthtrack.viewing.panels import captioned, draw_layer, tile_grid
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import Rgb
 
@@ -59,7 +59,7 @@ class SideBySide:
         self.indices = sorted(set().union(*(panel.row_of for panel in self._panels)))
         keypoints = self._keypoints()
         known = np.asarray(np.isfinite(keypoints).all(axis=(1, 2)), dtype=np.bool_)
-        regions = _narrowed(close_ups(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
+        regions = _narrowed(close_up_regions(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
         self._regions = dict(zip(self.indices, regions, strict=True))
         depths = keypoints[known, :, 2]
         near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
@@ -79,7 +79,7 @@ class SideBySide:
         remark = "  ·  ".join(filter(None, (told, note)))
         colour = tracker_colour(panel.shown.number).rgb
         close = AnnotatedFrame(frame).cropped(self._regions[frame.index])
-        image = paint(close, "colour", self._height, *self._range)
+        image = draw_layer(close, "colour", self._height, *self._range)
         pose = None if row is None else panel.replay.run.poses[row]
         if pose is not None and np.isfinite(pose).all():
             camera = close.camera.resized(self._height / close.camera.height)

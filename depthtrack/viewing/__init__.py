@@ -1,1 +1,1 @@
-"""Overlays, videos, contact sheets and viewers."""
+"""Overlays, videos, contact sheets and interactive viewers."""

@@ -1,4 +1,4 @@
-"""A frame with everything known about it: what pictures and viewers show."""
+"""Frames with their silhouette and keypoints, for pictures and viewers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -13,14 +13,16 @@ from depthtrack.types import Array, Mask
 from depthtrack.viewing.depth_colours import depth_range
 
 MaskEstimator = Callable[[Frame], Mask | None]
-"""Finds the hand's silhouette (h, w) in a frame, or None where it sees no hand. Called on frames in their order."""
+"""Returns the hand's silhouette (h, w) in a frame, None without a hand; called on frames in order."""
 
 
 @dataclass(frozen=True)
 class AnnotatedFrame:
-    """One frame, the hand's silhouette (h, w) in it, and the true keypoints (21, 3) in metres, camera frame.
+    """A frame with the hand's silhouette and keypoints, if known.
 
-    `mask_is_true` tells a silhouette known to the recording from an estimated one.
+    mask (h, w): silhouette.
+    mask_is_true: whether the silhouette is ground truth instead of an estimate.
+    keypoints (21, 3): metres, camera frame.
     """
 
     frame: Frame
@@ -30,9 +32,9 @@ class AnnotatedFrame:
 
     @classmethod
     def of(cls, sequence: Sequence, frame: Frame, estimate: MaskEstimator | None = None) -> Self:
-        """A frame of a recording; `estimate` is asked for a mask where the recording knows none.
+        """Annotate a frame of a recording; `estimate` returns the mask if there is no true one.
 
-        Raises DamagedFrameError where the true mask is there and cannot be read.
+        Raises: DamagedFrameError if the true mask cannot be read.
         """
         true_mask = sequence.hand_mask(frame.index)
         mask = true_mask if true_mask is not None or estimate is None else estimate(frame)
@@ -40,11 +42,11 @@ class AnnotatedFrame:
 
     @property
     def camera(self) -> Camera:
-        """Camera of the frame."""
+        """Return the frame's camera."""
         return self.frame.camera
 
     def hand_box(self) -> Rect | None:
-        """Return the bounding box of the silhouette and the keypoints in sight, None without either."""
+        """Return the bounding box of silhouette and projected keypoints; None without both."""
         pixels = [np.empty((0, 2))]
         if self.mask is not None:
             pixels.append(np.argwhere(self.mask)[:, ::-1].astype(np.float64))
@@ -55,7 +57,7 @@ class AnnotatedFrame:
         return Rect.around(np.floor(found)) if len(found) else None
 
     def cropped(self, region: Rect) -> "AnnotatedFrame":
-        """Return a region of the frame; what lies outside the image is black and without reading."""
+        """Return a region of the frame; pixels outside the image are black, without depth."""
         frame = self.frame
         return AnnotatedFrame(
             Frame(
@@ -71,28 +73,28 @@ class AnnotatedFrame:
         )
 
 
-def moments(
+def annotated_frames(
     sequence: Sequence, indices: Iterable[int] | None = None, estimate: MaskEstimator | None = None
 ) -> Iterator[AnnotatedFrame]:
-    """Moments of a recording, one at a time: of the frames `indices` in that order, or of all.
+    """Yield annotated frames of a recording: those of `indices` in that order, or all.
 
-    Damaged frames are refused or skipped as was chosen when the recording was opened.
+    The sequence rejects or skips damaged frames, as chosen when it was opened.
     """
     for frame in sequence.frames(range(len(sequence)) if indices is None else indices):
         yield AnnotatedFrame.of(sequence, frame, estimate)
 
 
 def true_keypoints(truth: GroundTruth | None, timestamp: float) -> Array | None:
-    """The 21 keypoints (21, 3) known at `timestamp`, metres."""
+    """Return the true keypoints (21, 3) at a time, metres, camera frame; None if unknown."""
     return None if truth is None else truth.keypoints_at(timestamp)
 
 
-def evenly_chosen(length: int, count: int) -> list[int]:
-    """At most `count` different indices below `length`, in order: the middles of as many equal parts."""
+def evenly_spaced(length: int, count: int) -> list[int]:
+    """Return at most `count` increasing indices below `length`: the middles of equal parts."""
     count = min(length, count)
     return [int((part + 0.5) * length / count) for part in range(count)]
 
 
 def sequence_depth_range(sequence: Sequence) -> tuple[float, float]:
-    """Near and far, metres, of a few frames spread over a recording: one scale for all of its pictures."""
-    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_chosen(len(sequence), 8))]))
+    """Return near and far (metres) of evenly spaced frames: one colour scale for a recording."""
+    return depth_range(np.stack([frame.depth for frame in sequence.frames(evenly_spaced(len(sequence), 8))]))

@@ -1,4 +1,4 @@
-"""What a calibration changed: the average hand and the measured one over what was observed."""
+"""Calibration picture: the hand before and after calibration over the observed depth."""
 
 from collections.abc import Sequence
 
@@ -28,11 +28,12 @@ _OPACITY = 0.75
 
 
 def calibration_picture(calibration: Calibration | RigCalibration, before: HandShape | None = None) -> Image:
-    """Return a page (h, w, 3): for a few views, the depth, the hand before over it, and the measured hand.
+    """Return a page of views: depth, the hand before calibration and the calibrated hand.
 
-    The outline of the observed silhouette is drawn around each.
+    The outline of the observed silhouette is drawn on both.
 
-    `before`: the rig at its own scale; None for the average hand.
+    before: the rig at its own scale; None for the average hand.
+    Result (h, w, 3): RGB.
     """
     first = HandShape(side=calibration.hand.side) if before is None else before
     name_before = "average hand" if before is None else "rig as given"
@@ -40,13 +41,13 @@ def calibration_picture(calibration: Calibration | RigCalibration, before: HandS
     for i in shown_views(calibration.observations):
         o = calibration.observations[i]
         camera = o.camera.crop(_square(o.camera.shape)).resized(_HEIGHT / max(o.camera.shape))
-        ground, outline = _ground(o, camera)
-        tiles = [captioned(ground, f"frame {o.frame_index}", "depth")]
+        background, outline = _background(o, camera)
+        tiles = [captioned(background, f"frame {o.frame_index}", "depth")]
         for name, hand, pose in (
             (name_before, first, calibration.poses_before[i]),
             ("measured hand", calibration.hand, calibration.poses[i]),
         ):
-            drawn = draw_surface(dimmed(ground, 0.8), _seen(hand, pose, camera), _OPACITY)
+            drawn = draw_surface(dimmed(background, 0.8), _rendered(hand, pose, camera), _OPACITY)
             drawn[outline] = TRUE_MASK
             tiles.append(captioned(drawn, name))
         rows.append(beside(tiles))
@@ -54,19 +55,19 @@ def calibration_picture(calibration: Calibration | RigCalibration, before: HandS
 
 
 def shown_views(observations: Sequence[Observation]) -> list[int]:
-    """Which of the observations are shown, in the order of the recording."""
+    """Return the indices of the shown observations, in the order of the recording."""
     chosen = np.unique(np.linspace(0, len(observations) - 1, _ROWS).round().astype(int)).tolist()
     return sorted(chosen, key=lambda i: observations[i].frame_index)
 
 
 def _square(shape: tuple[int, int]) -> Rect:
-    """Return the square around an image of `shape` (height, width): pictures of one size."""
+    """Return the square around an image of `shape` (height, width), for pictures of one size."""
     side = max(shape)
     return Rect.of_size((shape[1] - side) // 2, (shape[0] - side) // 2, side, side)
 
 
-def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
-    """The observed depth in colours, and the outline of the silhouette (h, w)."""
+def _background(o: Observation, camera: Camera) -> tuple[Image, Mask]:
+    """Return the observed depth in colours (h, w, 3) and the silhouette's outline (h, w)."""
     square = _square(o.camera.shape)
     depth, silhouette = square.crop(o.depth), square.crop(o.silhouette.astype(np.uint8))
     size = (camera.width, camera.height)
@@ -78,7 +79,7 @@ def _ground(o: Observation, camera: Camera) -> tuple[Image, Mask]:
     return image, (large > 0) & (cv2.erode(large, np.ones((3, 3), np.uint8)) == 0)
 
 
-def _seen(hand: HandShape, pose: Array, camera: Camera) -> RenderedSurface:
+def _rendered(hand: HandShape, pose: Array, camera: Camera) -> RenderedSurface:
     skin = Skin.of(hand)
     vertices = skin.at(pose)
     return rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)

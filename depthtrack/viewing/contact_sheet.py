@@ -1,4 +1,4 @@
-"""A recording on one page: moments chosen evenly, each with depth and colour, under a title and over a legend."""
+"""Contact sheets: frames of a recording on one page, with title and legend."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,48 +12,52 @@ from depthtrack.recording.sequence import Sequence
 from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import colour_scale
-from depthtrack.viewing.panels import Layer, beside, blank, captioned, paint, smaller, stacked, tile_grid
+from depthtrack.viewing.panels import Layer, beside, blank, captioned, draw_layer, smaller, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, TEXT, TRUE_MASK, Rgb
 
 MARGIN = 20
+"""Background around a page, pixels."""
 PICTURE_SETTINGS = {".png": (cv2.IMWRITE_PNG_COMPRESSION, 6), ".jpg": (cv2.IMWRITE_JPEG_QUALITY, 92)}
 
 
 def contact_sheet(
-    moments: Iterable[AnnotatedFrame], title: str, subtitle: str, near: float, far: float, width: int = 1700
+    frames: Iterable[AnnotatedFrame], title: str, subtitle: str, near: float, far: float, width: int = 1700
 ) -> Image:
-    """A page (h, w, 3) of moments in reading order, about `width` pixels wide: depth beside an overview in colour.
+    """Return a page of frames in reading order: depth, and colour with silhouette and keypoints.
 
-    Silhouettes and true keypoints are drawn where they are known. Raises InputError without any moment to show.
+    near, far: ends of the depth colours, metres.
+    width: approximate width of the page, pixels.
+    Result (h, w, 3): RGB.
+    Raises: InputError if there are no frames.
     """
-    moments = list(moments)
-    if not moments:
+    frames = list(frames)
+    if not frames:
         raise InputError(f"{title} holds no readable frame to show")
-    # Pairs of pictures stand three in a row, single ones four.
-    columns = min(4 if moments[0].frame.colour is None else 3, len(moments))
-    tiles = [_tile(moment, _tile_height(moments[0], width // columns), near, far) for moment in moments]
+    # Pairs of pictures are placed three in a row, single ones four.
+    columns = min(4 if frames[0].frame.colour is None else 3, len(frames))
+    tiles = [_tile(annotated, _tile_height(frames[0], width // columns), near, far) for annotated in frames]
     grid = tile_grid(tiles, columns)
-    parts = [_title(title, subtitle, grid.shape[1]), grid, _legend(moments, near, far, grid.shape[1])]
+    parts = [_title(title, subtitle, grid.shape[1]), grid, _legend(frames, near, far, grid.shape[1])]
     return framed(stacked(parts, gap=12))
 
 
 def framed(image: Image, margin: int = MARGIN) -> Image:
-    """`image` with a margin of background all around."""
+    """Add a margin of background around an image."""
     out = blank(image.shape[1] + 2 * margin, image.shape[0] + 2 * margin)
     out[margin:-margin, margin:-margin] = image
     return out
 
 
 def describe(sequence: Sequence) -> str:
-    """Length, duration, rate and size in one line."""
+    """Return length, duration, rate and image size of a recording in one line."""
     times, camera, rate = sequence.timestamps, sequence.camera, frame_rate(sequence)
     span = [] if rate is None else [f"{times[-1] - times[0]:.1f} s", f"{rate:.0f} Hz"]
     return "  ·  ".join([f"{len(sequence)} frames", *span, f"{camera.width} x {camera.height}"])
 
 
 def frame_rate(sequence: Sequence) -> float | None:
-    """Frames a second by the usual interval; None for a single frame."""
+    """Return the frame rate (Hz) from the median interval; None for a single frame."""
     times = sequence.timestamps
     return float(1 / np.median(np.diff(times))) if len(times) > 1 else None
 
@@ -72,17 +76,17 @@ def save_picture(image: Image, path: Path) -> None:
     write_atomic(path, data.tobytes())
 
 
-def _tile(moment: AnnotatedFrame, height: int, near: float, far: float) -> Image:
-    """Depth and overview; without colour the overview is drawn on the depth itself."""
-    layers: list[Layer] = ["overview"] if moment.frame.colour is None else ["depth", "overview"]
-    large = [paint(moment, layer, 2 * height, near, far) for layer in layers]
+def _tile(annotated: AnnotatedFrame, height: int, near: float, far: float) -> Image:
+    """Return depth beside the overview; without colour, the overview on depth alone."""
+    layers: list[Layer] = ["overview"] if annotated.frame.colour is None else ["depth", "overview"]
+    large = [draw_layer(annotated, layer, 2 * height, near, far) for layer in layers]
     pictures = [smaller(image, image.shape[1] // 2, height) for image in large]
-    return captioned(beside(pictures, gap=0), f"frame {moment.frame.index}", f"{moment.frame.timestamp:.2f} s")
+    return captioned(beside(pictures, gap=0), f"frame {annotated.frame.index}", f"{annotated.frame.timestamp:.2f} s")
 
 
-def _tile_height(moment: AnnotatedFrame, tile_width: int) -> int:
-    pictures = 1 if moment.frame.colour is None else 2
-    return max(16, round(tile_width / pictures * moment.camera.height / moment.camera.width))
+def _tile_height(annotated: AnnotatedFrame, tile_width: int) -> int:
+    pictures = 1 if annotated.frame.colour is None else 2
+    return max(16, round(tile_width / pictures * annotated.camera.height / annotated.camera.width))
 
 
 def _title(title: str, subtitle: str, width: int) -> Image:
@@ -94,20 +98,20 @@ def _title(title: str, subtitle: str, width: int) -> Image:
     return bar
 
 
-def _legend(moments: list[AnnotatedFrame], near: float, far: float, width: int) -> Image:
-    """The depth scale and the meaning of the colours that occur, left to right as far as there is room."""
+def _legend(frames: list[AnnotatedFrame], near: float, far: float, width: int) -> Image:
+    """Return the depth scale and the legend of the colours in use, cut at the page's width."""
     bar = blank(width, 22)
     x = _write(bar, 0, f"{near:.2f} m", FAINT_TEXT) + 8
     scale = colour_scale(min(160, max(1, width - x)), 10)
     bar[6:16, x : x + scale.shape[1]] = scale[:, : max(0, width - x)]
     x = _write(bar, x + scale.shape[1] + 8, f"{far:.2f} m", FAINT_TEXT) + 28
-    masks = {moment.mask_is_true for moment in moments if moment.mask is not None}
+    masks = {annotated.mask_is_true for annotated in frames if annotated.mask is not None}
     entries: list[tuple[str, Rgb]] = []
     if True in masks:
         entries.append(("true mask", TRUE_MASK))
     if False in masks:
         entries.append(("estimated mask", ESTIMATED_MASK))
-    if any(moment.keypoints is not None for moment in moments):
+    if any(annotated.keypoints is not None for annotated in frames):
         entries += FINGER_COLOURS.items()
     for name, colour in entries:
         if x + 16 + text_width(name, 13) > width:
@@ -118,6 +122,6 @@ def _legend(moments: list[AnnotatedFrame], near: float, far: float, width: int) 
 
 
 def _write(bar: Image, x: int, text: str, colour: Rgb) -> int:
-    """Write `text` at `x`; returns where it ends."""
+    """Write `text` at `x` and return its end."""
     put_text(bar, text, (x, bar.shape[0] // 2), 13, colour)
     return x + text_width(text, 13)

@@ -1,4 +1,4 @@
-"""Depth maps in colour: near is bright, far is dim, no reading is darker than both."""
+"""Depth maps as colour images: near is bright, far is dim, missing depth is darkest."""
 
 import cv2
 import numpy as np
@@ -8,27 +8,30 @@ from depthtrack.types import Depth, Image
 from depthtrack.viewing.theme import NO_READING
 
 NEAR_LIMIT = 0.1
-"""Metres; nearer readings are sensor artefacts and must not stretch a range."""
+"""Smallest valid depth, metres; nearer readings are sensor artefacts."""
 
 
 def depth_range(depth: Depth, percent: tuple[float, float] = (0.2, 98.0)) -> tuple[float, float]:
-    """Robust (near, far) in metres of the readings in depth maps of any shape.
+    """Return the robust range (near, far) of depth maps, metres.
 
-    Percentiles, so that specks do not count. Without any reading the range is (0.3, 1.5) m, where hands are tracked.
+    depth (...): metres.
+    percent: percentiles of near and far, which reject outliers.
+    The result is (0.3, 1.5) without any reading.
     """
     readings = depth[np.isfinite(depth) & (depth >= NEAR_LIMIT)]
     if readings.size == 0:
         return 0.3, 1.5
     near, far = (float(value) for value in np.percentile(readings, percent))
-    # A plane seen head-on still needs two ends to its scale.
+    # A fronto-parallel plane would have an empty range.
     return near, max(far, near + 0.05)
 
 
 def depth_to_rgb(depth: Depth, near: float, far: float) -> Image:
-    """Colours (h, w, 3) uint8 RGB of a depth map (h, w) in metres, `near` brightest, `far` dimmest.
+    """Convert a depth map to colours, linear in inverse depth.
 
-    Colours run linearly in 1/z, as disparity does: the hand, being near, gets most of them. Readings outside
-    [near, far] take the colour of the nearer end; 0 and non-finite values are NO_READING.
+    depth (h, w): metres; 0 and non-finite values become NO_READING.
+    near, far: ends of the scale, metres; depths outside are clipped.
+    Result (h, w, 3): RGB, uint8.
     """
     has_reading = np.isfinite(depth) & (depth > 0)
     z = np.clip(np.where(has_reading, depth, far), near, far)
@@ -37,16 +40,16 @@ def depth_to_rgb(depth: Depth, near: float, far: float) -> Image:
 
 
 def colour_scale(width: int, height: int) -> Image:
-    """The scale itself (height, width, 3) for a legend, near on the left."""
+    """Return the colour scale (height, width, 3) for a legend, near on the left."""
     return np.broadcast_to(_palette(np.linspace(1, 0, width)), (height, width, 3)).copy()
 
 
 def _palette(brightness: NDArray[np.floating]) -> Image:
-    """RGB (..., 3) of values (...) in [0, 1]; the darkest eighth of the colour map is left to 'no reading'."""
+    """Return RGB (..., 3) of values (...) in [0, 1], without the colour map's darkest eighth."""
     return _LOOKUP[np.rint(32 + 223 * brightness).astype(np.intp)]
 
 
-# Inferno (N. Smith and S. van der Walt, 2015): lightness rises evenly, also in grey and to colour-blind eyes.
+# Inferno (N. Smith and S. van der Walt, 2015): perceptually uniform, also in grey and with colour vision deficiency.
 _LOOKUP: Image = np.ascontiguousarray(
     cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_INFERNO)[:, 0, ::-1]
 )

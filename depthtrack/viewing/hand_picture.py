@@ -1,4 +1,4 @@
-"""A hand in a posture, shaded, its fingers in their colours."""
+"""Shaded pictures of a hand posture, one colour per finger."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,28 +14,32 @@ from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import SURFACE
 
 _DISTANCE = 1.0
-"""Metres to the hand: far enough that a picture shows little perspective."""
-_REACH = 0.22
-"""Metres that a picture spans, of a hand of scale 1."""
+"""Distance of the hand, metres; large for a weak perspective."""
+_SPAN = 0.22
+"""Side of the picture at the hand's distance for a hand of scale 1, metres."""
 _TURN = np.radians(-50)
-"""Away from the view into the palm, towards the thumb's side, from which flexion shows best."""
-_FINER = 3
-"""Rendered so many times larger, then averaged: smooth edges."""
+"""Rotation from the palmar view towards the thumb's side, which shows flexion best."""
+_SUPERSAMPLING = 3
+"""Rendering resolution relative to the picture, for smooth edges."""
 
 
 def hand_picture(skin: Skin, angles: ArrayLike, size: int) -> Image:
-    """Square RGB picture (size, size, 3) of the hand with these finger angles (20,), seen from the thumb's side."""
-    side = size * _FINER
-    focal = side * _DISTANCE / (_REACH * skin.shape.scale)
+    """Return a picture of the hand, seen from the thumb's side.
+
+    angles (20,): finger angles, radians.
+    Result (size, size, 3): RGB.
+    """
+    side = size * _SUPERSAMPLING
+    focal = side * _DISTANCE / (_SPAN * skin.shape.scale)
     camera = Camera(side, side, focal, focal, side / 2, side / 2)
     vertices = skin.at(make_pose([0, 0, _DISTANCE], _orientation(skin.shape.mirror), angles))
-    # The hand in the middle of the picture, wherever its fingers are.
+    # Centre the hand's bounding box in the picture.
     vertices[:, :2] -= (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2
     surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
     return smaller(draw_surface(blank(side, side, SURFACE), surface), size, size)
 
 
 def _orientation(mirror: float) -> Array:
-    """Quaternion of a palm with the fingers up, turned from facing the camera towards the thumb's side."""
+    """Return the palm's quaternion: fingers up, rotated towards the thumb's side."""
     facing = quaternion_exp([np.pi, 0, 0])
     return quaternion_product(quaternion_exp([0, _TURN * mirror, 0]), facing)

@@ -1,4 +1,4 @@
-"""Marks on an image: masks as a tint with a contour, hands as a coloured skeleton. All return new images."""
+"""Overlays on images: masks as a tint with a contour, hands as a coloured skeleton."""
 
 import cv2
 import numpy as np
@@ -27,14 +27,14 @@ FINGER_BONES: dict[str, tuple[Bone, ...]] = {
 """The three bones of each finger, from the palm outward, as pairs of keypoints."""
 
 BONE_BREADTH = 0.0018
-"""Metres; slim enough that neighbouring fingers stay apart."""
+"""Width of a bone, metres; narrow enough to separate neighbouring fingers."""
 
 _SUBPIXEL_BITS = 4
 _FARTHEST_PIXEL = 1 << 20
 
 
 def overlay_mask(image: Image, mask: Mask, colour: Rgb = TRUE_MASK, opacity: float = 0.4) -> Image:
-    """`image` (h, w, 3) tinted where `mask` (h, w) is set, with a solid contour just inside it."""
+    """Tint an image (h, w, 3) inside a mask (h, w) and draw the mask's inner contour."""
     out = image.copy()
     out[mask] = np.rint(image[mask] * (1 - opacity) + np.array(colour, dtype=np.float32) * opacity)
     out[_inner_contour(mask, width=_line_width(image))] = colour
@@ -42,12 +42,12 @@ def overlay_mask(image: Image, mask: Mask, colour: Rgb = TRUE_MASK, opacity: flo
 
 
 def spotlight(image: Image, mask: Mask, brightness: float = 0.25) -> Image:
-    """`image` (h, w, 3) as it is inside `mask` (h, w), grey and dimmed outside."""
+    """Dim an image (h, w, 3) outside a mask (h, w)."""
     return np.where(mask[..., None], image, dimmed(image, brightness))
 
 
 def dimmed(image: Image, brightness: float = 0.45) -> Image:
-    """`image` (h, w, 3) in darker, paler colours, as a ground for bright marks."""
+    """Darken and desaturate an image (h, w, 3), as a background for overlays."""
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)[..., None]
     return np.rint((0.35 * image + 0.65 * grey) * brightness).astype(np.uint8)
 
@@ -59,11 +59,15 @@ def draw_skeleton(
     thickness: int | None = None,
     colours: dict[str, Rgb] | None = None,
 ) -> Image:
-    """`image` with the 21 keypoints (21, 3), metres in the camera frame, as bones and joints, a colour per finger.
+    """Draw the skeleton of a hand, one colour per finger; nearer bones cover farther ones.
 
-    `camera` is the image's own (resized and cropped with it). Nearer bones cover farther ones. Keypoints that are
-    not finite or not in front of the camera are left out with their bones. `thickness` in pixels follows the hand's
-    distance unless given; `colours` by finger, and "palm", replace the theme's.
+    Bones with a keypoint that is not finite or behind the camera are omitted.
+
+    camera: the camera of the image, resized and cropped with it.
+    keypoints (21, 3): metres, camera frame.
+    thickness: pixels; None to scale with the hand's distance.
+    colours: by finger and "palm"; they replace the theme's.
+    Raises: ValueError if the keypoints have another shape.
     """
     points = np.asarray(keypoints, dtype=np.float64)
     if points.shape != (len(KEYPOINT_NAMES), 3):
@@ -71,23 +75,23 @@ def draw_skeleton(
     palette = {"palm": PALM, **FINGER_COLOURS, **(colours or {})}
     pixels = camera.project(points)
     out = np.ascontiguousarray(image).copy()
-    seen = np.isfinite(pixels.sum(axis=-1))
-    thickness = _bone_thickness(image, camera, points[seen, 2]) if thickness is None else thickness
-    for (a, b), part in _far_to_near(points, seen):
+    visible = np.isfinite(pixels.sum(axis=-1))
+    thickness = _bone_thickness(image, camera, points[visible, 2]) if thickness is None else thickness
+    for (a, b), part in _far_to_near(points, visible):
         _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
     return out
 
 
-def _far_to_near(points: Array, seen: Mask) -> list[tuple[Bone, str]]:
-    """Bones with both ends seen, and the part whose colour they take; the farthest first."""
+def _far_to_near(points: Array, visible: Mask) -> list[tuple[Bone, str]]:
+    """Return bones with both ends visible and the name of their colour, the farthest first."""
     bones = [(bone, "palm") for bone in PALM_BONES]
     bones += [(bone, finger) for finger, chain in FINGER_BONES.items() for bone in chain]
-    visible = [((a, b), part) for (a, b), part in bones if seen[a] and seen[b]]
-    return sorted(visible, key=lambda entry: -float(points[list(entry[0]), 2].sum()))
+    drawn = [((a, b), part) for (a, b), part in bones if visible[a] and visible[b]]
+    return sorted(drawn, key=lambda entry: -float(points[list(entry[0]), 2].sum()))
 
 
 def _draw_bone(image: Image, start: Array, end: Array, colour: Rgb, thickness: int) -> None:
-    """A line with a dark rim and a dot at both ends, in place."""
+    """Draw a line with a dark rim and dots at its ends, in place."""
     a, b = _fixed_point(start), _fixed_point(end)
     rim = max(1, thickness // 2)
     radius = round(0.9 * thickness * (1 << _SUBPIXEL_BITS))
@@ -99,25 +103,25 @@ def _draw_bone(image: Image, start: Array, end: Array, colour: Rgb, thickness: i
 
 
 def _fixed_point(pixel: Array) -> tuple[int, int]:
-    """OpenCV's fixed-point coordinates; far outside the image they are held back from overflowing."""
+    """Convert a pixel position to OpenCV's fixed point, clipped against overflow."""
     x, y = np.rint(np.clip(pixel, -_FARTHEST_PIXEL, _FARTHEST_PIXEL) * (1 << _SUBPIXEL_BITS)).astype(int)
     return int(x), int(y)
 
 
 def _inner_contour(mask: Mask, width: int) -> Mask:
-    """Pixels of `mask` within `width` of its edge; the image's border is no edge."""
+    """Return the pixels of a mask within `width` of its edge; the image's border is no edge."""
     element = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * width + 1, 2 * width + 1))
     inner = cv2.erode(mask.astype(np.uint8), element, borderType=cv2.BORDER_CONSTANT, borderValue=1)
     return mask & (inner == 0)
 
 
 def _bone_thickness(image: Image, camera: Camera, depths: Array) -> int:
-    """Pixels that BONE_BREADTH takes at the hand's distance, within what the image's size makes readable."""
+    """Return the projected BONE_BREADTH in pixels, within readable limits for the image's size."""
     thinnest = _line_width(image)
     apparent = BONE_BREADTH * camera.fx / float(np.median(depths)) if len(depths) else 0.0
     return round(min(max(apparent, thinnest), 3 * thinnest))
 
 
 def _line_width(image: Image) -> int:
-    """Pixels; a line that looks the same at any resolution."""
+    """Return a line width in pixels that is proportional to the image's height."""
     return max(1, round(image.shape[0] / 160))

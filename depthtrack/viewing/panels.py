@@ -1,4 +1,4 @@
-"""One composed picture of a moment: depth, colour, silhouette and skeleton side by side, in equal sizes."""
+"""Panels: depth, colour, silhouette and skeleton of a frame side by side, in equal sizes."""
 
 from collections.abc import Iterable
 from typing import Literal
@@ -8,93 +8,103 @@ import numpy as np
 
 from depthtrack.recording.sequence import Sequence
 from depthtrack.types import Image, Mask
-from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator, evenly_chosen, moments
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator, annotated_frames, evenly_spaced
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, SURFACE, TEXT, TRUE_MASK, Rgb
 
 Layer = Literal["colour", "depth", "mask", "hand", "skeleton", "overview"]
+"""Kinds of pictures of a frame; see `draw_layer`."""
 
 GAP = 6
 CAPTION_HEIGHT = 28
 
 
-def paint(moment: AnnotatedFrame, layer: Layer, height: int, near: float, far: float) -> Image:
-    """One view of a moment, `height` pixels high; depth colours run from `near` to `far` (metres).
+def draw_layer(annotated: AnnotatedFrame, layer: Layer, height: int, near: float, far: float) -> Image:
+    """Draw one layer of a frame, `height` pixels high.
 
-    "colour" falls back to depth where there is none. "mask" tints the silhouette, "hand" leaves only it lit,
-    "skeleton" draws the true keypoints on a dimmed image, "overview" draws silhouette and keypoints on one image.
-    Lines are drawn after scaling, so they are crisp at any size.
+    - "colour": the colour image, else depth.
+    - "mask": a tinted silhouette; "hand": the image dimmed outside the silhouette.
+    - "skeleton": keypoints on a dimmed image; "overview": silhouette and keypoints.
+
+    Lines are drawn after scaling, so they are sharp at any size.
+
+    near, far: ends of the depth colours, metres.
+    Result (h, w, 3): RGB.
     """
-    camera = moment.camera.resized(height / moment.camera.height)
-    depth, colour = moment.frame.depth, moment.frame.colour
+    camera = annotated.camera.resized(height / annotated.camera.height)
+    depth, colour = annotated.frame.depth, annotated.frame.colour
     if layer == "depth" or colour is None:
         image = _scaled(depth_to_rgb(depth, near, far), camera.width, camera.height)
     else:
         image = _scaled(colour, camera.width, camera.height)
-    mask = None if moment.mask is None else _scaled_mask(moment.mask, camera.width, camera.height)
+    mask = None if annotated.mask is None else _scaled_mask(annotated.mask, camera.width, camera.height)
     if layer == "hand" and mask is not None:
         image = spotlight(image, mask)
     if layer in ("mask", "hand", "overview") and mask is not None:
-        image = overlay_mask(image, mask, mask_colour(moment), _tint(moment, layer))
+        image = overlay_mask(image, mask, mask_colour(annotated), _tint(annotated, layer))
     if layer == "skeleton":
         image = dimmed(image)
-    if layer in ("skeleton", "overview") and moment.keypoints is not None:
-        image = draw_skeleton(image, camera, moment.keypoints)
+    if layer in ("skeleton", "overview") and annotated.keypoints is not None:
+        image = draw_skeleton(image, camera, annotated.keypoints)
     return image
 
 
-def panel(moment: AnnotatedFrame, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
-    """The layers of one moment under their names: a film's picture. Up to three stand side by side, more in two rows.
+def panel(annotated: AnnotatedFrame, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
+    """Draw layers of a frame with captions, for a video; more than three make two rows.
 
-    Each is `height` pixels high without its caption; the first tells the frame's number and time.
+    The first caption has the frame's number and time.
+
+    height: of each layer without its caption, pixels.
+    near, far: ends of the depth colours, metres.
+    Result (h, w, 3): RGB.
     """
     tiles: list[Image] = []
     for layer in layers:
-        name, remark, accent = _layer_caption(layer, moment)
+        name, remark, accent = _layer_caption(layer, annotated)
         if not tiles:
-            remark = f"frame {moment.frame.index}  ·  {moment.frame.timestamp:.2f} s"
-        tiles.append(captioned(paint(moment, layer, height, near, far), name, remark, accent))
+            remark = f"frame {annotated.frame.index}  ·  {annotated.frame.timestamp:.2f} s"
+        tiles.append(captioned(draw_layer(annotated, layer, height, near, far), name, remark, accent))
     return tile_grid(tiles, columns=len(tiles) if len(tiles) <= 3 else -(-len(tiles) // 2))
 
 
 def useful_layers(sequence: Sequence, estimate: MaskEstimator | None = None) -> tuple[Layer, ...]:
-    """The layers of `panel` that have something to show, judged from a few frames; the same for a whole recording."""
-    sample = list(moments(sequence, evenly_chosen(len(sequence), 5)))
+    """Return the layers of `panel` that a recording has, judged by a few of its frames."""
+    sample = list(annotated_frames(sequence, evenly_spaced(len(sequence), 5)))
     shown: dict[Layer, bool] = {
         "depth": True,
-        "colour": any(moment.frame.colour is not None for moment in sample),
-        "mask": estimate is not None or any(moment.mask is not None for moment in sample),
-        "skeleton": any(moment.keypoints is not None for moment in sample),
+        "colour": any(annotated.frame.colour is not None for annotated in sample),
+        "mask": estimate is not None or any(annotated.mask is not None for annotated in sample),
+        "skeleton": any(annotated.keypoints is not None for annotated in sample),
     }
     return tuple(layer for layer, useful in shown.items() if useful)
 
 
-def mask_colour(moment: AnnotatedFrame) -> Rgb:
-    """True and estimated silhouettes never look the same."""
-    return TRUE_MASK if moment.mask_is_true else ESTIMATED_MASK
+def mask_colour(annotated: AnnotatedFrame) -> Rgb:
+    """Return the colour of the silhouette, which differs for true and estimated ones."""
+    return TRUE_MASK if annotated.mask_is_true else ESTIMATED_MASK
 
 
 def beside(images: Iterable[Image], gap: int = GAP) -> Image:
-    """Images of one height in a row."""
+    """Join images of one height in a row."""
     return np.concatenate(_with_gaps(list(images), gap, axis=1), axis=1)
 
 
 def stacked(images: Iterable[Image], gap: int = GAP) -> Image:
-    """Images of one width in a column."""
+    """Join images of one width in a column."""
     return np.concatenate(_with_gaps(list(images), gap, axis=0), axis=0)
 
 
 def tile_grid(tiles: list[Image], columns: int, gap: int = GAP) -> Image:
-    """Tiles of one size in rows of `columns`, from left to right; the last row is filled up with background."""
+    """Arrange tiles of one size in rows of `columns`; background fills the last row."""
     height, width = tiles[0].shape[:2]
     filled = tiles + [blank(width, height)] * (-len(tiles) % columns)
     return stacked((beside(filled[i : i + columns], gap) for i in range(0, len(filled), columns)), gap)
 
 
 def captioned(image: Image, left: str, right: str = "", accent: Rgb = TEXT) -> Image:
-    """`image` under a bar with a name at the left and a remark at the right, where there is room for it."""
+    """Add a caption bar above an image: a name, and a remark at the right if it fits."""
     bar = blank(image.shape[1], CAPTION_HEIGHT, SURFACE)
     put_text(bar, left, (8, CAPTION_HEIGHT // 2), 14, accent)
     remark = bar.shape[1] - 8 - text_width(right, 13)
@@ -104,25 +114,25 @@ def captioned(image: Image, left: str, right: str = "", accent: Rgb = TEXT) -> I
 
 
 def blank(width: int, height: int, colour: Rgb = BACKGROUND) -> Image:
-    """A plain image (height, width, 3)."""
+    """Return an image (height, width, 3) of one colour."""
     return np.full((height, width, 3), colour, dtype=np.uint8)
 
 
-def _layer_caption(layer: Layer, moment: AnnotatedFrame) -> tuple[str, str, Rgb]:
+def _layer_caption(layer: Layer, annotated: AnnotatedFrame) -> tuple[str, str, Rgb]:
     if layer == "mask":
-        if moment.mask is None:
+        if annotated.mask is None:
             return "hand", "none found", FAINT_TEXT
-        return ("hand, true mask" if moment.mask_is_true else "hand, estimated mask"), "", mask_colour(moment)
+        return ("hand, true mask" if annotated.mask_is_true else "hand, estimated mask"), "", mask_colour(annotated)
     if layer == "skeleton":
-        return "true skeleton", "" if moment.keypoints is not None else "not annotated", TEXT
+        return "true skeleton", "" if annotated.keypoints is not None else "not annotated", TEXT
     return layer, "", TEXT
 
 
-def _tint(moment: AnnotatedFrame, layer: Layer) -> float:
-    """Opacity of the silhouette: a contour alone around a lit hand, and little colour under a skeleton."""
+def _tint(annotated: AnnotatedFrame, layer: Layer) -> float:
+    """Return the silhouette's opacity: 0 around a bright hand, low under a skeleton."""
     if layer == "hand":
         return 0.0
-    return 0.15 if layer == "overview" and moment.keypoints is not None else 0.4
+    return 0.15 if layer == "overview" and annotated.keypoints is not None else 0.4
 
 
 def _with_gaps(images: list[Image], gap: int, axis: int) -> list[Image]:
@@ -137,7 +147,7 @@ def _with_gaps(images: list[Image], gap: int, axis: int) -> list[Image]:
 
 
 def smaller(image: Image, width: int, height: int) -> Image:
-    """`image` shrunk by averaging, which smooths lines that were drawn large."""
+    """Downscale an image by area averaging, which antialiases lines."""
     return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
 
 

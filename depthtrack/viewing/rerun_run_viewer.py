@@ -1,4 +1,4 @@
-"""The interactive viewer of a run: hypothesis, residual and skeleton on the recording's time line, and its energies."""
+"""The interactive viewer of a run: hypothesis, residual, skeleton and energy on a time line."""
 
 import importlib
 from typing import Any
@@ -11,9 +11,9 @@ from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.viewing.annotated_frame import true_keypoints
 from depthtrack.viewing.rerun_stream import CAMERA
-from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, MomentStream, bones, jpeg
+from depthtrack.viewing.rerun_viewer import FLAT_IMAGES, AnnotatedFrameStream, bones, jpeg
 from depthtrack.viewing.residual_colours import residual_to_rgb
-from depthtrack.viewing.run_pictures import hand_range, run_moment
+from depthtrack.viewing.run_pictures import annotated_run_frame, hand_depth_range
 from depthtrack.viewing.shading import BODY_COLOURS, draw_surface
 from depthtrack.viewing.theme import FINGER_TRUTH, STATUS_COLOURS
 
@@ -22,16 +22,19 @@ _HAND_IMAGES = ("hypothesis", "residual", "true_skeleton")
 _SERIES = {"energy": (167, 110, 230), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
 
 
-class RerunRunViewer(MomentStream[ReplayedFrame]):
-    """Shows a run as it is replayed.
+class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
+    """Viewer of a replayed run.
 
-    Beside what recordings show: `world/hypothesis`, the tracked hand's visible surface (metres, camera frame);
-    `world/camera/hypothesis` and `/residual` in pixels; `world/true_skeleton` where the recording knows it; and
-    `run/energy`, `run/confidence`, `run/error_mm` and `run/status` over time.
+    Entities, in addition to those of recordings:
+
+    - `world/hypothesis`: the tracked hand's visible surface, metres, camera frame.
+    - `world/camera/hypothesis` and `world/camera/residual`: images.
+    - `world/true_skeleton`: true keypoints, if known.
+    - `run/energy`, `run/confidence`, `run/error_mm` and `run/status`: values over time.
     """
 
     def __init__(self, replay: Replay) -> None:
-        near, far = hand_range(replay)
+        near, far = hand_depth_range(replay)
         super().__init__(
             f"{replay.run.folder.resolve().name} on {replay.sequence.name}", replay.sequence.camera, near, far
         )
@@ -42,12 +45,12 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
     def log(self, item: ReplayedFrame) -> None:
         """See `RerunStream`."""
         rr, stream, estimate, frame = self._rr, self._stream, item.estimate, item.frame
-        moment = run_moment(item, self._surface.model)
-        self.log_moment(moment)
+        annotated = annotated_run_frame(item, self._surface.model)
+        self.log_annotated(annotated)
         surface = None if estimate.pose is None else self._surface.render(estimate.pose, frame.camera)
         self._log_or_clear(f"{CAMERA}/hypothesis", None if surface is None else _picture(rr, surface))
         rendered = np.zeros(frame.camera.shape) if surface is None else surface.depth
-        stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, moment.mask), -7))
+        stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, annotated.mask), -7))
         self._log_or_clear("world/hypothesis", None if surface is None else self._points(surface))
         truth = true_keypoints(self._truth, frame.timestamp)
         in_pixels = None if truth is None else frame.camera.project(truth)
@@ -66,7 +69,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
         stream.log("run/status", rr.TextLog(f"frame {item.frame.index}: {status}", color=STATUS_COLOURS[status]))
 
     def _points(self, surface: RenderedSurface) -> Any:
-        """The visible surface in the colours of its fingers, a point for every second pixel."""
+        """Return every second pixel of the visible surface as points in the fingers' colours."""
         depth, label = surface.depth[::2, ::2], surface.label[::2, ::2]
         v, u = np.nonzero(label >= 0)
         points = self._camera.unproject(2 * np.stack([u, v], axis=-1), depth[v, u])
@@ -95,7 +98,7 @@ class RerunRunViewer(MomentStream[ReplayedFrame]):
 
 
 def _picture(rr: Any, surface: RenderedSurface) -> Any:
-    """The hypothesis as a picture, clear where there is no hand."""
+    """Return the hypothesis as an image that is transparent outside the hand."""
     image = draw_surface(np.zeros((*surface.depth.shape, 3), dtype=np.uint8), surface)
     alpha = np.where(surface.label >= 0, _OPACITY, 0).astype(np.uint8)
     _, data = cv2.imencode(".png", np.dstack([image[..., ::-1], alpha]), [cv2.IMWRITE_PNG_COMPRESSION, 3])

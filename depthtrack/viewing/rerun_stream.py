@@ -1,4 +1,7 @@
-"""Where the interactive viewer's data go: its window, a browser, or a file. Needs the extra `view` (rerun-sdk)."""
+"""Output of the interactive viewer: a window, a browser or a file.
+
+It needs the extra `view` (rerun-sdk).
+"""
 
 import importlib
 import shutil
@@ -21,10 +24,12 @@ Item = TypeVar("Item")
 
 
 class RerunStream(ABC, Generic[Item]):
-    """Sends items, whatever a subclass shows, to rerun. Raises MissingExtraError without it.
+    """A stream of items to rerun; subclasses define the items.
 
-    Choose one destination, `open_window`, `serve` or `save`, before the first `log`. `near` and `far` (metres) are the
-    ends of the depth colours.
+    Call `open_window`, `serve` or `save` before the first `log`.
+
+    near, far: ends of the depth colours, metres.
+    Raises: MissingExtraError if rerun is not installed.
     """
 
     def __init__(self, name: str, camera: Camera, near: float, far: float) -> None:
@@ -36,15 +41,18 @@ class RerunStream(ABC, Generic[Item]):
 
     @abstractmethod
     def log(self, item: Item) -> None:
-        """Show an item at its time; what it does not know is cleared, so that nothing old stays on the screen."""
+        """Send an item at its time; entities without a value are cleared."""
 
     @abstractmethod
     def _layout(self) -> Any:
-        """The blueprint of the viewer's panels."""
+        """Return the blueprint of the viewer's panels."""
 
     def open_window(self) -> None:
-        """Start rerun's own window, which goes on after this program ends. Raises InputError where it cannot start."""
-        # The program beside this Python, which is on no PATH unless the virtual environment is activated.
+        """Start rerun's window, which outlives this program.
+
+        Raises: InputError if it cannot start.
+        """
+        # The executable of this environment, which is not on PATH without activation.
         program = shutil.which("rerun", path=sysconfig.get_path("scripts"))
         try:
             self._rr.spawn(executable_path=program, recording=self._stream, default_blueprint=self._layout())
@@ -56,9 +64,11 @@ class RerunStream(ABC, Generic[Item]):
         self._log_static()
 
     def serve(self, open_browser: bool = True) -> str:
-        """Serve the viewer to browsers while this process lives; returns its address.
+        """Serve the viewer to browsers until this process ends, and return its address.
 
-        Rerun listens on every network interface: whoever reaches this machine's ports can look on.
+        Rerun listens on every network interface, so every host with access to this machine's ports can connect.
+
+        Raises: InputError if no network port is free.
         """
         port = _free_port(9090)
         source = self._stream.serve_grpc(grpc_port=_free_port(9876), default_blueprint=self._layout())
@@ -67,7 +77,7 @@ class RerunStream(ABC, Generic[Item]):
         return f"http://localhost:{port}/?url={source}"
 
     def close(self) -> None:
-        """Wait until everything has been sent."""
+        """Flush and close the stream."""
         self._stream.flush()
         self._stream.disconnect()
 
@@ -111,9 +121,12 @@ class RerunStream(ABC, Generic[Item]):
         self._stream.log(entity, self._rr.Clear(recursive=False) if content is None else content)
 
 
-def _free_port(usual: int) -> int:
-    """The usual port, or any free one where it is taken: rerun only logs that it could not listen."""
-    for port in (usual, 0):
+def _free_port(default: int) -> int:
+    """Return the default port, or any free one if it is in use.
+
+    Rerun itself only logs a failure.
+    """
+    for port in (default, 0):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:

@@ -1,4 +1,4 @@
-"""What a hypothesis does not explain, in colour: where the sensor saw something nearer, farther, or no hand at all."""
+"""Depth residuals as colours: observed depth nearer or farther than the hypothesis."""
 
 import cv2
 import numpy as np
@@ -8,25 +8,28 @@ from depthtrack.types import Depth, Image, Mask
 from depthtrack.viewing.theme import ESTIMATED_MASK, NO_READING
 
 LARGEST = 0.02
-"""Metres at the ends of the scale."""
+"""Residual at the ends of the scale, metres."""
 UNREAD = (71, 80, 94)
-"""The hypothesis where the sensor has no reading."""
-UNEXPLAINED = ESTIMATED_MASK
-"""An observed hand where the hypothesis has none."""
+"""Colour of hypothesis pixels without an observed depth."""
+UNCOVERED = ESTIMATED_MASK
+"""Colour of observed hand pixels that the hypothesis does not cover."""
 
 
 def residual_to_rgb(
     measured: NDArray[np.floating], rendered: NDArray[np.floating], observed: Mask | None = None
 ) -> Image:
-    """Colours (h, w, 3) of the difference of two depth maps (h, w), metres, 0 = none, where there is a hypothesis.
+    """Return the colours of depth residuals.
 
-    White where they agree, red where the sensor saw something nearer than the hypothesis, blue where farther.
-    `observed` (h, w) is the silhouette of the hand as it was seen.
+    White is 0, red an observed depth nearer than the hypothesis, blue farther.
+
+    measured (h, w), rendered (h, w): metres; 0 without depth.
+    observed (h, w): observed silhouette.
+    Result (h, w, 3): RGB.
     """
     out = np.empty((*measured.shape, 3), dtype=np.uint8)
     out[:] = NO_READING
     if observed is not None:
-        out[observed] = UNEXPLAINED
+        out[observed] = UNCOVERED
     hypothesis = rendered > 0
     out[hypothesis] = UNREAD
     both = hypothesis & (measured > 0)
@@ -35,20 +38,20 @@ def residual_to_rgb(
 
 
 def residual_scale(width: int, height: int) -> Image:
-    """The scale itself (height, width, 3), from nearer on the left to farther."""
+    """Return the colour scale (height, width, 3) for a legend, nearer on the left."""
     return np.broadcast_to(_palette(np.linspace(-LARGEST, LARGEST, width)), (height, width, 3)).copy()
 
 
 def _palette(difference: NDArray[np.floating]) -> Image:
-    """RGB (..., 3) of differences (...) in metres."""
+    """Return RGB (..., 3) of residuals (...), metres."""
     position = np.clip(difference / LARGEST, -1, 1)[..., None]
-    # Two straight lines through white: evenly bright on both sides, and red and blue to most colour-blind eyes.
+    # A diverging scale through white; red and blue are distinct with colour vision deficiency.
     towards = np.where(position < 0, np.array([215, 48, 39]), np.array([49, 101, 200]))
     return np.rint(255 + (towards - 255) * np.sqrt(np.abs(position))).astype(np.uint8)
 
 
 def enlarged(depth: NDArray[np.floating], width: int, height: int) -> Depth:
-    """A depth map at another size, its readings picked, never averaged."""
+    """Resize a depth map by nearest neighbour, without averaging depths."""
     return cv2.resize(depth.astype(np.float32), (width, height), interpolation=cv2.INTER_NEAREST_EXACT).astype(
         np.float32, copy=False
     )

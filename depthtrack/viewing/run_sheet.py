@@ -1,4 +1,4 @@
-"""A page of a run: moments with the tracked hand over the recording, and what it does not explain."""
+"""Contact sheets of runs: frames with the tracked hand over the recording, and residuals."""
 
 from collections.abc import Collection
 
@@ -9,7 +9,7 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.types import Image
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked, tile_grid
-from depthtrack.viewing.residual_colours import LARGEST, UNEXPLAINED, UNREAD, residual_scale
+from depthtrack.viewing.residual_colours import LARGEST, UNCOVERED, UNREAD, residual_scale
 from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, STATUS_COLOURS
@@ -17,20 +17,25 @@ from depthtrack.viewing.timeline import Timeline
 
 
 def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns: int = 3) -> Image:
-    """An RGB page (h, w, 3) of the frames in these `rows` of the run; `height` pixels of a view.
+    """Return a page of a run's frames.
 
-    Raises InputError when none of them can be read any more.
+    rows: rows of the run.
+    height: of a view, pixels.
+    Result (h, w, 3): RGB.
+    Raises: InputError if none of the frames can be read.
     """
     painter, tiles = RunPainter(replay, 2 * height), []
     last = max(rows, default=-1)
-    for seen in replay:
-        if seen.row in rows:
-            views = [painter.view(seen, layer) for layer in ("overlay", "residual")]
+    for replayed in replay:
+        if replayed.row in rows:
+            views = [painter.view(replayed, layer) for layer in ("overlay", "residual")]
             small = [smaller(view, view.shape[1] // 2, height) for view in views]
-            status = seen.estimate.status
-            told = f"{seen.frame.timestamp:.2f} s  ·  {status}"
-            tiles.append(captioned(beside(small, gap=0), f"frame {seen.frame.index}", told, STATUS_COLOURS[status]))
-        if seen.row >= last:
+            status = replayed.estimate.status
+            remark = f"{replayed.frame.timestamp:.2f} s  ·  {status}"
+            tiles.append(
+                captioned(beside(small, gap=0), f"frame {replayed.frame.index}", remark, STATUS_COLOURS[status])
+            )
+        if replayed.row >= last:
             break
     if not tiles:
         raise InputError(f"the run {replay.run.folder} holds no frame to show")
@@ -40,22 +45,22 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
 
 
 def _legend(width: int) -> Image:
-    """What the residual's colours mean, left to right as far as there is room."""
-    bar, reach, x = blank(width, 22), f"{1000 * LARGEST:.0f} mm", 0
+    """Return the legend of the residual's colours, cut at the page's width."""
+    bar, limit, x = blank(width, 22), f"{1000 * LARGEST:.0f} mm", 0
     scale = residual_scale(120, 10)
-    for mark, told in (
-        (None, f"seen {reach} nearer"),
-        (scale, f"{reach} farther"),
-        (np.full((10, 10, 3), UNEXPLAINED, dtype=np.uint8), "hand unexplained"),
+    for mark, text in (
+        (None, f"{limit} nearer"),
+        (scale, f"{limit} farther"),
+        (np.full((10, 10, 3), UNCOVERED, dtype=np.uint8), "hand not covered"),
         (np.full((10, 10, 3), UNREAD, dtype=np.uint8), "no reading"),
     ):
         start = x if mark is None else x + mark.shape[1] + 8
-        if start + text_width(told, 14) > width:
+        if start + text_width(text, 14) > width:
             break
         if mark is not None:
             bar[6:16, x : x + mark.shape[1]] = mark
-        put_text(bar, told, (start, 11), 14, FAINT_TEXT)
-        x = start + text_width(told, 14) + (8 if mark is None else 24)
+        put_text(bar, text, (start, 11), 14, FAINT_TEXT)
+        x = start + text_width(text, 14) + (8 if mark is None else 24)
     return bar
 
 
@@ -64,8 +69,8 @@ def _title(replay: Replay, width: int) -> Image:
     name = f"{run.folder.resolve().name[:40]}: {str(run.configuration.get('tracker', 'track'))[:20]}"
     put_text(bar, name, (0, 17), 24)
     lost = sum(not status.is_trusted for status in run.status)
-    told = f"{len(run.index)} frames of {replay.sequence.name[:40]}  ·  {lost} without a trusted pose"
+    subtitle = f"{len(run.index)} frames of {replay.sequence.name[:40]}  ·  {lost} without a trusted pose"
     start = text_width(name, 24) + 18
-    if start + text_width(told, 14) <= width:
-        put_text(bar, told, (start, 19), 14, FAINT_TEXT)
+    if start + text_width(subtitle, 14) <= width:
+        put_text(bar, subtitle, (start, 19), 14, FAINT_TEXT)
     return bar

@@ -1,4 +1,4 @@
-"""A rendered hand in the colours of its fingers, lit from the upper left."""
+"""Shading of a rendered hand: one colour per finger, light from the upper left."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from depthtrack.viewing.theme import FINGER_COLOURS, PALM
 _LIGHT = np.array([-0.35, -0.5, -0.8]) / np.linalg.norm([-0.35, -0.5, -0.8])
 _AMBIENT = 0.3
 BODY_COLOURS = np.array([PALM, *(FINGER_COLOURS[finger] for finger in FINGERS for _ in range(3))], dtype=np.uint8)
-"""(16, 3) RGB of the bodies."""
+"""RGB colours (16, 3) of the bodies."""
 
 
 def draw_surface(image: Image, surface: RenderedSurface, opacity: float = 1.0) -> Image:
-    """`image` (h, w, 3) with the hand of `surface` (h, w), labelled by body, over it."""
+    """Draw a rendered hand, labelled by body, over an image (h, w, 3)."""
     hit = surface.label >= 0
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(surface.normal[hit] @ _LIGHT, 0)
     out = image.copy()

@@ -1,4 +1,4 @@
-"""A wide banner: a few moments of a recording, each seen in colour, as depth, segmented and as a skeleton."""
+"""Picture strips: a few frames of a recording as colour, depth, segmentation and skeleton."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,7 +9,7 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Image
 from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import depth_range
-from depthtrack.viewing.panels import Layer, beside, blank, mask_colour, paint, smaller, stacked
+from depthtrack.viewing.panels import Layer, beside, blank, draw_layer, mask_colour, smaller, stacked
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, Rgb
 
@@ -17,74 +17,77 @@ ROWS: tuple[Layer, ...] = ("colour", "depth", "hand", "skeleton")
 LABEL_WIDTH = 30
 GAP = 4
 SMALLEST_SIDE = 32
-"""Pixels of a picture in which a hand can still be made out."""
+"""Smallest side of a picture, pixels."""
 
 
-def strip(moments: Iterable[AnnotatedFrame], width: int = 1600) -> Image:
-    """A banner (h, w, 3) of `width` pixels: a column a moment, a row a view, close on the hand.
+def strip(frames: Iterable[AnnotatedFrame], width: int = 1600) -> Image:
+    """Return a strip of close-ups: one column per frame, one row per layer.
 
-    Every moment is seen in a region of the same size, so that sizes compare. Rows with nothing to show are
-    left out. Raises InputError without any moment to show, or with more than there is room for.
+    All regions have one size, so that hand sizes are comparable. Rows without data are omitted.
+
+    width: of the strip, pixels.
+    Result (h, w, 3): RGB.
+    Raises: InputError if there are no frames, or more than fit.
     """
-    moments = list(moments)
-    if not moments:
-        raise InputError("a picture strip needs at least one readable frame")
-    close = _close_on_the_hand(moments)
-    near, far = _range_of_the_hand(close)
+    frames = list(frames)
+    if not frames:
+        raise InputError("a picture strip needs at least one readable frame, found none")
+    close = _close_on_the_hand(frames)
+    near, far = _hand_depth_range(close)
     side = (width - LABEL_WIDTH) // len(close) - GAP
     if side < SMALLEST_SIDE:
         most = (width - LABEL_WIDTH) // (SMALLEST_SIDE + GAP)
-        raise InputError(f"a picture strip has room for {most} moments, found {len(close)}: choose fewer")
+        raise InputError(f"a picture strip has room for {most} frames, found {len(close)}: choose fewer")
     rows = []
     for layer in (layer for layer in ROWS if _has(close, layer)):
-        pictures = [smaller(paint(moment, layer, 2 * side, near, far), side, side) for moment in close]
+        pictures = [smaller(draw_layer(annotated, layer, 2 * side, near, far), side, side) for annotated in close]
         rows.append(beside([_label(*_name(close, layer), side), *pictures], GAP))
     return stacked(rows, GAP)
 
 
-def _has(moments: Sequence[AnnotatedFrame], layer: Layer) -> bool:
+def _has(frames: Sequence[AnnotatedFrame], layer: Layer) -> bool:
     match layer:
         case "colour":
-            return any(moment.frame.colour is not None for moment in moments)
+            return any(annotated.frame.colour is not None for annotated in frames)
         case "hand":
-            return any(moment.mask is not None for moment in moments)
+            return any(annotated.mask is not None for annotated in frames)
         case "skeleton":
-            return any(moment.keypoints is not None for moment in moments)
+            return any(annotated.keypoints is not None for annotated in frames)
     return True
 
 
-def _close_on_the_hand(moments: Sequence[AnnotatedFrame]) -> list[AnnotatedFrame]:
-    """Square regions of one size around the hand, or around the image's middle where no hand is known."""
-    boxes = [moment.hand_box() for moment in moments]
+def _close_on_the_hand(frames: Sequence[AnnotatedFrame]) -> list[AnnotatedFrame]:
+    """Crop square regions of one size around the hand, or the image's centre if it is unknown."""
+    boxes = [annotated.hand_box() for annotated in frames]
     extents = [max(box.shape) for box in boxes if box is not None]
-    smallest = min(moments[0].camera.shape)
+    smallest = min(frames[0].camera.shape)
     side = min(round(1.2 * max(extents)), smallest) if extents else smallest
     out = []
-    for moment, box in zip(moments, boxes, strict=True):
-        left, top, right, bottom = box or moment.camera.rect
-        out.append(moment.cropped(Rect.of_size((left + right - side) // 2, (top + bottom - side) // 2, side, side)))
+    for annotated, box in zip(frames, boxes, strict=True):
+        left, top, right, bottom = box or annotated.camera.rect
+        out.append(annotated.cropped(Rect.of_size((left + right - side) // 2, (top + bottom - side) // 2, side, side)))
     return out
 
 
-def _range_of_the_hand(moments: Sequence[AnnotatedFrame]) -> tuple[float, float]:
-    """Near and far (metres) that give the hand most of the colours; of everything where no silhouette is known."""
-    hands = [moment.frame.depth[moment.mask] for moment in moments if moment.mask is not None]
+def _hand_depth_range(frames: Sequence[AnnotatedFrame]) -> tuple[float, float]:
+    """Return near and far (metres) of the hand, or of the frames without silhouettes."""
+    hands = [annotated.frame.depth[annotated.mask] for annotated in frames if annotated.mask is not None]
     if not hands:
-        return depth_range(np.stack([moment.frame.depth for moment in moments]))
+        return depth_range(np.stack([annotated.frame.depth for annotated in frames]))
     near, far = depth_range(np.concatenate(hands))
     return near, far + 0.25 * (far - near)
 
 
-def _name(moments: Sequence[AnnotatedFrame], layer: Layer) -> tuple[str, Rgb]:
-    """What a row is called, and in which colour."""
+def _name(frames: Sequence[AnnotatedFrame], layer: Layer) -> tuple[str, Rgb]:
+    """Return the name of a row and its colour."""
     if layer != "hand":
         return layer, FAINT_TEXT
-    masked = [moment for moment in moments if moment.mask is not None]
+    masked = [annotated for annotated in frames if annotated.mask is not None]
     return ("hand" if masked[0].mask_is_true else "hand, estimated"), mask_colour(masked[0])
 
 
 def _label(name: str, colour: Rgb, height: int) -> Image:
-    """The name of a row, written upwards."""
+    """Return the name of a row as vertical text."""
     bar = blank(height, LABEL_WIDTH)
     put_text(bar, name, ((height - text_width(name, 16)) // 2, LABEL_WIDTH // 2), 16, colour)
     return np.ascontiguousarray(np.rot90(bar))

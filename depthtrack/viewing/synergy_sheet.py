@@ -1,4 +1,4 @@
-"""What each of the first synergies does to the hand, on one page (as Fig. 6 of Schroeder et al. 2014)."""
+"""Pages of hand synergies (as Fig. 6 of Schroeder et al. 2014)."""
 
 import numpy as np
 
@@ -18,9 +18,10 @@ _LABEL_WIDTH = 170
 
 
 def synergy_sheet(synergies: Synergies, skin: Skin, count: int = 4, size: int = 260) -> Image:
-    """A page (h, w, 3) with a row for each of the first `count` components: the hand from -2 to +2 deviations.
+    """Return a page (h, w, 3) with one row for each of the first `count` components.
 
-    No further than the recorded postures went along that component, and within the joint limits.
+    A row shows the hand from -2 to +2 standard deviations, within the recorded range of the component and the joint
+    limits.
     """
     rows = [_row(synergies, skin, k, size) for k in range(min(count, len(synergies)))]
     return framed(stacked([_title(synergies, rows[0].shape[1]), *rows], gap=10))
@@ -34,15 +35,15 @@ def _row(synergies: Synergies, skin: Skin, k: int, size: int) -> Image:
         coefficients = np.zeros(len(synergies))
         coefficients[k] = coefficient
         picture = hand_picture(skin, np.clip(synergies.angles(coefficients), LOWER, UPPER), size)
-        reached = coefficient / deviation if deviation > 0 else 0.0
-        name = "mean" if step == 0 else f"{reached:+.1f} sd"
-        tiles.append(captioned(picture, name, "" if abs(reached - step) < 1e-6 else "no further recorded"))
+        actual = coefficient / deviation if deviation > 0 else 0.0
+        name = "mean" if step == 0 else f"{actual:+.1f} sd"
+        tiles.append(captioned(picture, name, "" if abs(actual - step) < 1e-6 else "end of recorded range"))
     label = blank(_LABEL_WIDTH, tiles[0].shape[0])
     middle = label.shape[0] // 2
     put_text(label, f"component {k + 1}", (8, middle - 34), 20, TEXT)
     share = synergies.variance_share(k + 1) - synergies.variance_share(k)
     put_text(label, f"{share:.1%} of the variance", (8, middle), 14, FAINT_TEXT)
-    put_text(label, f"{synergies.variance_share(k + 1):.1%} so far", (8, middle + 24), 14, FAINT_TEXT)
+    put_text(label, f"{synergies.variance_share(k + 1):.1%} cumulative", (8, middle + 24), 14, FAINT_TEXT)
     return beside([label, *tiles])
 
 

@@ -1,4 +1,4 @@
-"""Smooth text on images."""
+"""Antialiased text on images."""
 
 from functools import lru_cache
 from math import ceil
@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from depthtrack.viewing.theme import TEXT, Rgb
 
 _BLANK = 0.3
-"""Width between words, of the text's size."""
+"""Space between words, relative to the text's size."""
 
 
 def put_text(
@@ -20,9 +20,10 @@ def put_text(
     size: int = 14,
     colour: Rgb = TEXT,
 ) -> None:
-    """Write `text` into `image` (h, w, 3), in place: `position` is the left end of its centre line, `size` in pixels.
+    """Draw text into an image (h, w, 3), in place; text outside the image is clipped.
 
-    Text that reaches outside the image is cut.
+    position: x and y of the left end of the text's centre line, pixels.
+    size: pixels.
     """
     coverage = _coverage(text, size)
     height, width = coverage.shape
@@ -32,20 +33,20 @@ def put_text(
     if x0 >= x1 or y0 >= y1:
         return
     alpha = coverage[y0 - top : y1 - top, x0 - left : x1 - left, None].astype(np.float32) / 255
-    window = image[y0:y1, x0:x1]
-    window[:] = np.rint(window * (1 - alpha) + np.array(colour, dtype=np.float32) * alpha)
+    region = image[y0:y1, x0:x1]
+    region[:] = np.rint(region * (1 - alpha) + np.array(colour, dtype=np.float32) * alpha)
 
 
 def text_width(text: str, size: int = 14) -> int:
-    """Width in pixels of `text` as `put_text` writes it."""
+    """Return the width of a text drawn by `put_text`, pixels."""
     return _coverage(text, size).shape[1]
 
 
 @lru_cache(maxsize=512)
 def _coverage(text: str, size: int) -> NDArray[np.uint8]:
-    """How much of each pixel (h, w) the text covers, 0 to 255; h depends on `size` alone."""
+    """Return the coverage of each pixel by a text (h, w), 0 to 255; h depends only on `size`."""
     font = ImageFont.load_default(size)
-    # The font's own blank is so thin that words run into one another.
+    # The font's own space is too narrow to separate words.
     words, blank = text.split(" "), ceil(_BLANK * size)
     lengths = [font.getlength(word) for word in words]
     width = max(1, round(sum(lengths)) + blank * (len(words) - 1) + 1)

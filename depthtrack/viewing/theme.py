@@ -1,4 +1,4 @@
-"""The look of every picture: colours as RGB, chosen to read on a dark ground and to be told apart by most eyes."""
+"""RGB colours of all pictures, for a dark background and colour vision deficiency."""
 
 from depthtrack.recording.status import Status
 
@@ -10,11 +10,11 @@ TEXT: Rgb = (230, 237, 243)
 FAINT_TEXT: Rgb = (139, 148, 158)
 
 NO_READING: Rgb = (7, 9, 13)
-"""Depth pixels without a reading: darker than any depth."""
+"""Depth pixels without a reading; darker than any depth."""
 
 TRUE_MASK: Rgb = (34, 211, 238)
 ESTIMATED_MASK: Rgb = (240, 80, 230)
-"""Neither is a colour of skin, of the depth scale's near end, or of the other."""
+"""Both differ from each other, from skin and from the depth scale's near end."""
 
 PALM: Rgb = (226, 232, 240)
 FINGER_COLOURS: dict[str, Rgb] = {
@@ -25,9 +25,9 @@ FINGER_COLOURS: dict[str, Rgb] = {
     "little": (192, 132, 252),
 }
 FINGER_TRUTH: dict[str, Rgb] = dict.fromkeys(("palm", *FINGER_COLOURS), TRUE_MASK)
-"""A true skeleton beside a tracked one."""
+"""Colours of a true skeleton beside a tracked one."""
 OUTLINE: Rgb = (10, 12, 18)
-"""Dark rim around lines and joints, so that they show on bright images too."""
+"""Rim around lines and joints, for contrast on bright images."""
 
 STATUS_COLOURS: dict[Status, Rgb] = {
     Status.TRACKED: (74, 222, 128),
@@ -35,4 +35,4 @@ STATUS_COLOURS: dict[Status, Rgb] = {
     Status.LOST: (251, 113, 133),
     Status.ABSENT: FAINT_TEXT,
 }
-"""What became of a frame of a run."""
+"""Colours of the status of a run's frame."""

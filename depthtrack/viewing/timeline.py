@@ -1,4 +1,4 @@
-"""A run at a glance: its energy over time, where it was lost, and where we are."""
+"""Timeline of a run: energy over time, lost frames and a cursor."""
 
 import cv2
 import numpy as np
@@ -15,14 +15,22 @@ _SUBPIXEL_BITS = 4
 
 
 class Timeline:
-    """`image` (HEIGHT, width, 3), drawn once, is what all frames of a run share; `at` adds the cursor."""
+    """The timeline of a run.
+
+    image (HEIGHT, width, 3): without a cursor; drawn once for all frames.
+    """
 
     def __init__(self, energy: Array, status: tuple[Status, ...], width: int) -> None:
-        """`energy` (T,), NaN where there is none, and `status` (T,) of a run."""
+        """Draw the timeline.
+
+        energy (T,): NaN without an energy.
+        status (T,): of each frame.
+        width: pixels.
+        """
         self._width, self._count = width, len(energy)
         self.image = blank(width, HEIGHT, SURFACE)
         known = energy[np.isfinite(energy)]
-        # A lost frame's energy must not flatten all others.
+        # The percentile keeps the energy of lost frames from compressing the scale.
         self._top = float(max(1.2 * np.percentile(known, 98), 1e-6)) if len(known) else 1.0
         for row, found in enumerate(status):
             if not found.is_trusted:
@@ -32,8 +40,8 @@ class Timeline:
         self._draw_curve(energy)
         put_text(self.image, f"energy, 0 to {self._top:.3g}", (8, _TOP // 2), 13, FAINT_TEXT)
 
-    def at(self, row: int, note: str = "") -> Image:
-        """The picture (HEIGHT, width, 3) with a cursor at one frame and a note beside the title."""
+    def with_cursor(self, row: int, note: str = "") -> Image:
+        """Return the timeline (HEIGHT, width, 3) with a cursor and a note beside the title."""
         image = self.image.copy()
         x = self._x(row)
         image[_TOP:, max(x - 1, 0) : x + 1] = TEXT
@@ -49,9 +57,9 @@ class Timeline:
         x = (np.arange(self._count) + 0.5) / max(self._count, 1) * (self._width - 1)
         points = np.stack([x, y], axis=-1)
         finite = np.isfinite(y)
-        # Each stretch without a gap is a line of its own.
-        for stretch in np.split(np.arange(self._count), np.flatnonzero(np.diff(finite)) + 1):
-            if len(stretch) and finite[stretch[0]]:
-                fixed = np.rint(points[stretch] * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        # Each interval without a gap is one polyline.
+        for interval in np.split(np.arange(self._count), np.flatnonzero(np.diff(finite)) + 1):
+            if len(interval) and finite[interval[0]]:
+                fixed = np.rint(points[interval] * (1 << _SUBPIXEL_BITS)).astype(np.int32)
                 cv2.polylines(self.image, [fixed], False, BACKGROUND, 4, cv2.LINE_AA, _SUBPIXEL_BITS)
                 cv2.polylines(self.image, [fixed], False, TEXT, 1, cv2.LINE_AA, _SUBPIXEL_BITS)

@@ -1,4 +1,4 @@
-"""Video files through OpenCV's own encoder, complete or absent."""
+"""Atomic writing of video files by OpenCV's encoder."""
 
 import os
 import sys
@@ -16,20 +16,24 @@ from depthtrack.files import replace_atomically
 from depthtrack.types import Image
 
 QUICK_CODECS = ("avc1", "mp4v")
-"""H.264 where OpenCV brings it (macOS, distributions), else MPEG-4 part 2: fast, plays in every video player."""
+"""H.264 if OpenCV has it (macOS, distributions), else MPEG-4 part 2: fast, for every video player."""
 
 WEB_CODECS = ("avc1", "vp09")
-"""H.264, else VP9: plays in browsers too, and takes some thirty times as long to encode."""
+"""H.264, else VP9: also for browsers; VP9 takes about thirty times longer to encode."""
 
 WEBM_CODECS = ("VP80",)
-"""VP8, in files that end in .webm: plays in browsers, and takes a sixth of VP9's time to encode."""
+"""VP8 in .webm files: for browsers, with a sixth of VP9's encoding time."""
 
 
 class VideoWriter:
     """Write RGB images (h, w, 3) uint8 as an mp4 or webm video; use as a context manager.
 
-    The size is that of the first image, rounded down to even numbers; all images must have the same size. The file
-    appears if the block succeeds. If the block fails or writes no image, no file is left.
+    All images must have the first one's size, which is rounded down to even numbers. The file appears if the block
+    succeeds. If the block fails or writes no image, no file is left.
+
+    rate: frames a second.
+    codecs: codecs in order of preference; None for the default of the suffix.
+    Raises: InputError if suffix or rate are invalid.
     """
 
     def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] | None = None) -> None:
@@ -46,7 +50,10 @@ class VideoWriter:
         self._encoder: cv2.VideoWriter | None = None
 
     def write(self, image: Image) -> None:
-        """Append one image. Raises InputError when no codec works or the size differs from the first image's."""
+        """Append one image (h, w, 3).
+
+        Raises: InputError if no codec works, or if the size differs from the first image's.
+        """
         if self._encoder is None:
             self._shape = image.shape
             self._encoder = self._open_encoder(image.shape[1] // 2 * 2, image.shape[0] // 2 * 2)
@@ -73,16 +80,21 @@ class VideoWriter:
                 self._check_complete()
 
     def _check_complete(self) -> None:
-        """Raise InputError if the file holds fewer images than were written: OpenCV does not report a full disk."""
+        """Raise InputError if the file has fewer images than were written.
+
+        OpenCV does not report a full disk.
+        """
         reader = cv2.VideoCapture(str(self._temporary))
         held = round(reader.get(cv2.CAP_PROP_FRAME_COUNT))
         reader.release()
         if held != self.frame_count:
-            raise InputError(f"the video {self.path} holds {held} of {self.frame_count} images: is the disk full?")
+            raise InputError(
+                f"the video {self.path} must hold {self.frame_count} images, found {held}: check the disk's free space"
+            )
 
     def _open_encoder(self, width: int, height: int) -> cv2.VideoWriter:
-        """The first codec that this build of OpenCV can encode."""
-        # FFmpeg complains on stderr about each codec tried in vain; it reads this once, at first use.
+        """Return an encoder with the first codec that this build of OpenCV supports."""
+        # FFmpeg reports every unsupported codec on stderr; it reads this variable once, at first use.
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
         level = cv2.utils.logging.getLogLevel()
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -104,7 +116,10 @@ class VideoWriter:
 
 @contextmanager
 def _silent_stderr() -> Iterator[None]:
-    """Discard the output of C libraries on stderr: FFmpeg reports each tag that webm does not support."""
+    """Discard the output of C libraries on stderr.
+
+    FFmpeg reports each tag that webm does not support.
+    """
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

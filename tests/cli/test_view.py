@@ -13,7 +13,7 @@ import pytest
 from depthtrack.cli import main
 from depthtrack.errors import DepthtrackError, InputError, MissingExtraError
 from depthtrack.recording import open_sequence
-from depthtrack.viewing.annotated_frame import AnnotatedFrame, moments
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, annotated_frames
 from depthtrack.viewing.rerun_viewer import RerunViewer
 from depthtrack.viewing.theme import ESTIMATED_MASK
 from depthtrack.viewing.video import QUICK_CODECS, WEB_CODECS, WEBM_CODECS, VideoWriter
@@ -207,7 +207,7 @@ def test_a_viewer_file_contains_all_entities(sample: Path, out: Path) -> None:
 @needs_rerun
 def test_a_failed_viewer_file_leaves_nothing(sample: Path, out: Path) -> None:
     def broken() -> Iterator[AnnotatedFrame]:
-        yield next(moments(open_sequence(sample)))
+        yield next(annotated_frames(open_sequence(sample)))
         raise InputError("the disk is on fire")
 
     with pytest.raises(DepthtrackError, match="on fire"):

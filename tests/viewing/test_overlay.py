@@ -1,4 +1,4 @@
-"""Drawing: what is painted lies where the camera sees it, and nowhere else."""
+"""Overlays: masks, skeletons and text are drawn only at their projected positions."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_nearer_depth_is_never_dimmer_and_no_reading_is_darkest() -> None:
     assert shades[0] > shades[200] > shades[-1] > lightness(np.array(NO_READING, dtype=np.uint8)) + 5
 
 
-def test_missing_and_broken_readings_have_the_colour_of_no_reading() -> None:
+def test_missing_and_invalid_readings_have_the_colour_of_no_reading() -> None:
     depth = np.array([[0.0, np.nan, np.inf, -1.0, 0.7]], dtype=np.float32)
     colours = depth_to_rgb(depth, 0.4, 2.0)
     assert np.all(colours[0, :4] == NO_READING)
@@ -42,7 +42,7 @@ def test_depth_outside_the_range_takes_the_colour_of_its_end() -> None:
     assert np.array_equal(colour_scale(50, 3)[1, [0, -1]], colours[[1, 2]])
 
 
-def test_depth_range_ignores_specks_and_missing_readings() -> None:
+def test_depth_range_ignores_outliers_and_missing_readings() -> None:
     depth = np.linspace(0.5, 1.0, 100_000, dtype=np.float32)
     depth[:20_000] = 0
     depth[20_000:20_050] = 0.12
@@ -53,7 +53,7 @@ def test_depth_range_ignores_specks_and_missing_readings() -> None:
 
 
 @pytest.mark.parametrize("depth", [np.zeros((4, 4)), np.full((4, 4), 0.7), np.full((4, 4), np.nan)])
-def test_depth_range_always_spans_something(depth: NDArray[np.float64]) -> None:
+def test_depth_range_is_never_empty(depth: NDArray[np.float64]) -> None:
     near, far = depth_range(depth.astype(np.float32))
     assert 0 < near < far
 
@@ -61,7 +61,7 @@ def test_depth_range_always_spans_something(depth: NDArray[np.float64]) -> None:
 # Masks
 
 
-def test_mask_tints_inside_only_and_leaves_the_input_alone() -> None:
+def test_overlay_mask_tints_only_the_inside_of_a_new_image() -> None:
     image = np.random.default_rng(1).integers(0, 256, (60, 80, 3), dtype=np.uint8)
     before, mask = image.copy(), np.zeros((60, 80), dtype=np.bool_)
     mask[20:40, 30:60] = True
@@ -84,7 +84,7 @@ def test_spotlight_keeps_the_hand_and_dims_the_rest() -> None:
 # Skeletons
 
 
-def test_every_joint_is_drawn_where_the_camera_projects_it() -> None:
+def test_every_joint_is_drawn_at_its_projection() -> None:
     keypoints = open_hand()
     out = draw_skeleton(GREY, CAMERA, keypoints, thickness=3)
     for name, (u, v) in zip(KEYPOINT_NAMES, CAMERA.project(keypoints), strict=True):
@@ -110,7 +110,7 @@ def _distance_to_segment(
     return np.asarray(np.linalg.norm(points - (start + along[:, None] * (end - start)), axis=1))
 
 
-def test_the_bones_join_all_keypoints_of_each_finger_to_the_wrist() -> None:
+def test_bones_connect_all_keypoints_of_each_finger_to_the_wrist() -> None:
     reached = {0}
     bones = [*PALM_BONES, *(bone for chain in FINGER_BONES.values() for bone in chain)]
     for _ in bones:
@@ -132,13 +132,13 @@ def test_a_nearer_finger_covers_a_farther_one() -> None:
 
 
 @given(st.integers(0, 20), st.sampled_from([np.nan, -0.5, 0.0, 1e-9, 1e9]), st.sampled_from([0.0, 1e12, -1e12]))
-def test_impossible_keypoints_are_left_out_without_harm(which: int, z: float, x: float) -> None:
+def test_invalid_keypoints_are_omitted(which: int, z: float, x: float) -> None:
     keypoints = open_hand()
     keypoints[which] = [x, 0.0, z]
     assert np.any(draw_skeleton(GREY, CAMERA, keypoints) != GREY)
 
 
-def test_a_skeleton_of_another_size_is_refused() -> None:
+def test_keypoints_of_another_shape_raise_a_value_error() -> None:
     with pytest.raises(ValueError, match="21, 3"):
         draw_skeleton(GREY, CAMERA, np.zeros((20, 3)))
 
@@ -146,7 +146,7 @@ def test_a_skeleton_of_another_size_is_refused() -> None:
 # Text
 
 
-def test_text_stays_inside_the_image_and_is_as_wide_as_told() -> None:
+def test_text_has_the_reported_width_and_is_clipped_at_the_image() -> None:
     canvas = np.zeros((40, 300, 3), dtype=np.uint8)
     put_text(canvas, "frame 12", (20, 20), 16, (255, 255, 255))
     v, u = np.nonzero(canvas[..., 0])
@@ -158,5 +158,5 @@ def test_text_stays_inside_the_image_and_is_as_wide_as_told() -> None:
 
 
 @pytest.mark.parametrize("size", [13, 24])
-def test_words_stand_apart(size: int) -> None:
+def test_words_are_separated_by_a_space(size: int) -> None:
     assert text_width("24 frames", size) - text_width("24frames", size) >= 0.3 * size

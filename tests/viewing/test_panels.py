@@ -1,4 +1,4 @@
-"""Moments and the pictures composed of them: every part is its own frame's, in its place."""
+"""Annotated frames and the pages composed of them: content, positions and sizes."""
 
 from pathlib import Path
 
@@ -14,39 +14,39 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import Frame, GroundTruth, open_sequence
-from depthtrack.viewing.annotated_frame import AnnotatedFrame, evenly_chosen, moments, true_keypoints
+from depthtrack.viewing.annotated_frame import AnnotatedFrame, annotated_frames, evenly_spaced, true_keypoints
 from depthtrack.viewing.contact_sheet import contact_sheet, save_picture
 from depthtrack.viewing.depth_colours import depth_range
-from depthtrack.viewing.panels import paint, panel, tile_grid, useful_layers
+from depthtrack.viewing.panels import draw_layer, panel, tile_grid, useful_layers
 from depthtrack.viewing.strip import strip
 from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, TRUE_MASK
 from tests.support.recordings import TIMES, joints_at, mask_at, write_sample
 from tests.support.viewing import CAMERA, GREY, open_hand
 
 
-def moment(depth: float = 0.5, colour: int | None = 100, index: int = 0) -> AnnotatedFrame:
-    """A plane of one depth and one grey."""
+def plane_frame(depth: float = 0.5, colour: int | None = 100, index: int = 0) -> AnnotatedFrame:
+    """Return a frame of a plane with one depth and one grey."""
     pixels = None if colour is None else np.full((*CAMERA.shape, 3), colour, dtype=np.uint8)
     return AnnotatedFrame(Frame(index, 0.1 * index, np.full(CAMERA.shape, depth, dtype=np.float32), pixels, CAMERA))
 
 
-# Moments
+# Annotated frames
 
 
-def test_moments_bring_mask_and_joints_of_their_own_frame(tmp_path: Path) -> None:
+def test_annotated_frames_have_mask_and_joints_of_their_own_frame(tmp_path: Path) -> None:
     sequence = open_sequence(write_sample(tmp_path / "sample"))
-    for index, seen in zip((1, 4), moments(sequence, (1, 4)), strict=True):
-        assert seen.frame.index == index
-        assert seen.mask_is_true
-        assert seen.mask is not None
-        assert np.array_equal(seen.mask, mask_at(index))
-        assert seen.keypoints is not None
-        np.testing.assert_allclose(seen.keypoints, joints_at(index))
-    assert len(list(moments(sequence))) == len(TIMES)
+    for index, annotated in zip((1, 4), annotated_frames(sequence, (1, 4)), strict=True):
+        assert annotated.frame.index == index
+        assert annotated.mask_is_true
+        assert annotated.mask is not None
+        assert np.array_equal(annotated.mask, mask_at(index))
+        assert annotated.keypoints is not None
+        np.testing.assert_allclose(annotated.keypoints, joints_at(index))
+    assert len(list(annotated_frames(sequence))) == len(TIMES)
     assert useful_layers(sequence) == ("depth", "colour", "mask", "skeleton")
 
 
-def test_keypoints_come_from_the_pose_where_no_joints_are_given() -> None:
+def test_true_keypoints_are_computed_from_the_pose_without_joints() -> None:
     hand, pose = HandShape(side="left", scale=0.9), make_pose([0.0, 0.1, 0.5], [1.0, 0.2, 0.0, 0.1], np.full(20, 0.1))
     truth = GroundTruth(np.array([0.5, 1.0]), poses=np.stack([pose, pose + 0.01]), hand=hand)
     found = true_keypoints(truth, 0.5)
@@ -56,21 +56,21 @@ def test_keypoints_come_from_the_pose_where_no_joints_are_given() -> None:
     assert true_keypoints(GroundTruth(np.array([0.5]), poses=pose[None]), 0.5) is None
 
 
-def test_an_estimate_is_asked_only_where_no_mask_is_known(tmp_path: Path) -> None:
+def test_masks_are_estimated_only_without_a_true_mask(tmp_path: Path) -> None:
     sequence = open_sequence(write_sample(tmp_path / "sample"))
     for path in (tmp_path / "sample" / "hand_mask").glob("*.png"):
         if path.stem != "0.000000":
             path.unlink()
     estimated = np.zeros((24, 32), dtype=np.bool_)
     estimated[5:20, 5:20] = True
-    found = list(moments(sequence, estimate=lambda frame: estimated if frame.index != 3 else None))
-    assert [seen.mask_is_true for seen in found] == [True, False, False, False, False]
-    assert [seen.mask is None for seen in found] == [False, False, False, True, False]
-    assert np.any(np.all(paint(found[1], "mask", 48, 0.4, 0.9) == ESTIMATED_MASK, axis=-1))
-    assert not np.any(np.all(paint(found[1], "mask", 48, 0.4, 0.9) == TRUE_MASK, axis=-1))
+    found = list(annotated_frames(sequence, estimate=lambda frame: estimated if frame.index != 3 else None))
+    assert [annotated.mask_is_true for annotated in found] == [True, False, False, False, False]
+    assert [annotated.mask is None for annotated in found] == [False, False, False, True, False]
+    assert np.any(np.all(draw_layer(found[1], "mask", 48, 0.4, 0.9) == ESTIMATED_MASK, axis=-1))
+    assert not np.any(np.all(draw_layer(found[1], "mask", 48, 0.4, 0.9) == TRUE_MASK, axis=-1))
 
 
-def test_a_crop_sees_the_same_points_of_space_in_the_same_colours() -> None:
+def test_a_crop_keeps_pixels_and_projections() -> None:
     rng = np.random.default_rng(2)
     colour = rng.integers(0, 256, (*CAMERA.shape, 3), dtype=np.uint8)
     mask = rng.random(CAMERA.shape) < 0.5
@@ -89,8 +89,8 @@ def test_a_crop_sees_the_same_points_of_space_in_the_same_colours() -> None:
 
 
 @given(st.integers(0, 300), st.integers(1, 40))
-def test_chosen_frames_are_spread_evenly(length: int, count: int) -> None:
-    chosen = evenly_chosen(length, count)
+def test_chosen_frames_are_evenly_spaced(length: int, count: int) -> None:
+    chosen = evenly_spaced(length, count)
     assert len(chosen) == min(length, count)
     assert chosen == sorted(set(chosen))
     if chosen:
@@ -103,16 +103,18 @@ def test_chosen_frames_are_spread_evenly(length: int, count: int) -> None:
 # Composed pictures
 
 
-def test_tiles_stand_in_reading_order() -> None:
+def test_tiles_are_in_reading_order() -> None:
     tiles = [np.full((4, 6, 3), 10 * number, dtype=np.uint8) for number in range(5)]
     grid = tile_grid(tiles, columns=3, gap=2)
     assert grid.shape == (10, 22, 3)
     assert [int(grid[6 * (n // 3), 8 * (n % 3), 0]) for n in range(5)] == [0, 10, 20, 30, 40]
 
 
-def test_a_contact_sheet_shows_every_moment_in_order() -> None:
+def test_a_contact_sheet_shows_every_frame_in_order() -> None:
     greys = range(60, 240, 15)
-    page = contact_sheet([moment(colour=grey, index=grey) for grey in greys], "title", "subtitle", 0.4, 0.6, width=900)
+    page = contact_sheet(
+        [plane_frame(colour=grey, index=grey) for grey in greys], "title", "subtitle", 0.4, 0.6, width=900
+    )
     assert 880 <= page.shape[1] <= 960
     corners = []
     for grey in greys:
@@ -124,54 +126,60 @@ def test_a_contact_sheet_shows_every_moment_in_order() -> None:
     assert len({column for _, column in corners}) == 3
 
 
-def test_a_contact_sheet_of_nothing_is_refused() -> None:
+def test_a_contact_sheet_without_frames_raises_an_input_error() -> None:
     with pytest.raises(InputError, match="no readable frame"):
         contact_sheet([], "empty", "", 0.4, 0.6)
 
 
-def test_panels_have_one_size_whatever_is_missing() -> None:
-    known = AnnotatedFrame(moment().frame, np.ones(CAMERA.shape, dtype=np.bool_), True, open_hand())
+def test_panels_have_one_size_with_and_without_annotations() -> None:
+    known = AnnotatedFrame(plane_frame().frame, np.ones(CAMERA.shape, dtype=np.bool_), True, open_hand())
     for layers in (("depth",), ("depth", "mask", "skeleton"), ("depth", "colour", "mask", "skeleton")):
-        shapes = {panel(seen, layers, 120, 0.4, 0.6).shape for seen in (known, moment(), moment(colour=None))}
+        shapes = {
+            panel(annotated, layers, 120, 0.4, 0.6).shape
+            for annotated in (known, plane_frame(), plane_frame(colour=None))
+        }
         assert len(shapes) == 1
 
 
 @pytest.mark.parametrize("height", [60, 240, 700])
-def test_skeleton_and_mask_meet_at_any_resolution(height: int) -> None:
-    """The hand's keypoints, drawn and as a mask of their own, land on the same scaled pixels."""
+def test_skeleton_and_mask_align_at_any_resolution(height: int) -> None:
+    """A keypoint in the skeleton and in a mask is at the same scaled pixels."""
     keypoints, mask = open_hand(), np.zeros(CAMERA.shape, dtype=np.bool_)
     tip = CAMERA.project(keypoints[8]).round().astype(int)
     mask[tip[1] - 4 : tip[1] + 5, tip[0] - 4 : tip[0] + 5] = True
-    seen = AnnotatedFrame(moment(colour=0).frame, mask, True, keypoints)
-    tinted = np.argwhere(np.any(paint(seen, "mask", height, 0.4, 0.6) > 0, axis=-1)).mean(axis=0)
+    annotated = AnnotatedFrame(plane_frame(colour=0).frame, mask, True, keypoints)
+    tinted = np.argwhere(np.any(draw_layer(annotated, "mask", height, 0.4, 0.6) > 0, axis=-1)).mean(axis=0)
     drawn = np.argwhere(
-        np.all(np.abs(paint(seen, "skeleton", height, 0.4, 0.6).astype(int) - FINGER_COLOURS["index"]) <= 3, axis=-1)
+        np.all(
+            np.abs(draw_layer(annotated, "skeleton", height, 0.4, 0.6).astype(int) - FINGER_COLOURS["index"]) <= 3,
+            axis=-1,
+        )
     )
     nearest = np.linalg.norm(drawn - tinted, axis=1).min()
     assert nearest <= 1.0
 
 
-def test_a_strip_looks_close_at_the_hand() -> None:
+def test_a_strip_crops_to_the_hand() -> None:
     mask = np.zeros(CAMERA.shape, dtype=np.bool_)
     mask[100:150, 200:250] = True
-    shown = [AnnotatedFrame(moment(index=n).frame, np.roll(mask, -10 * n, axis=1), True, None) for n in range(4)]
+    shown = [AnnotatedFrame(plane_frame(index=n).frame, np.roll(mask, -10 * n, axis=1), True, None) for n in range(4)]
     banner = strip(shown, width=800)
-    # Three rows (no skeleton is known) of four squares; the hand fills 50 of 60 pixels of its window's side.
+    # Three rows (there is no skeleton) of four squares; the hand fills 50 of 60 pixels of a region's side.
     assert abs(banner.shape[1] - 800) <= 4
     side = (banner.shape[0] - 8) // 3
     lit = np.all(banner[-side:] == 100, axis=-1)
     assert 0.55 < lit.mean() < 0.75
 
 
-def test_a_strip_of_too_many_moments_is_refused() -> None:
+def test_a_strip_of_too_many_frames_raises_an_input_error() -> None:
     with pytest.raises(InputError, match="room for 43"):
-        strip([moment()] * 44)
+        strip([plane_frame()] * 44)
 
 
 # Files
 
 
-def test_a_picture_is_complete_or_absent(tmp_path: Path) -> None:
+def test_a_failed_picture_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "taken.png").mkdir()
     with pytest.raises(InputError, match="cannot write"):
         save_picture(GREY, tmp_path / "taken.png")
@@ -195,21 +203,21 @@ def test_a_picture_reads_back_in_its_colours(tmp_path: Path, name: str, error: i
 # Real recordings
 
 
-def test_annotated_joints_lie_on_the_annotated_silhouette(real_data: Path) -> None:
-    """The annotation is the projection of one model: drawn joints that left the mask would mean a wrong camera."""
+def test_annotated_joints_project_into_the_annotated_silhouette(real_data: Path) -> None:
+    """Joints and mask are projections of one model: joints outside mean a wrong camera."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
-    for seen in moments(sequence, evenly_chosen(len(sequence), 4)):
-        assert seen.mask is not None
-        assert seen.keypoints is not None
-        u, v = seen.camera.project(seen.keypoints).round().astype(int).T
-        assert seen.mask[v, u].mean() > 0.8
+    for annotated in annotated_frames(sequence, evenly_spaced(len(sequence), 4)):
+        assert annotated.mask is not None
+        assert annotated.keypoints is not None
+        u, v = annotated.camera.project(annotated.keypoints).round().astype(int).T
+        assert annotated.mask[v, u].mean() > 0.8
 
 
 @pytest.mark.parametrize("name", ["open-close", "with-ball", "kinect2-counting", "sr305-poses"])
-def test_every_real_recording_makes_a_page(real_data: Path, name: str) -> None:
+def test_every_real_recording_has_a_contact_sheet_and_a_strip(real_data: Path, name: str) -> None:
     sequence = open_sequence(real_data / "rgbd" / name)
-    shown = list(moments(sequence, evenly_chosen(len(sequence), 4)))
-    near, far = depth_range(np.stack([seen.frame.depth for seen in shown]))
+    shown = list(annotated_frames(sequence, evenly_spaced(len(sequence), 4)))
+    near, far = depth_range(np.stack([annotated.frame.depth for annotated in shown]))
     page = contact_sheet(shown, name, "", near, far, width=600)
     assert page.std() > 10
     assert strip(shown, width=400).std() > 10

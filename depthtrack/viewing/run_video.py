@@ -1,4 +1,4 @@
-"""A film of a run: every frame with the hypothesis over it."""
+"""The video of a run: every frame with the hypothesis over it."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -9,9 +9,10 @@ from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.video import VideoWriter
 
 Progress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
+"""Wraps an iterator of frames, for a progress bar."""
 
 
-def write_run_film(
+def write_run_video(
     replay: Replay,
     path: Path,
     codecs: tuple[str, ...] | None = None,
@@ -19,13 +20,15 @@ def write_run_film(
     progress: Progress | None = None,
     speed: float = 1.0,
 ) -> int:
-    """Write an mp4 (or webm) of a run at its own pace times `speed`, complete or not at all; returns how many frames.
+    """Write a run as an mp4 or webm video, atomically, and return the number of frames.
 
-    `height` pixels of each of the four views; frames stream. Raises InputError.
+    height: of each of the four views, pixels.
+    speed: playback speed relative to the recording.
+    Raises: InputError if a frame cannot be read or the video cannot be written.
     """
     painter = RunPainter(replay, height)
     replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
     with VideoWriter(path, speed * (frame_rate(replay.sequence) or 30.0), codecs) as writer:
-        for seen in replayed:
-            writer.write(painter.picture(seen))
+        for frame in replayed:
+            writer.write(painter.picture(frame))
     return writer.frame_count
