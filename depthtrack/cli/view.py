@@ -123,7 +123,7 @@ class Command(ViewOptions):
         yield from bar(annotated_frames(sequence, None, self._estimator()), total=len(sequence))
 
     def _chosen_frames(self, sequence: "Sequence", count: int) -> "Iterator[AnnotatedFrame]":
-        from depthtrack.viewing.annotated_frame import evenly_spaced, annotated_frames
+        from depthtrack.viewing.annotated_frame import annotated_frames, evenly_spaced
 
         outside = [index for index in self.frames if not 0 <= index < len(sequence)]
         if outside:

@@ -1,1 +1,1 @@
-"""The report: one HTML page that holds everything it shows, made from run folders alone."""
+"""The report of runs: one self-contained HTML page from run folders."""

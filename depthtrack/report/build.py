@@ -1,4 +1,4 @@
-"""The page from evaluated runs: what it says and shows, recording by recording, within bounded size."""
+"""The report page of evaluated runs: text, table, plots and animations of bounded size."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,28 +15,37 @@ from depthtrack.evaluation.compare.results import TrackerResult, figures_of, tra
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.files import write_atomic
 from depthtrack.recording.sequence import Frame
+from depthtrack.report.animation import Animation, make_animation, webp_data_uri
 from depthtrack.report.colours import css_variables
-from depthtrack.report.film import Film, as_webp, film_of
-from depthtrack.report.narrative import ERRORS, Verdict, error_name, judged_by, standings, verdict, where
+from depthtrack.report.narrative import (
+    ERRORS,
+    Summary,
+    error_metric,
+    error_name,
+    recording_scope,
+    summary,
+    tracker_summaries,
+)
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.plots import TIMELINE_FROM, TIMELINE_TO, finger_bars, share_curves, stage_bars, timeline
-from depthtrack.report.provenance import Fact, bias_warning, facts_of_recording, facts_of_tracker, matched_model
+from depthtrack.report.provenance import Fact, bias_warning, matched_model, recording_facts, tracker_facts
 from depthtrack.report.series import TrackerSeries, worst_frames
 from depthtrack.report.table import table_head, table_rows
 
-FILM_BYTES, ALL_FILMS_BYTES = 5_000_000, 30_000_000
-"""A film, and all films of a page, take about so much at most."""
+ANIMATION_BYTES, ALL_ANIMATIONS_BYTES = 5_000_000, 30_000_000
+"""Approximate largest size of one animation, and of all animations of a page."""
 MOST_DETAILED = 12
-"""Recordings with plots and pictures; further ones are in the table."""
+"""Recordings with plots and images; further ones appear in the table alone."""
 WORST = 2
+"""Worst frames shown of each tracker."""
 
 Progress = Callable[[Iterable[Frame], str, int], Iterable[Frame]]
-"""Watches frames go by, under a heading; told about how many there are."""
+"""Wraps an iterator of frames, given a heading and their number, for a progress bar."""
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A drawing with its title, what it shows, and a remark on how."""
+    """An SVG plot with its title, its quantity, and a remark on how it is drawn."""
 
     title: str
     about: str
@@ -45,30 +54,34 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Worst:
-    """A frame in which a tracker was at its worst: a picture of all trackers there."""
+class WorstFrame:
+    """One of the frames with a tracker's largest errors, as an image of all trackers.
+
+    seconds: time since the recording's first frame.
+    picture: data URI.
+    """
 
     label: str
     number: int
-    told: str
+    caption: str
     seconds: float
     picture: str
 
 
 @dataclass(frozen=True)
 class Section:
-    """What the page shows of one recording."""
+    """The page's section of one recording; `end` is its duration in seconds."""
 
     name: str
-    shown: list[TrackerSeries]
+    series: list[TrackerSeries]
     facts: list[Fact]
     bias_warning: str
     matched_model: tuple[str, ...]
     timeline: Plot
     plots: list[Plot]
-    film: Film
+    animation: Animation
     end: float
-    worst: list[Worst]
+    worst: list[WorstFrame]
 
 
 def write_report(
@@ -77,28 +90,32 @@ def write_report(
     sequence: Path | None = None,
     progress: Progress = lambda frames, heading, total: frames,
 ) -> None:
-    """Write the page; `sequence` is where the recording lies now, if it was moved. Raises InputError."""
+    """Write the report page of evaluated runs, atomically.
+
+    sequence: the recording's present path, if it was moved since the runs.
+    Raises: InputError if there is no frame to report, a recording cannot be opened, or the page cannot be written.
+    """
     check_reportable(evaluations)
-    # In the order of their folders' names, so that the page is the same whoever asks for it.
-    lines = tracker_results(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
-    numbers = {label: number for number, label in enumerate(dict.fromkeys(line.label for line in lines))}
-    shown = [TrackerSeries(line, numbers[line.label]) for line in lines]
+    # Sorted by folder name, so that the page does not depend on the order of the arguments.
+    results = tracker_results(sorted(evaluations, key=lambda evaluation: evaluation.run.folder.name))
+    numbers = {label: number for number, label in enumerate(dict.fromkeys(result.label for result in results))}
+    series = [TrackerSeries(result, numbers[result.label]) for result in results]
     recordings: dict[str, list[TrackerSeries]] = {}
-    for each in shown:
-        recordings.setdefault(each.line.source, []).append(each)
+    for each in series:
+        recordings.setdefault(each.result.source, []).append(each)
     detailed = list(recordings.values())[:MOST_DETAILED]
-    most_bytes = min(FILM_BYTES, ALL_FILMS_BYTES // len(detailed))
+    most_bytes = min(ANIMATION_BYTES, ALL_ANIMATIONS_BYTES // len(detailed))
     sections = [_section(each, most_bytes, sequence, progress) for each in detailed]
     page = {
         "version": __version__,
-        "verdict": _verdict(lines, sections if len(sections) == len(recordings) else []),
-        "standings": [(standing, numbers[standing.label]) for standing in standings(lines)],
-        "judged_by": error_name(lines) + where(lines),
-        "head": table_head(lines),
-        "rows": table_rows(shown),
+        "summary": _summary(results, sections if len(sections) == len(recordings) else []),
+        "tracker_summaries": [(tracker, numbers[tracker.label]) for tracker in tracker_summaries(results)],
+        "error_name": error_name(results) + recording_scope(results),
+        "head": table_head(results),
+        "rows": table_rows(series),
         "sections": sections,
-        "left_out": [each[0].line.recording for each in list(recordings.values())[MOST_DETAILED:]],
-        "trackers": [(label, number, facts_of_tracker(label, lines)) for label, number in numbers.items()],
+        "left_out": [each[0].result.recording for each in list(recordings.values())[MOST_DETAILED:]],
+        "trackers": [(label, number, tracker_facts(label, results)) for label, number in numbers.items()],
         "runs": len(evaluations),
         "from_percent": 100 * TIMELINE_FROM,
         "to_percent": 100 * TIMELINE_TO,
@@ -110,86 +127,89 @@ def write_report(
 
 
 def check_reportable(evaluations: Sequence[Evaluation]) -> None:
-    """Raise InputError where there is nothing to tell of."""
+    """Raise InputError if there is no run, or a run without frames."""
     if not evaluations:
-        raise InputError("a report needs at least one run")
+        raise InputError("a report needs at least one run, found none")
     for evaluation in evaluations:
         if evaluation.frames == 0:
             raise InputError(f"{evaluation.run.folder} holds no frame yet: track it first, or leave it out")
 
 
-def _section(shown: list[TrackerSeries], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
-    lines = [each.line for each in shown]
-    metric = judged_by(lines)
-    painter = SideBySide(shown, metric, sequence=sequence)
-    heading = f"film of {lines[0].recording}"
-    film = film_of(painter, most_bytes, lambda frames, total: progress(frames, heading, total))
+def _section(series: list[TrackerSeries], most_bytes: int, sequence: Path | None, progress: Progress) -> Section:
+    results = [each.result for each in series]
+    metric = error_metric(results)
+    painter = SideBySide(series, metric, sequence=sequence)
+    heading = f"animation of {results[0].recording}"
+    animation = make_animation(painter, most_bytes, lambda frames, total: progress(frames, heading, total))
     times = painter.sequence.timestamps[painter.indices]
     return Section(
-        lines[0].recording,
-        shown,
-        facts_of_recording(painter.sequence, lines[0]),
-        bias_warning(painter.sequence.description, lines),
-        matched_model(painter.sequence.description, lines),
-        _timeline(shown, metric),
-        _plots(shown, metric),
-        film,
+        results[0].recording,
+        series,
+        recording_facts(painter.sequence, results[0]),
+        bias_warning(painter.sequence.description, results),
+        matched_model(painter.sequence.description, results),
+        _timeline(series, metric),
+        _plots(series, metric),
+        animation,
         max(float(times[-1] - times[0]), 1e-3),
-        _worst(shown, metric, painter),
+        _worst_frames(series, metric, painter),
     )
 
 
-def _timeline(shown: list[TrackerSeries], metric: str) -> Plot:
-    svg, remark = timeline(shown, metric, "mm")
-    title = "Distance to the sensor's points over time" if metric == "e3d_mm" else "Error over time"
+def _timeline(series: list[TrackerSeries], metric: str) -> Plot:
+    svg, remark = timeline(series, metric, "mm")
+    title = "Distance of the depth points over time" if metric == "e3d_mm" else "Error over time"
     return Plot(title, ERRORS[metric].replace("median ", "").replace("mean ", ""), Markup(svg), remark)
 
 
-def _plots(shown: list[TrackerSeries], metric: str) -> list[Plot]:
+def _plots(series: list[TrackerSeries], metric: str) -> list[Plot]:
     found = []
-    if (svg := share_curves(shown)) is not None:
-        judged = "E3D" if metric == "e3d_mm" else "largest error"
-        found.append(Plot("Share of frames under a threshold", f"by a frame's {judged}", Markup(svg)))
-    if (svg := finger_bars(shown)) is not None:
+    if (svg := share_curves(series)) is not None:
+        error = "E3D" if metric == "e3d_mm" else "largest error"
+        found.append(Plot("Share of frames under a threshold", f"by a frame's {error}", Markup(svg)))
+    if (svg := finger_bars(series)) is not None:
         found.append(Plot("Error of each finger", "mean; whiskers to the 95th percentile", Markup(svg)))
     else:
-        svg, _ = timeline(shown, "silhouette_iou", "IoU", small=True)
-        found.append(Plot("Agreement of silhouettes", "rendered and seen, over time", Markup(svg)))
-    if (svg := stage_bars(shown)) is not None:
-        clock = shown[0].line.evaluations[0].configuration.context.get("clock", "wall")
-        about = "CPU time" if clock == "cpu" else "by the clock on the wall"
+        svg, _ = timeline(series, "silhouette_iou", "IoU", small=True)
+        found.append(Plot("Silhouette IoU", "rendered and observed, over time", Markup(svg)))
+    if (svg := stage_bars(series)) is not None:
+        clock = series[0].result.evaluations[0].configuration.context.get("clock", "wall")
+        about = "CPU time" if clock == "cpu" else "wall-clock time"
         found.append(Plot("Time per stage", about, Markup(svg)))
     return found
 
 
-def _worst(shown: list[TrackerSeries], metric: str, painter: SideBySide) -> list[Worst]:
+def _worst_frames(series: list[TrackerSeries], metric: str, painter: SideBySide) -> list[WorstFrame]:
     found = []
-    for each in shown:
-        evaluation = each.line.evaluations[0]
+    for each in series:
+        evaluation = each.result.evaluations[0]
         figures = figures_of(evaluation).get(metric)
         if figures is None:
             continue
         run = evaluation.run
         for row in worst_frames(figures.values, run.timestamps, WORST):
-            told = f"frame {run.index[row]}, {figures.values[row]:.1f} mm"
+            caption = f"frame {run.index[row]}, {figures.values[row]:.1f} mm"
             fingers = {finger: errors.values[row] for finger, errors in evaluation.finger_errors.items()}
             known = {finger: error for finger, error in fingers.items() if np.isfinite(error)}
             if known:
                 finger = max(known, key=lambda finger: known[finger])
-                told += f"; most in the {finger} finger" if finger != "thumb" else "; most in the thumb"
+                caption += f"; largest at the {finger}" + (" finger" if finger != "thumb" else "")
             frame = next(iter(painter.sequence.frames([int(run.index[row])])))
             seconds = float(run.timestamps[row] - painter.sequence.timestamps[painter.indices[0]])
-            found.append(Worst(each.label, each.number, told, seconds, as_webp(painter.picture(frame), quality=70)))
+            picture = webp_data_uri(painter.picture(frame), quality=70)
+            found.append(WorstFrame(each.label, each.number, caption, seconds, picture))
     return found
 
 
-def _verdict(lines: Sequence[TrackerResult], sections: Sequence[Section]) -> Verdict:
-    """`sections` of all recordings, if they are known."""
-    contexts = [evaluation.configuration.context for line in lines for evaluation in line.evaluations]
+def _summary(results: Sequence[TrackerResult], sections: Sequence[Section]) -> Summary:
+    """Return the page's summary; `sections` of all recordings, or none."""
+    contexts = [evaluation.configuration.context for result in results for evaluation in result.evaluations]
     budgets = {(context.get("budget") or {}).get("equal_ms") for context in contexts}
-    homes = {section.matched_model for section in sections}
-    return verdict(
-        lines, next(iter(budgets)) if len(budgets) == 1 else None, next(iter(homes)) if len(homes) == 1 else ()
+    matched = {section.matched_model for section in sections}
+    return summary(
+        results,
+        next(iter(budgets)) if len(budgets) == 1 else None,
+        next(iter(matched)) if len(matched) == 1 else (),
     )
 
 

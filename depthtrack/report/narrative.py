@@ -1,4 +1,4 @@
-"""The page in words: what came out, in a sentence or two that the figures bear out."""
+"""The page's headline and summary sentences, generated from the results of a comparison."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,27 +7,33 @@ import numpy as np
 
 from depthtrack.evaluation.compare.results import TRACKER_MS, TrackerResult
 
-ALIKE = 1.05
-"""Figures that differ by less than this factor are called the same."""
+TIE_FACTOR = 1.05
+"""Values that differ by less than this factor count as equal."""
 _MOST_NAMED = 3
+"""Recordings that a sentence names one by one; more are counted."""
 _SPACE = "\u00a0"
-"""Between a number and its unit, where no line may break."""
+"""No-break space between a number and its unit."""
 
 ERRORS = {"endpoint_error_mm": "mean endpoint error", "joint_error_mm": "mean joint error", "e3d_mm": "median E3D"}
+"""Names of the metrics that rank trackers."""
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """A headline, and the sentences below it."""
+class Summary:
+    """The headline of a page and the sentences below it."""
 
     headline: str
     sentences: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Standing:
-    """A tracker over all recordings: the mean of its errors (mm) on them, the mean of its median milliseconds a frame
-    without segmentation, and how many of its frames were lost."""
+class TrackerSummary:
+    """A tracker over all recordings.
+
+    error: mean over the recordings of its error, mm; infinite if a recording that ranks others lacks it.
+    ms: mean over the recordings of its median time a frame without segmentation, milliseconds.
+    lost: number of lost frames among `frames`.
+    """
 
     label: str
     error: float
@@ -36,169 +42,166 @@ class Standing:
     frames: int
 
 
-def judged_by(lines: Sequence[TrackerResult]) -> str:
-    """The metric that trackers are judged by: the truth's, where any recording has one, else the distance E3D."""
-    return next((line.truth for line in lines if line.truth is not None), "e3d_mm")
+def error_metric(results: Sequence[TrackerResult]) -> str:
+    """Return the metric that ranks trackers: E3D if no recording has ground truth."""
+    return next((result.truth for result in results if result.truth is not None), "e3d_mm")
 
 
-def error_name(lines: Sequence[TrackerResult]) -> str:
-    """What the errors are called that trackers are judged by."""
-    truths = {line.truth for line in lines if line.truth is not None}
-    return "mean error" if len(truths) > 1 else ERRORS[judged_by(lines)]
+def error_name(results: Sequence[TrackerResult]) -> str:
+    """Return the name of the errors that rank trackers."""
+    truths = {result.truth for result in results if result.truth is not None}
+    return "mean error" if len(truths) > 1 else ERRORS[error_metric(results)]
 
 
-def where(lines: Sequence[TrackerResult]) -> str:
-    """On which recordings trackers are judged, where that is not all there is to say."""
-    every, judged = {line.source for line in lines}, _winners(lines)
-    if not _all_judged(lines):
-        return f" on the {_count(len(judged))} of {_count(len(every))} recordings with a known truth"
+def recording_scope(results: Sequence[TrackerResult]) -> str:
+    """Return a sentence's end that names the recordings in the ranking; empty for a single one."""
+    every, ranked = {result.source for result in results}, _winners(results)
+    if not _all_ranked(results):
+        return f" on the {_count(len(ranked))} of {_count(len(every))} recordings with ground truth"
     return " over all recordings" if len(every) > 1 else ""
 
 
-def standings(lines: Sequence[TrackerResult]) -> list[Standing]:
-    """All trackers, the closest first; with an infinite error those that found no hand where others are judged."""
-    judged = set(_winners(lines))
+def tracker_summaries(results: Sequence[TrackerResult]) -> list[TrackerSummary]:
+    """Return all trackers in the order of their errors, the smallest first."""
+    ranked = set(_winners(results))
     found = []
-    for label in dict.fromkeys(line.label for line in lines):
-        own = [line for line in lines if line.label == label]
-        errors = {line.source: error for line in own if (error := _error(line, lines)) is not None}
-        times = [ms for line in own if (ms := line.figure(TRACKER_MS, "median")) is not None]
+    for label in dict.fromkeys(result.label for result in results):
+        own = [result for result in results if result.label == label]
+        errors = {result.source: error for result in own if (error := _error(result, results)) is not None}
+        times = [ms for result in own if (ms := result.figure(TRACKER_MS, "median")) is not None]
         found.append(
-            Standing(
+            TrackerSummary(
                 label,
-                float(np.mean(list(errors.values()))) if errors and judged <= set(errors) else float("inf"),
+                float(np.mean(list(errors.values()))) if errors and ranked <= set(errors) else float("inf"),
                 float(np.mean(times)) if times else None,
-                sum(line.lost for line in own),
-                sum(line.frames for line in own),
+                sum(result.lost for result in own),
+                sum(result.frames for result in own),
             )
         )
-    return sorted(found, key=lambda standing: standing.error)
+    return sorted(found, key=lambda tracker: tracker.error)
 
 
-def verdict(
-    lines: Sequence[TrackerResult], equal_ms: float | None = None, matched_model: Sequence[str] = ()
-) -> Verdict:
-    """What the comparison says; `equal_ms` where all trackers were given the same time a frame, `matched_model` the
-    trackers whose very model every recording's hand was drawn from."""
-    found = standings(lines)
+def summary(
+    results: Sequence[TrackerResult], equal_ms: float | None = None, matched_model: Sequence[str] = ()
+) -> Summary:
+    """Return the headline and the sentences of a comparison.
+
+    equal_ms: time budget of a frame, milliseconds, if all trackers had the same.
+    matched_model: trackers that fit the hand model that every recording was rendered from.
+    """
+    found = tracker_summaries(results)
     first = found[0]
     if not np.isfinite(first.error):
-        return Verdict("No tracker followed the hand", (_losses(found),))
+        return Summary("No tracker found the hand", (_losses(found),))
     if len(found) == 1:
-        speed = "" if first.ms is None else f", at {first.ms:.1f}{_SPACE}ms a frame"
-        told = f"That is its {error_name(lines)}{speed}."
-        return Verdict(f"{first.label} follows the hand to {_mm(first.error)}", (told, _losses(found)))
-    winners = _winners(lines)
-    headline, told = _split(lines, winners) if len(set(winners.values())) > 1 else _clear(lines, found)
-    headline = _matched_model(headline, first.label, matched_model) if matched_model else headline
-    sentences = (told, _elsewhere(lines), _speeds(found, equal_ms), _losses(found))
-    return Verdict(headline, tuple(filter(None, sentences)))
+        time = "" if first.ms is None else f"It takes {first.ms:.1f}{_SPACE}ms a frame."
+        headline = f"{first.label} has a {error_name(results)} of {_mm(first.error)}"
+        return Summary(headline, tuple(filter(None, (time, _losses(found)))))
+    winners = _winners(results)
+    several = len(set(winners.values())) > 1
+    headline, sentence = _several_winners(results, winners) if several else _one_winner(results, found)
+    if matched_model:
+        headline += f", on a hand rendered from the model of {enumeration(matched_model)}"
+    sentences = (sentence, _without_truth(results), _times(found, equal_ms), _losses(found))
+    return Summary(headline, tuple(filter(None, sentences)))
 
 
-def _matched_model(headline: str, first: str, matched_model: Sequence[str]) -> str:
-    """The headline of a comparison on the home ground of some trackers; `first` is the closest."""
-    if not headline.startswith(f"{first} follows"):
-        return f"{headline}, on the home ground of {listed(matched_model)}"
-    ground = "its home ground" if list(matched_model) == [first] else f"the home ground of {listed(matched_model)}"
-    return f"On {ground}, {headline}"
-
-
-def _clear(lines: Sequence[TrackerResult], found: Sequence[Standing]) -> tuple[str, str]:
-    """One tracker is closest on every recording, or several are alike."""
-    first, *others = [standing for standing in found if np.isfinite(standing.error)]
-    against = [f"{standing.label}'s {_mm(standing.error)}" for standing in others]
-    told = f"{first.label}'s {error_name(lines)} is {_mm(first.error)}{where(lines)}"
-    told += f", {listed(against)}." if against else "."
-    alike = [standing.label for standing in found if standing.error < ALIKE * first.error]
-    if len(alike) > 1:
-        headline = f"{listed(alike)} follow the hand equally closely"
+def _one_winner(results: Sequence[TrackerResult], found: Sequence[TrackerSummary]) -> tuple[str, str]:
+    """Return headline and sentence if one tracker has the smallest error on every recording."""
+    first, *others = [tracker for tracker in found if np.isfinite(tracker.error)]
+    against = [f"{tracker.label}'s {_mm(tracker.error)}" for tracker in others]
+    sentence = f"{first.label}'s {error_name(results)} is {_mm(first.error)}{recording_scope(results)}"
+    sentence += f", {enumeration(against)}." if against else "."
+    equal = [tracker.label for tracker in found if tracker.error < TIE_FACTOR * first.error]
+    if len(equal) > 1:
+        headline = f"{enumeration(equal)} are equally accurate"
     elif len(found) == 2:
-        headline = f"{first.label} follows the hand more closely than {found[1].label}"
+        headline = f"{first.label} is more accurate than {found[1].label}"
     else:
-        headline = f"{first.label} follows the hand most closely of {_count(len(found))} trackers"
-    # Elsewhere, it may be otherwise.
-    headline = headline if _all_judged(lines) else f"Where the truth is known, {headline}"
-    return headline, told
+        headline = f"{first.label} is the most accurate of {_count(len(found))} trackers"
+    headline = headline if _all_ranked(results) else f"On recordings with ground truth, {headline}"
+    return headline, sentence
 
 
-def _split(lines: Sequence[TrackerResult], winners: dict[str, str]) -> tuple[str, str]:
-    """Different trackers are closest on different recordings: `winners` by the recordings' paths."""
-    labels = list(dict.fromkeys(line.label for line in lines))
-    headline = f"{'Neither' if len(labels) == 2 else 'No'} tracker is the closest everywhere"
+def _several_winners(results: Sequence[TrackerResult], winners: dict[str, str]) -> tuple[str, str]:
+    """Return headline and sentence if the most accurate tracker differs between recordings."""
+    labels = list(dict.fromkeys(result.label for result in results))
+    headline = f"{'Neither' if len(labels) == 2 else 'No'} tracker is the most accurate on every recording"
     if len(winners) > _MOST_NAMED:
         counts = {label: list(winners.values()).count(label) for label in labels}
         ordered = sorted((label for label in labels if counts[label]), key=lambda label: -counts[label])
         parts = [f"{label} on {counts[label]}" for label in ordered]
-        return headline, f"Of {len(winners)} recordings, the closest is {listed(parts)}."
+        return headline, f"Of {len(winners)} recordings, the most accurate is {enumeration(parts)}."
     parts = []
     for source, label in winners.items():
-        own = [line for line in lines if line.source == source]
-        best = next(line for line in own if line.label == label)
-        told = f"{_mm(_error(best, lines) or 0)} {_name(best)}"
+        own = [result for result in results if result.source == source]
+        best = next(result for result in own if result.label == label)
+        values = f"{_mm(_error(best, results) or 0)} {_name(best)}"
         if len(labels) == 2:
-            other = next((line for line in own if line.label != label), None)
-            error = None if other is None else _error(other, lines)
-            told += "" if other is None or error is None else f"; {other.label} {_mm(error)}"
-        parts.append(f"{label} on {best.recording} ({told})")
-    return headline, f"Closest are {listed(parts)}."
+            other = next((result for result in own if result.label != label), None)
+            error = None if other is None else _error(other, results)
+            values += "" if other is None or error is None else f"; {other.label} {_mm(error)}"
+        parts.append(f"{label} on {best.recording} ({values})")
+    return headline, f"The most accurate are {enumeration(parts)}."
 
 
-def _elsewhere(lines: Sequence[TrackerResult]) -> str:
-    """What E3D says of recordings that know no truth, beside others that do."""
-    blind = [line for line in lines if judged_by(lines) != "e3d_mm" and line.truth is None]
-    judged = _winners([line for line in blind if line.source not in {each.source for each in lines if each.truth}])
-    if not judged:
+def _without_truth(results: Sequence[TrackerResult]) -> str:
+    """Return the E3D ranking of recordings without ground truth, if others have it."""
+    unknown = [result for result in results if error_metric(results) != "e3d_mm" and result.truth is None]
+    with_truth = {result.source for result in results if result.truth}
+    winners = _winners([result for result in unknown if result.source not in with_truth])
+    if not winners:
         return ""
-    counts = {label: list(judged.values()).count(label) for label in dict.fromkeys(judged.values())}
-    told = listed([f"{label} on {count}" for label, count in sorted(counts.items(), key=lambda pair: -pair[1])])
-    return f"Where no truth is known, the sensor's points lie nearest to {told} of {len(judged)}."
+    counts = {label: list(winners.values()).count(label) for label in dict.fromkeys(winners.values())}
+    parts = [f"{label} on {count}" for label, count in sorted(counts.items(), key=lambda pair: -pair[1])]
+    return f"Of the recordings without ground truth, the lowest E3D is that of {enumeration(parts)} of {len(winners)}."
 
 
-def _winners(lines: Sequence[TrackerResult]) -> dict[str, str]:
-    """The label of the closest tracker on each recording that can be judged, by the recording's path."""
+def _winners(results: Sequence[TrackerResult]) -> dict[str, str]:
+    """Return the label of the most accurate tracker by the path of each ranked recording."""
     found: dict[str, tuple[float, str]] = {}
-    for line in lines:
-        error = _error(line, lines)
-        if error is not None and (line.source not in found or error < found[line.source][0]):
-            found[line.source] = (error, line.label)
+    for result in results:
+        error = _error(result, results)
+        if error is not None and (result.source not in found or error < found[result.source][0]):
+            found[result.source] = (error, result.label)
     return {source: label for source, (_, label) in found.items()}
 
 
-def _all_judged(lines: Sequence[TrackerResult]) -> bool:
-    """Whether every recording says how close trackers are."""
-    return set(_winners(lines)) == {line.source for line in lines}
+def _all_ranked(results: Sequence[TrackerResult]) -> bool:
+    """Return whether every recording ranks the trackers."""
+    return set(_winners(results)) == {result.source for result in results}
 
 
-def _error(line: TrackerResult, lines: Sequence[TrackerResult]) -> float | None:
-    """What a line is judged by, mm: its error; where no recording knows a truth, its E3D."""
-    return line.figure("e3d_mm", "median") if judged_by(lines) == "e3d_mm" else line.error("mean")
+def _error(result: TrackerResult, results: Sequence[TrackerResult]) -> float | None:
+    """Return the error that ranks a result, mm: E3D if no recording has ground truth."""
+    return result.figure("e3d_mm", "median") if error_metric(results) == "e3d_mm" else result.error("mean")
 
 
-def _name(line: TrackerResult) -> str:
-    return ERRORS[line.truth or "e3d_mm"]
+def _name(result: TrackerResult) -> str:
+    return ERRORS[result.truth or "e3d_mm"]
 
 
-def _speeds(found: Sequence[Standing], equal_ms: float | None) -> str:
-    timed = sorted(((s.ms, s.label) for s in found if s.ms is not None), key=lambda pair: pair[0])
+def _times(found: Sequence[TrackerSummary], equal_ms: float | None) -> str:
+    timed = sorted(((t.ms, t.label) for t in found if t.ms is not None), key=lambda pair: pair[0])
     if len(timed) < 2:
         return ""
-    told = listed([f"{label} {ms:.1f}{_SPACE}ms" for ms, label in timed])
+    times = enumeration([f"{label} {ms:.1f}{_SPACE}ms" for ms, label in timed])
     if equal_ms is not None:
-        return f"Each was given {equal_ms:g}{_SPACE}ms a frame; taken were: {told}."
+        return f"The time budget was {equal_ms:g}{_SPACE}ms a frame; measured: {times}."
     (fast, quickest), (slow, slowest) = timed[0], timed[-1]
-    if fast <= 0 or slow < ALIKE * fast:
-        return f"They take the same time a frame: {told}."
+    if fast <= 0 or slow < TIE_FACTOR * fast:
+        return f"They take the same time a frame: {times}."
     if len(timed) == 2:
         return f"{quickest} is faster: {fast:.1f}{_SPACE}ms a frame, {slowest} {slow:.1f}{_SPACE}ms."
-    return f"{quickest} is the fastest: {told} a frame."
+    return f"{quickest} is the fastest: {times} a frame."
 
 
-def _losses(found: Sequence[Standing]) -> str:
-    if all(standing.lost == 0 for standing in found):
+def _losses(found: Sequence[TrackerSummary]) -> str:
+    if all(tracker.lost == 0 for tracker in found):
         return "The hand was never lost."
-    lost = [f"{s.label} in {s.lost} of {s.frames} frames" for s in found if s.lost]
-    never = [s.label for s in found if not s.lost]
-    return f"The hand was lost by {listed(lost)}" + (f"; never by {listed(never)}." if never else ".")
+    lost = [f"{t.label} in {t.lost} of {t.frames} frames" for t in found if t.lost]
+    never = [t.label for t in found if not t.lost]
+    return f"The hand was lost by {enumeration(lost)}" + (f"; never by {enumeration(never)}." if never else ".")
 
 
 def _mm(value: float) -> str:
@@ -206,8 +209,8 @@ def _mm(value: float) -> str:
     return f"{number}{_SPACE}mm"
 
 
-def listed(parts: Sequence[str]) -> str:
-    """The parts as a sentence lists them."""
+def enumeration(parts: Sequence[str]) -> str:
+    """Join parts by commas and a final "and"."""
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 

@@ -1,4 +1,4 @@
-"""Overlays: what each tracker says of a frame, drawn on it side by side, close on the hand."""
+"""Close-up overlays of all trackers' poses on a frame, side by side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,17 +28,17 @@ from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.theme import Rgb
 
 _TRUE: Rgb = (255, 255, 255)
-_SIDE_ROOM = 1.15
-"""Half the width of a region over how far the hand reaches to a side."""
+_SIDE_MARGIN = 1.15
+"""Half the width of a region, relative to the hand's largest horizontal distance from its middle."""
 _MOST_BESIDE = 3
-"""More panels than this go into two rows."""
+"""Panels in one row; more are arranged in two rows."""
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """A tracker's run, where to find a frame in it, and the figure that its frames are told by."""
+    """A tracker's run with its rows by frame index and the metric of its caption."""
 
-    shown: TrackerSeries
+    series: TrackerSeries
     replay: Replay
     row_of: dict[int, int]
     values: Array
@@ -46,27 +46,34 @@ class _Panel:
 
 
 class SideBySide:
-    """Paints frames of one recording with the first run of every tracker, all through the same region."""
+    """Images of a recording's frames with the first run of every tracker, in one crop."""
 
     def __init__(
-        self, shown: Sequence[TrackerSeries], metric: str, height: int = 300, sequence: Path | None = None
+        self, series: Sequence[TrackerSeries], metric: str, height: int = 300, sequence: Path | None = None
     ) -> None:
-        """`metric` is written under each picture. Raises InputError where the recording cannot be opened any more."""
+        """Open the recording; captions show `metric`.
+
+        height: of a panel, pixels.
+        sequence: the recording's present path, if it was moved.
+        Raises: InputError if the recording cannot be opened.
+        """
         self._height = height
-        self._panels = [_panel(each, metric, sequence) for each in shown]
+        self._panels = [_panel(each, metric, sequence) for each in series]
         self._surfaces = [panel.replay.surface() for panel in self._panels]
         self.sequence = self._panels[0].replay.sequence
         self.indices = sorted(set().union(*(panel.row_of for panel in self._panels)))
         keypoints = self._keypoints()
         known = np.asarray(np.isfinite(keypoints).all(axis=(1, 2)), dtype=np.bool_)
-        regions = _narrowed(close_up_regions(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known)
+        regions = _narrowed(
+            close_up_regions(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known
+        )
         self._regions = dict(zip(self.indices, regions, strict=True))
         depths = keypoints[known, :, 2]
         near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
         self._range = max(near - 0.06, 0.05), far + 0.1
 
     def picture(self, frame: Frame) -> Image:
-        """All trackers' panels of a frame, each under its tracker's name and error."""
+        """Return all trackers' panels of a frame (h, w, 3), each with its tracker's name and error."""
         tiles = [self._tile(k, frame) for k in range(len(self._panels))]
         return tile_grid(tiles, columns=len(tiles) if len(tiles) <= _MOST_BESIDE else -(-len(tiles) // 2))
 
@@ -75,9 +82,9 @@ class SideBySide:
         status = None if row is None else panel.replay.run.status[row]
         note = "not tracked" if status is None else "" if status.is_trusted else status
         value = np.nan if row is None else panel.values[row]
-        told = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
-        remark = "  ·  ".join(filter(None, (told, note)))
-        colour = tracker_colour(panel.shown.number).rgb
+        error = f"{value:.1f} {panel.unit}".strip() if np.isfinite(value) else ""
+        remark = "  ·  ".join(filter(None, (error, note)))
+        colour = tracker_colour(panel.series.number).rgb
         close = AnnotatedFrame(frame).cropped(self._regions[frame.index])
         image = draw_layer(close, "colour", self._height, *self._range)
         pose = None if row is None else panel.replay.run.poses[row]
@@ -87,10 +94,10 @@ class SideBySide:
             image = _outlined(draw_surface(image, surface, 0.35), surface, colour)
             image = self._with_truth(image, close)
             image = draw_skeleton(image, camera, self._surfaces[k].model.keypoints(pose))
-        return captioned(image, panel.shown.label, remark, colour)
+        return captioned(image, panel.series.label, remark, colour)
 
     def _with_truth(self, image: Image, close: AnnotatedFrame) -> Image:
-        """The image with the true skeleton in thin white lines, which the tracker's covers where it is right."""
+        """Draw the true skeleton in thin white lines, below the tracker's skeleton."""
         truth = true_keypoints(self.sequence.ground_truth, close.frame.timestamp)
         if truth is None:
             return image
@@ -104,21 +111,24 @@ class SideBySide:
         return out
 
     def _keypoints(self) -> Array:
-        """Where the hand is (N, 21, 3) in each of `indices`: the truth, else the trackers' median; NaN unknown."""
+        """Return the keypoints (N, 21, 3), metres, camera frame, of `indices`.
+
+        They are ground truth if known, else the median of the trackers, else NaN.
+        """
         found = np.full((len(self.indices), len(self._panels) + 1, 21, 3), np.nan)
         times = self.sequence.timestamps
         for n, index in enumerate(self.indices):
             truth = true_keypoints(self.sequence.ground_truth, float(times[index]))
             if truth is not None and np.isfinite(truth).all():
                 found[n, :] = truth
-        place = {index: n for n, index in enumerate(self.indices)}
-        untold = np.isnan(found[:, -1, 0, 0])
+        row_of = {index: n for n, index in enumerate(self.indices)}
+        without_truth = np.isnan(found[:, -1, 0, 0])
         for k, panel in enumerate(self._panels):
             run = panel.replay.run
             keypoints = HandModel(panel.replay.hand).keypoints(run.poses)
             keypoints[[status is Status.LOST for status in run.status]] = np.nan
-            places = np.array([place[int(index)] for index in run.index], dtype=np.intp)
-            found[places, k] = np.where(untold[places, None, None], keypoints, found[places, k])
+            rows = np.array([row_of[int(index)] for index in run.index], dtype=np.intp)
+            found[rows, k] = np.where(without_truth[rows, None, None], keypoints, found[rows, k])
         out = np.full((len(self.indices), 21, 3), np.nan)
         known = np.isfinite(found).all(axis=(2, 3))
         some = known.any(axis=1)
@@ -126,28 +136,28 @@ class SideBySide:
         return out
 
 
-def _panel(shown: TrackerSeries, metric: str, sequence: Path | None) -> _Panel:
-    evaluation: Evaluation = shown.line.evaluations[0]
+def _panel(series: TrackerSeries, metric: str, sequence: Path | None) -> _Panel:
+    evaluation: Evaluation = series.result.evaluations[0]
     replay = Replay.open(evaluation.run, sequence)
     found = figures_of(evaluation).get(metric)
     values = np.full(evaluation.frames, np.nan) if found is None else found.values
     unit = "" if found is None else found.unit
-    return _Panel(shown, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
+    return _Panel(series, replay, {int(index): row for row, index in enumerate(evaluation.run.index)}, values, unit)
 
 
 def _narrowed(regions: list[Rect], camera: Camera, keypoints: Array, known: Mask) -> list[Rect]:
-    """The regions (N) without what the hand leaves empty at both sides, though never higher than wide."""
+    """Crop the empty margins at both sides of the regions, to a square at most."""
     height, width = regions[0].shape
     if not known.any() or width <= height:
         return regions
     middles = np.array([region.left + width / 2 for region in regions])
-    reach = np.abs(camera.project(keypoints[known])[..., 0] - middles[known, None]).max(axis=1)
-    narrow = min(width, max(height, round(2 * _SIDE_ROOM * float(np.percentile(reach, 98)))))
+    extent = np.abs(camera.project(keypoints[known])[..., 0] - middles[known, None]).max(axis=1)
+    narrow = min(width, max(height, round(2 * _SIDE_MARGIN * float(np.percentile(extent, 98)))))
     return [Rect.of_size(region.left + (width - narrow) // 2, region.top, narrow, height) for region in regions]
 
 
 def _outlined(image: Image, surface: RenderedSurface, colour: Rgb) -> Image:
-    """`image` with the rim of the surface in a colour."""
+    """Draw the outline of a rendered surface in a colour."""
     hit = (surface.label >= 0).astype(np.uint8)
     rim = cv2.dilate(hit, np.ones((3, 3), dtype=np.uint8)) - cv2.erode(hit, np.ones((3, 3), dtype=np.uint8))
     out = image.copy()

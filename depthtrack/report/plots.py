@@ -1,4 +1,4 @@
-"""The plots of the page, as SVG that takes its colours and letters from the page around it."""
+"""The plots of the page, as SVG that inherits colours and fonts from the page."""
 
 import re
 from collections.abc import Sequence
@@ -12,12 +12,19 @@ from matplotlib.figure import Figure
 
 from depthtrack.evaluation.metrics.success import LIMIT_MM
 from depthtrack.hand.pose import FINGERS
-from depthtrack.report.colours import FAINT, GRID, INK, PAPER, stand_in, with_variables
-from depthtrack.report.series import TrackerSeries, finger_errors, over_time, shares, stage_medians, top_of_scale
+from depthtrack.report.colours import FAINT, GRID, INK, PAPER, placeholder, with_variables
+from depthtrack.report.series import (
+    TrackerSeries,
+    axis_limit,
+    finger_errors,
+    metric_curve,
+    stage_medians,
+    success_curve,
+)
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
-    # The same figures give the same page.
+    # Makes the SVG reproducible.
     "svg.hashsalt": "depthtrack",
     "text.parse_math": False,
     "font.size": 8.5,
@@ -43,20 +50,20 @@ _STYLE: dict[Any, Any] = {
 }
 _WIDE, _THIRD = (10.6, 2.5), (3.4, 2.45)
 _DASHES = ("-", (0, (4, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)))
-"""Trackers differ in their dashes too, for print and for eyes that see no colour."""
+"""Trackers also differ in line style, for grey print and colour vision deficiency."""
 
 TIMELINE_FROM, TIMELINE_TO = 0.052, 0.992
-"""Where in the width of a plot over time its first and last second lie."""
+"""Positions of the first and the last second in a time plot, relative to its width."""
 
 
-def timeline(shown: Sequence[TrackerSeries], metric: str, unit: str, small: bool = False) -> tuple[str, str]:
-    """A metric of each tracker over time, and a remark on how it is drawn."""
+def timeline(series: Sequence[TrackerSeries], metric: str, unit: str, small: bool = False) -> tuple[str, str]:
+    """Return the SVG of a metric of each tracker over time, and a remark on how it is drawn."""
     with rc_context(_STYLE):
         figure, axes = _figure(_THIRD, left=0.13) if small else _figure(_WIDE, TIMELINE_FROM, TIMELINE_TO, 0.19)
-        curves = [over_time(each.line, metric) for each in shown]
-        for each, curve in zip(shown, curves, strict=True):
-            colour, style = _look(each.number)
-            if len(each.line.evaluations) > 1:
+        curves = [metric_curve(each.result, metric) for each in series]
+        for each, curve in zip(series, curves, strict=True):
+            colour, style = _line_style(each.number)
+            if len(each.result.evaluations) > 1:
                 axes.fill_between(curve.seconds, curve.low, curve.high, color=colour, alpha=0.18, lw=0)
             axes.plot(curve.seconds, curve.median, color=colour, linestyle=style, lw=1.3)
             _mark_losses(axes, each)
@@ -66,28 +73,28 @@ def timeline(shown: Sequence[TrackerSeries], metric: str, unit: str, small: bool
         if metric == "silhouette_iou":
             axes.set_ylim(min(0.5, min(float(np.nanmin([*c.low, 1.0])) for c in curves)), 1)
         else:
-            top, largest = top_of_scale(curves)
+            top, largest = axis_limit(curves)
             axes.set_ylim(0, top)
             if largest > top:
-                remarks.append(f"peaks up to {largest:.0f} {unit} are cut off")
-        if (each_of := max(curve.worst_of for curve in curves)) > 1:
-            remarks.append(f"every point shows the worst of {each_of} frames")
-        if any(len(each.line.evaluations) > 1 for each in shown):
-            remarks.append("line: median over the runs; band: all of them")
-        if any(each.line.lost for each in shown):
-            remarks.append("ticks below: frames that the tracker itself gave up as lost")
+                remarks.append(f"peaks up to {largest:.0f} {unit} are clipped")
+        if (frames := max(curve.frames_per_point for curve in curves)) > 1:
+            remarks.append(f"each point is the worst of {frames} frames")
+        if any(len(each.result.evaluations) > 1 for each in series):
+            remarks.append("line: median of the runs; band: their range")
+        if any(each.result.lost for each in series):
+            remarks.append("ticks below: frames that the tracker lost")
         return _svg(figure, f"{metric} over time"), "; ".join(remarks)
 
 
-def share_curves(shown: Sequence[TrackerSeries]) -> str | None:
-    """The share of frames under each threshold; None where nothing can be judged."""
-    curves = [(each, curve) for each in shown if (curve := shares(each.line)) is not None]
+def share_curves(series: Sequence[TrackerSeries]) -> str | None:
+    """Return the SVG of the share of frames under each threshold; None without errors and E3D."""
+    curves = [(each, curve) for each in series if (curve := success_curve(each.result)) is not None]
     if not curves:
         return None
     with rc_context(_STYLE):
         figure, axes = _figure(_THIRD, left=0.13)
         for each, (thresholds, share) in curves:
-            colour, style = _look(each.number)
+            colour, style = _line_style(each.number)
             axes.plot(thresholds, 100 * share, color=colour, linestyle=style)
         limit = float(curves[0][1][0][-1])
         axes.set(xlim=(0, limit), ylim=(0, 101), xlabel="threshold, mm", ylabel="frames, %")
@@ -95,29 +102,29 @@ def share_curves(shown: Sequence[TrackerSeries]) -> str | None:
         return _svg(figure, "share of frames under a threshold")
 
 
-def finger_bars(shown: Sequence[TrackerSeries]) -> str | None:
-    """Mean error of each finger, with a mark at its 95th percentile; None without a truth."""
-    errors = [(each, found) for each in shown if (found := finger_errors(each.line))]
+def finger_bars(series: Sequence[TrackerSeries]) -> str | None:
+    """Return the SVG of each finger's mean error and 95th percentile; None without ground truth."""
+    errors = [(each, found) for each in series if (found := finger_errors(each.result))]
     if not errors:
         return None
     with rc_context(_STYLE):
         figure, axes = _figure(_THIRD, left=0.1)
         width = 0.8 / len(errors)
         for k, (each, found) in enumerate(errors):
-            places = np.arange(len(FINGERS)) + (k - (len(errors) - 1) / 2) * width
+            x = np.arange(len(FINGERS)) + (k - (len(errors) - 1) / 2) * width
             means, tails = (np.array([found.get(finger, (np.nan, np.nan))[j] for finger in FINGERS]) for j in (0, 1))
-            axes.bar(places, means, width=0.86 * width, color=stand_in(each.number))
-            axes.vlines(places, means, tails, color=stand_in(each.number), lw=1)
-            axes.plot(places, tails, "_", color=stand_in(each.number), ms=5)
+            axes.bar(x, means, width=0.86 * width, color=placeholder(each.number))
+            axes.vlines(x, means, tails, color=placeholder(each.number), lw=1)
+            axes.plot(x, tails, "_", color=placeholder(each.number), ms=5)
         axes.set(ylabel="mm", ylim=(0, None))
         axes.set_xticks(range(len(FINGERS)), FINGERS)
         axes.tick_params(axis="x", length=0)
         return _svg(figure, "error of each finger")
 
 
-def stage_bars(shown: Sequence[TrackerSeries]) -> str | None:
-    """What a frame's time goes to: a bar a tracker, its stages one after another; None where no times were kept."""
-    stages = [(each, found) for each in shown if (found := stage_medians(each.line))]
+def stage_bars(series: Sequence[TrackerSeries]) -> str | None:
+    """Return the SVG of the time per stage as stacked bars; None without stored times."""
+    stages = [(each, found) for each in series if (found := stage_medians(each.result))]
     if not stages:
         return None
     with rc_context(_STYLE | {"axes.grid.axis": "x"}):
@@ -127,7 +134,9 @@ def stage_bars(shown: Sequence[TrackerSeries]) -> str | None:
             left = 0.0
             for k, (stage, ms) in enumerate(found.items()):
                 alpha = 1 - 0.55 * k / max(1, len(found) - 1)
-                axes.barh(row, ms, left=left, height=0.34, color=stand_in(each.number), alpha=alpha, ec=PAPER, lw=0.8)
+                axes.barh(
+                    row, ms, left=left, height=0.34, color=placeholder(each.number), alpha=alpha, ec=PAPER, lw=0.8
+                )
                 if ms > 0.11 * longest:
                     axes.text(left + ms / 2, row + 0.3, stage, ha="center", va="center", fontsize=7.5, color=FAINT)
                 left += ms
@@ -138,8 +147,8 @@ def stage_bars(shown: Sequence[TrackerSeries]) -> str | None:
 
 
 def _mark_losses(axes: Axes, each: TrackerSeries) -> None:
-    """A tick at the bottom for every frame that was lost, in any run."""
-    for evaluation in each.line.evaluations:
+    """Draw a tick at the bottom for every lost frame of any run."""
+    for evaluation in each.result.evaluations:
         lost = np.nonzero(evaluation.losses.lost)[0]
         if len(lost):
             times = evaluation.run.timestamps
@@ -149,7 +158,7 @@ def _mark_losses(axes: Axes, each: TrackerSeries) -> None:
                 at,
                 np.full(len(at), height),
                 "|",
-                color=stand_in(each.number),
+                color=placeholder(each.number),
                 ms=5,
                 transform=axes.get_xaxis_transform(),
             )
@@ -160,18 +169,18 @@ def _figure(inches: tuple[float, float], left: float, right: float = 0.98, botto
     return figure, figure.add_axes((left, bottom, right - left, 0.95 - bottom))
 
 
-def _look(number: int) -> tuple[str, Any]:
-    return stand_in(number), _DASHES[number % len(_DASHES)]
+def _line_style(number: int) -> tuple[str, Any]:
+    return placeholder(number), _DASHES[number % len(_DASHES)]
 
 
 def _svg(figure: Figure, about: str) -> str:
-    """The figure as an inline SVG element that fills the width it is given."""
+    """Return a figure as an inline SVG element that fills the available width."""
     text = StringIO()
     figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.DOTALL)
-    # Groups need no names, which would come again in the next plot.
+    # Identifiers of groups would not be unique in a page with several plots.
     svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
     svg = re.sub(r"<svg [^>]*?viewBox=\"([^\"]*)\"[^>]*>", rf'<svg viewBox="\1" role="img" aria-label="{about}">', svg)
     svg = svg.replace("xlink:href", "href")

@@ -1,4 +1,4 @@
-"""What a reader must know to trust or repeat the figures: recordings, hands, cameras, options, machines."""
+"""Provenance of the results: recordings, hands, cameras, options, versions and machines."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,34 +6,37 @@ from typing import Any
 from depthtrack.evaluation.compare.results import TrackerResult
 from depthtrack.evaluation.compare.specs import label_of as tracker_label
 from depthtrack.recording.sequence import Sequence as Recording
-from depthtrack.report.narrative import listed
+from depthtrack.report.narrative import enumeration
 
 Fact = tuple[str, str]
+"""Name and value."""
 
 _MOST_CHARACTERS = 160
 
 
-def facts_of_recording(recording: Recording, line: TrackerResult) -> list[Fact]:
-    """Length, camera, hand, and how the recording was made, as far as it says."""
-    camera, hand = recording.camera, line.evaluations[0].configuration.hand
+def recording_facts(recording: Recording, result: TrackerResult) -> list[Fact]:
+    """Return the recording's length, ground truth, camera, hand and synthesis options."""
+    camera, hand = recording.camera, result.evaluations[0].configuration.hand
     times = recording.timestamps
     seconds = float(times[-1] - times[0]) if len(times) > 1 else 0.0
     truth = recording.ground_truth
     known = "none" if truth is None else "poses" if truth.poses is not None else "annotated joints"
-    frames = f"{line.evaluations[0].frames} of {len(recording)}, {seconds:.1f} s in all"
-    made = ", ".join(f"{name} {_plain(value)}" for name, value in recording.description.items() if _says(value))
+    frames = f"{result.evaluations[0].frames} of {len(recording)}, which last {seconds:.1f} s"
+    made = ", ".join(f"{name} {_plain(value)}" for name, value in recording.description.items() if _is_plain(value))
     return [
         ("frames", frames),
         ("ground truth", known),
         ("camera", f"{camera.width} × {camera.height}, fx {camera.fx:.1f}, fy {camera.fy:.1f}"),
         ("hand", ", ".join(f"{name} {_plain(hand[name])}" for name in ("side", "scale", "source") if name in hand)),
-        *([("made by", made)] if made else []),
+        *([("description", made)] if made else []),
     ]
 
 
-def facts_of_tracker(label: str, lines: Sequence[TrackerResult]) -> list[Fact]:
-    """Tracker, options, seeds, versions and machine; values that differ between runs are told side by side."""
-    runs = [evaluation.configuration for line in lines if line.label == label for evaluation in line.evaluations]
+def tracker_facts(label: str, results: Sequence[TrackerResult]) -> list[Fact]:
+    """Return tracker, options, seeds, versions and machine, with all values of the runs."""
+    runs = [
+        evaluation.configuration for result in results if result.label == label for evaluation in result.evaluations
+    ]
     contexts = [run.context for run in runs]
     budgets = [context["budget"] for context in contexts if isinstance(context.get("budget"), dict)]
     facts = [
@@ -46,47 +49,52 @@ def facts_of_tracker(label: str, lines: Sequence[TrackerResult]) -> list[Fact]:
     ]
     if budgets:
         times = [budget.get("calibrated_ms") for budget in budgets]
-        found = _together([f"{ms} ms" if ms is not None else "no hand found, so not" for ms in times])
-        facts.insert(
-            2, ("equal time", f"{_together([b.get('equal_ms') for b in budgets])} ms asked, {found} calibrated")
-        )
+        measured = _together([f"{ms} ms" if ms is not None else "not measured (no hand found)" for ms in times])
+        budget = _together([b.get("equal_ms") for b in budgets])
+        facts.insert(2, ("equal time", f"budget {budget} ms, calibration {measured}"))
     return [(name, text) for name, text in facts if text]
 
 
-def bias_warning(description: Mapping[str, Any], lines: Sequence[TrackerResult]) -> str:
-    """Return a warning if a synthetic hand was drawn from the model that some trackers fit, and others do not."""
-    favoured = matched_model(description, lines)
-    others = [label for label in dict.fromkeys(line.label for line in lines) if label not in favoured]
+def bias_warning(description: Mapping[str, Any], results: Sequence[TrackerResult]) -> str:
+    """Return a warning if the hand was rendered from the model that only some trackers fit."""
+    favoured = matched_model(description, results)
+    others = [label for label in dict.fromkeys(result.label for result in results) if label not in favoured]
     if not favoured:
         return ""
-    names = {"skin": "the skin", "primitives": "the spheres and cylinders"}
-    hand = names.get(_drawn_surface(description), "the rigged mesh")
+    names = {"skin": "the skin model", "primitives": "the model of spheres and cylinders"}
+    hand = names.get(_rendered_model(description), "the rigged mesh")
     fit, do = ("fits" if len(favoured) == 1 else "fit"), ("does" if len(others) == 1 else "do")
-    first, rest = listed(favoured), listed(others)
-    return f"Home ground: the hand was drawn from {hand} that {first} {fit}, and {rest} {do} not."
+    return (
+        f"Biased comparison: the hand was rendered from {hand} that {enumeration(favoured)} {fit} "
+        f"and {enumeration(others)} {do} not."
+    )
 
 
-def matched_model(description: Mapping[str, Any], lines: Sequence[TrackerResult]) -> tuple[str, ...]:
-    """Return the trackers that fit the model that a synthetic hand was drawn from, if others fit another; else none."""
-    drawn = _drawn_surface(description)
-    if not drawn:
+def matched_model(description: Mapping[str, Any], results: Sequence[TrackerResult]) -> tuple[str, ...]:
+    """Return the trackers that fit the model of the rendered hand; empty if all do."""
+    rendered = _rendered_model(description)
+    if not rendered:
         return ()
-    labels = dict.fromkeys(line.label for line in lines)
-    favoured = tuple(label for label in labels if all(_surface(line) == drawn for line in lines if line.label == label))
+    labels = dict.fromkeys(result.label for result in results)
+    favoured = tuple(
+        label
+        for label in labels
+        if all(_fitted_model(result) == rendered for result in results if result.label == label)
+    )
     return favoured if len(favoured) < len(labels) else ()
 
 
-def _drawn_surface(description: Mapping[str, Any]) -> str:
-    """Return "skin", "primitives" or the digest of the rig that a synthetic hand was drawn from; else ""."""
+def _rendered_model(description: Mapping[str, Any]) -> str:
+    """Return the model of a synthetic hand: "skin", "primitives" or a rig's digest; else ""."""
     model = description.get("model")
     if model == "rig":
         return str(description.get("sha256", ""))
     return str(model) if model in ("skin", "primitives") else ""
 
 
-def _surface(line: TrackerResult) -> str:
-    """Return the surface that the line's tracker fits: see `_drawn_surface`."""
-    configuration = line.evaluations[0].configuration
+def _fitted_model(result: TrackerResult) -> str:
+    """Return the model that the result's tracker fits; see `_rendered_model`."""
+    configuration = result.evaluations[0].configuration
     rig = configuration.hand.get("rig")
     if configuration.surface == "cylinders":
         return "primitives"
@@ -103,7 +111,7 @@ def _pairs(value: Any) -> str | None:
     return ", ".join(f"{name} {part}" for name, part in value.items()) if isinstance(value, dict) else None
 
 
-def _says(value: Any) -> bool:
+def _is_plain(value: Any) -> bool:
     return isinstance(value, str | int | float) and value not in ("", None)
 
 

@@ -1,4 +1,4 @@
-"""The page's table: a row a tracker and recording, the best of each recording marked."""
+"""The page's table: one row per tracker and recording, with the best values marked."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from depthtrack.report.series import TrackerSeries
 
 @dataclass(frozen=True)
 class TableCell:
-    """A figure as text, and whether it is the best of its recording."""
+    """A value as text, and whether it is the best of its recording."""
 
     text: str
     best: bool
@@ -17,43 +17,43 @@ class TableCell:
 
 @dataclass(frozen=True)
 class TableRow:
-    """A tracker on a recording; `first` of its recording, which has `of` rows."""
+    """A tracker on a recording; the first row of a recording spans `row_count` rows."""
 
-    shown: TrackerSeries
+    series: TrackerSeries
     cells: list[TableCell]
-    first: bool
-    of: int
+    is_first: bool
+    row_count: int
 
 
-def table_head(lines: Sequence[TrackerResult]) -> list[tuple[str, str]]:
-    """Headings and units."""
-    return [(column.heading, column.unit) for column in shown_columns(lines)]
+def table_head(results: Sequence[TrackerResult]) -> list[tuple[str, str]]:
+    """Return the headings and units of the columns."""
+    return [(column.heading, column.unit) for column in shown_columns(results)]
 
 
-def table_rows(shown: Sequence[TrackerSeries]) -> list[TableRow]:
-    """All rows, recordings together, in order."""
-    columns = shown_columns([each.line for each in shown])
+def table_rows(series: Sequence[TrackerSeries]) -> list[TableRow]:
+    """Return all rows, grouped by recording."""
+    columns = shown_columns([each.result for each in series])
     rows = []
-    for source in dict.fromkeys(each.line.source for each in shown):
-        group = [each for each in shown if each.line.source == source]
-        best = [_best(column, [each.line for each in group]) for column in columns]
+    for source in dict.fromkeys(each.result.source for each in series):
+        group = [each for each in series if each.result.source == source]
+        best = [_best(column, [each.result for each in group]) for column in columns]
         for number, each in enumerate(group):
             cells = [
-                TableCell(_text(column, each.line), best=value is not None and column.value(each.line) == value)
+                TableCell(_text(column, each.result), best=value is not None and column.value(each.result) == value)
                 for column, value in zip(columns, best, strict=True)
             ]
             rows.append(TableRow(each, cells, number == 0, len(group)))
     return rows
 
 
-def _best(column: Column, lines: Sequence[TrackerResult]) -> float | None:
-    """The best value of a column; None where it tells nothing apart."""
-    values = [value for line in lines if (value := column.value(line)) is not None]
+def _best(column: Column, results: Sequence[TrackerResult]) -> float | None:
+    """Return the best value of a column; None if all are equal."""
+    values = [value for result in results if (value := column.value(result)) is not None]
     if len(set(values)) < 2:
         return None
     return max(values) if column.higher_is_better else min(values)
 
 
-def _text(column: Column, line: TrackerResult) -> str:
-    value = column.value(line)
+def _text(column: Column, result: TrackerResult) -> str:
+    value = column.value(result)
     return "–" if value is None else format(value, column.form)

@@ -8,7 +8,10 @@ from depthtrack.viewing.annotated_frame import MaskEstimator
 
 
 def mask_estimator() -> MaskEstimator:
-    """Return an estimator for one pass over a recording, frames in order: it follows the hand between frames."""
+    """Return an estimator for one recording, to be called on its frames in order.
+
+    It tracks the hand's region from frame to frame.
+    """
     segmenter = Segmenter(SkinColourModel.default())
 
     def estimate(frame: Frame) -> Mask | None:

@@ -38,7 +38,7 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
         if replayed.row >= last:
             break
     if not tiles:
-        raise InputError(f"the run {replay.run.folder} holds no frame to show")
+        raise InputError(f"the run {replay.run.folder} has no frame to show: choose another run")
     grid = tile_grid(tiles, min(columns, len(tiles)))
     timeline = Timeline(replay.run.energy, replay.run.status, grid.shape[1])
     return framed(stacked([_title(replay, grid.shape[1]), grid, _legend(grid.shape[1]), timeline.image], gap=12))

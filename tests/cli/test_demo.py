@@ -31,7 +31,7 @@ def test_the_demo_makes_a_report_on_synthetic_recordings(tmp_path: Path, capsys:
     # The surface of each tracker occurs in one recording, and the page warns of it.
     kinds = {open_sequence(folder).description["model"] for folder in (out / "recordings").iterdir()}
     assert kinds == {"skin", "primitives"}
-    assert (out / "report.html").read_text().count("Home ground") == 2
+    assert (out / "report.html").read_text().count("Biased comparison") == 2
     # The same command makes nothing again.
     made = {path: path.stat().st_mtime_ns for path in (*out.glob("recordings/*/*"), *out.glob("runs/*/poses.csv"))}
     assert main(["demo", "-o", str(out), "--frames", "3", "--jobs", "1"]) == 0

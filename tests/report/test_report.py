@@ -1,7 +1,8 @@
-"""The report: what it says is what the runs hold, it needs nothing beside itself, and its size is bounded."""
+"""The report page: its text matches the runs, it is self-contained, and its size is bounded."""
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -14,20 +15,20 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.compare.results import TrackerResult, tracker_results
 from depthtrack.evaluation.evaluate import Evaluation, evaluate_run
 from depthtrack.recording import open_sequence
-from depthtrack.report import film as films
+from depthtrack.report import animation
+from depthtrack.report.animation import make_animation
 from depthtrack.report.build import write_report
-from depthtrack.report.film import film_of
-from depthtrack.report.narrative import standings, verdict
+from depthtrack.report.narrative import summary, tracker_summaries
 from depthtrack.report.pictures import SideBySide
 from depthtrack.report.provenance import bias_warning, matched_model
-from depthtrack.report.series import TrackerSeries, over_time, shares, top_of_scale, worst_frames
+from depthtrack.report.series import TrackerSeries, axis_limit, metric_curve, success_curve, worst_frames
 from tests.support.runs import synthesise, true_poses, write_run
 
 FRAMES = 8
 
 
 def shifted(poses: np.ndarray, mm: float, frames: slice = slice(None)) -> np.ndarray:
-    """Every endpoint off by as much: the error is known."""
+    """Return poses whose endpoint errors are exactly `mm`."""
     out = poses.copy()
     out[frames, 0] += mm / 1000
     return out
@@ -40,7 +41,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def runs(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Near, with two seeds, 2 and 4 mm off; and Far: 9 mm off, 20 in one frame, which it gave up."""
+    """Write runs Near (two seeds, errors 2 and 4 mm) and Far (9 mm; 20 mm in one lost frame)."""
     folder, poses = tmp_path_factory.mktemp("runs"), true_poses(recording)
     far = shifted(shifted(poses, 9), 11, slice(5, 6))
     return [
@@ -63,7 +64,7 @@ def page(evaluations: list[Evaluation], tmp_path_factory: pytest.TempPathFactory
 
 
 class Reader(HTMLParser):
-    """Text, links and the nesting of a page."""
+    """Parser of a page's text, links and nesting."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -83,40 +84,40 @@ class Reader(HTMLParser):
             self.text += f"{data.strip()} " if data.strip() else ""
 
 
-def test_the_page_says_who_is_closer_and_by_how_much(page: str) -> None:
+def test_the_page_states_the_more_accurate_tracker_and_the_errors(page: str) -> None:
     text = Reader(page).text.replace("\u00a0", " ")
-    assert "Near follows the hand more closely than Far <b>" in text
+    assert "Near is more accurate than Far <b>" in text
     # The median of the runs' means, 2 and 4 mm; and (7 * 9 + 20) / 8.
     assert "Near's mean endpoint error is 3.0 mm, Far <b>'s 10.4 mm." in text
     assert "The hand was lost by Far <b> in 1 of 8 frames; never by Near." in text
     assert "frame 5, 20.0 mm" in text
-    assert "Home ground" not in text
+    assert "Biased comparison" not in text
 
 
-def test_the_page_is_well_formed_and_needs_nothing_beside_itself(page: str) -> None:
+def test_the_page_is_well_formed_and_self_contained(page: str) -> None:
     reader = Reader(page)
     assert reader.open == []
     assert reader.links
     assert all(link.startswith(("data:image/", "#")) for link in reader.links)
     assert "default-src 'none'" in page
     assert "://" not in re.sub(r"data:image/\S+|http://www.w3.org/\S+", "", page)
-    # A label is text, whatever it holds, and no plot keeps a stand-in for a colour.
+    # Labels are escaped, and no placeholder of a colour remains.
     assert "Far <b>" not in page
     assert not re.search(r"#0[1-5]0[0-9a-f]0[1-5]", page)
     assert "var(--tracker-1)" in page
 
 
-def test_the_film_shows_every_moment_of_a_short_recording(page: str, recording: Path) -> None:
-    found = re.search(r'<script type="application/json" class="film">(.*?)</script>', page, re.DOTALL)
+def test_the_animation_has_images_in_the_order_of_the_recording(page: str, recording: Path) -> None:
+    found = re.search(r'<script type="application/json" class="animation">(.*?)</script>', page, re.DOTALL)
     assert found is not None
-    film = json.loads(found[1])
-    assert len(film["pictures"]) == len(film["seconds"])
+    animation = json.loads(found[1])
+    assert len(animation["images"]) == len(animation["seconds"])
     times = open_sequence(recording).timestamps
-    assert set(np.round(film["seconds"], 3)) <= set(np.round(times - times[0], 3))
-    assert film["seconds"] == sorted(film["seconds"])
+    assert set(np.round(animation["seconds"], 3)) <= set(np.round(times - times[0], 3))
+    assert animation["seconds"] == sorted(animation["seconds"])
 
 
-def test_the_same_runs_give_the_same_page_whoever_asks(
+def test_the_page_does_not_depend_on_the_order_of_the_runs(
     runs: list[Path], page: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["evaluate", *map(str, reversed(runs)), "--report", str(tmp_path / "again")]) == 0
@@ -125,15 +126,15 @@ def test_the_same_runs_give_the_same_page_whoever_asks(
     assert len(json.loads((tmp_path / "again" / "results.json").read_text())) == 3
 
 
-def test_json_stays_json_beside_a_report(runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_output_is_unchanged_by_a_report(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["evaluate", str(runs[0]), "--json", "--report", str(tmp_path)]) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == FRAMES
     assert (tmp_path / "report.html").exists()
 
 
-def test_without_a_truth_label_free_metrics_stand_in(recording: Path, tmp_path: Path) -> None:
-    import shutil
-
+def test_without_ground_truth_the_page_uses_label_free_metrics(recording: Path, tmp_path: Path) -> None:
     poses, blind = true_poses(recording), tmp_path / "blind"
     shutil.copytree(recording, blind)
     for file in ("hand_poses.csv", "joints.csv"):
@@ -142,20 +143,20 @@ def test_without_a_truth_label_free_metrics_stand_in(recording: Path, tmp_path: 
     bad = write_run(tmp_path / "bad", blind, shifted(poses, 15), label="Bad")
     write_report([evaluate_run(good), evaluate_run(bad)], tmp_path / "report.html")
     text = Reader((tmp_path / "report.html").read_text()).text
-    assert "Good follows the hand more closely than Bad" in text
+    assert "Good is more accurate than Bad" in text
     assert "median E3D" in text
-    assert "Agreement of silhouettes" in text
+    assert "Silhouette IoU" in text
     assert "Error of each finger" not in text
 
 
-def test_a_hand_that_was_never_found_still_gives_a_page(recording: Path, tmp_path: Path) -> None:
+def test_a_run_without_a_found_hand_gives_a_page(recording: Path, tmp_path: Path) -> None:
     poses = true_poses(recording)
     absent = write_run(tmp_path / "absent", recording, poses[:3], dict.fromkeys(range(3), "absent"))
     write_report([evaluate_run(absent)], tmp_path / "report.html")
-    assert "No tracker followed the hand" in Reader((tmp_path / "report.html").read_text()).text
+    assert "No tracker found the hand" in Reader((tmp_path / "report.html").read_text()).text
 
 
-def test_runs_without_frames_are_refused(recording: Path, tmp_path: Path) -> None:
+def test_runs_without_frames_raise_an_input_error(recording: Path, tmp_path: Path) -> None:
     empty = write_run(tmp_path / "empty", recording, true_poses(recording)[:0])
     with pytest.raises(InputError, match="holds no frame"):
         write_report([evaluate_run(empty)], tmp_path / "report.html")
@@ -165,41 +166,43 @@ def test_runs_without_frames_are_refused(recording: Path, tmp_path: Path) -> Non
         write_report([], tmp_path / "report.html")
 
 
-def test_a_film_keeps_within_its_bytes(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(films, "LEAST_PICTURES", 2)
-    monkeypatch.setattr(films, "FASTEST", 1000.0)
-    shown = [TrackerSeries(line, number) for number, line in enumerate(tracker_results(evaluations))]
-    painter = SideBySide(shown, "endpoint_error_mm", height=60)
-    whole = film_of(painter, 10_000_000)
-    assert len(whole.pictures) == FRAMES
-    size = sum(map(len, whole.pictures))
-    half = film_of(painter, size // 2)
-    assert 2 <= len(half.pictures) <= FRAMES // 2 + 1
-    assert sum(map(len, half.pictures)) < 0.65 * size
+def test_the_size_of_an_animation_is_bounded(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(animation, "FEWEST_IMAGES", 2)
+    monkeypatch.setattr(animation, "HIGHEST_RATE", 1000.0)
+    series = [TrackerSeries(result, number) for number, result in enumerate(tracker_results(evaluations))]
+    painter = SideBySide(series, "endpoint_error_mm", height=60)
+    whole = make_animation(painter, 10_000_000)
+    assert len(whole.images) == FRAMES
+    size = sum(map(len, whole.images))
+    half = make_animation(painter, size // 2)
+    assert 2 <= len(half.images) <= FRAMES // 2 + 1
+    assert sum(map(len, half.images)) < 0.65 * size
 
 
-def test_curves_over_time_and_their_bands(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
-    curve = over_time(near, "endpoint_error_mm")
+def test_metric_curves_have_the_range_of_the_runs(evaluations: list[Evaluation]) -> None:
+    near = next(result for result in tracker_results(evaluations) if result.label == "Near")
+    curve = metric_curve(near, "endpoint_error_mm")
     np.testing.assert_allclose(curve.low, 2, atol=1e-6)
     np.testing.assert_allclose(curve.median, 3, atol=1e-6)
     np.testing.assert_allclose(curve.high, 4, atol=1e-6)
     assert curve.seconds[0] == 0
-    assert curve.worst_of == 1
+    assert curve.frames_per_point == 1
 
 
-def test_long_recordings_keep_their_peaks(evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_metric_curves_of_long_recordings_keep_peaks(
+    evaluations: list[Evaluation], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("depthtrack.report.series.POINTS", 3)
-    far = next(line for line in tracker_results(evaluations) if line.label.startswith("Far"))
-    curve = over_time(far, "endpoint_error_mm")
+    far = next(result for result in tracker_results(evaluations) if result.label.startswith("Far"))
+    curve = metric_curve(far, "endpoint_error_mm")
     assert len(curve.seconds) == 3
-    assert curve.worst_of == 3
+    assert curve.frames_per_point == 3
     np.testing.assert_allclose(curve.median, [9, 20, 9], atol=1e-6)
 
 
-def test_shares_count_all_runs(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
-    found = shares(near)
+def test_success_curves_include_all_runs(evaluations: list[Evaluation]) -> None:
+    near = next(result for result in tracker_results(evaluations) if result.label == "Near")
+    found = success_curve(near)
     assert found is not None
     thresholds, share = found
     assert share[np.searchsorted(thresholds, 1.5)] == 0
@@ -207,115 +210,131 @@ def test_shares_count_all_runs(evaluations: list[Evaluation]) -> None:
     assert share[np.searchsorted(thresholds, 5.0)] == 1
 
 
-def test_worst_frames_lie_apart() -> None:
+def test_worst_frames_are_spaced_in_time() -> None:
     values = np.array([1.0, 9.0, 8.0, 2.0, 7.0, np.nan, 3.0])
-    assert worst_frames(values, 0.3 * np.arange(7, dtype=np.float64), count=3, apart=0.5) == [1, 4, 6]
+    assert worst_frames(values, 0.3 * np.arange(7, dtype=np.float64), count=3, spacing=0.5) == [1, 4, 6]
     assert worst_frames(np.full(3, np.nan), np.arange(3.0), count=2) == []
 
 
-def test_rare_peaks_leave_the_scale_readable(evaluations: list[Evaluation]) -> None:
-    near = next(line for line in tracker_results(evaluations) if line.label == "Near")
-    np.testing.assert_allclose(top_of_scale([over_time(near, "endpoint_error_mm")]), (4.4, 4))
-    assert top_of_scale([]) == (1.0, 0.0)
+def test_the_axis_limit_of_smooth_curves_is_above_their_maximum(evaluations: list[Evaluation]) -> None:
+    near = next(result for result in tracker_results(evaluations) if result.label == "Near")
+    np.testing.assert_allclose(axis_limit([metric_curve(near, "endpoint_error_mm")]), (4.4, 4))
+    assert axis_limit([]) == (1.0, 0.0)
 
 
-class Told(TrackerResult):
-    """A line with the figures it is given."""
+class FixedResult(TrackerResult):
+    """A result with given values."""
 
     def __init__(
         self, recording: str, label: str, error: float | None, ms: float = 10.0, lost: int = 0, e3d: float = 2.0
     ) -> None:
         super().__init__(recording, label, ())
-        object.__setattr__(self, "_told", (error, ms, lost))
+        object.__setattr__(self, "_values", (error, ms, lost))
         object.__setattr__(self, "_figures", {"tracker_ms": ms, "endpoint_error_mm": error, "e3d_mm": e3d})
 
-    _told: tuple[float | None, float, int]
+    _values: tuple[float | None, float, int]
     _figures: dict[str, float | None]
 
     source = property(lambda self: self.recording)
     frames = property(lambda self: 100)
-    lost = property(lambda self: self._told[2])
-    truth = property(lambda self: None if self._told[0] is None else "endpoint_error_mm")
+    lost = property(lambda self: self._values[2])
+    truth = property(lambda self: None if self._values[0] is None else "endpoint_error_mm")
 
     def figure(self, metric: str, statistic: str) -> float | None:
         return self._figures.get(metric)
 
 
-def said(lines: list[TrackerResult], **more: Any) -> str:
-    found = verdict(lines, **more)
+def summary_text(results: list[TrackerResult], **more: Any) -> str:
+    found = summary(results, **more)
     return " ".join([f"{found.headline}.", *found.sentences]).replace("\u00a0", " ")
 
 
-def test_a_single_tracker_is_told_for_itself() -> None:
-    assert said([Told("a", "PSO", 3.21)]) == (
-        "PSO follows the hand to 3.2 mm. That is its mean endpoint error, at 10.0 ms a frame. The hand was never lost."
+def test_the_summary_of_a_single_tracker_has_its_error_and_time() -> None:
+    assert summary_text([FixedResult("a", "PSO", 3.21)]) == (
+        "PSO has a mean endpoint error of 3.2 mm. It takes 10.0 ms a frame. The hand was never lost."
     )
 
 
-def test_the_headline_says_where_a_tracker_is_at_home() -> None:
-    lines: list[TrackerResult] = [Told("a", "PSO", 3.0), Told("a", "IK", 2.0)]
-    assert said(lines, matched_model=("IK",)).startswith(
-        "On its home ground, IK follows the hand more closely than PSO."
+def test_the_headline_names_the_trackers_that_fit_the_rendered_model() -> None:
+    results: list[TrackerResult] = [FixedResult("a", "PSO", 3.0), FixedResult("a", "IK", 2.0)]
+    assert summary_text(results, matched_model=("IK",)).startswith(
+        "IK is more accurate than PSO, on a hand rendered from the model of IK."
     )
-    assert said(lines, matched_model=("PSO",)).startswith(
-        "On the home ground of PSO, IK follows the hand more closely than PSO."
+    assert summary_text(results, matched_model=("PSO",)).startswith(
+        "IK is more accurate than PSO, on a hand rendered from the model of PSO."
     )
-    lines.append(Told("b", "PSO", 1.0))
-    assert said(lines, matched_model=("IK",)).startswith(
-        "Neither tracker is the closest everywhere, on the home ground of IK."
+    results.append(FixedResult("b", "PSO", 1.0))
+    assert summary_text(results, matched_model=("IK",)).startswith(
+        "Neither tracker is the most accurate on every recording, on a hand rendered from the model of IK."
     )
-    assert "home ground" not in said(lines)
+    assert "rendered" not in summary_text(results)
 
 
-def test_equal_figures_have_no_winner() -> None:
-    text = said([Told("a", "PSO", 3.0), Told("a", "IK", 3.1, ms=10.2)])
-    assert text.startswith("PSO and IK follow the hand equally closely.")
+def test_equal_errors_have_no_winner() -> None:
+    text = summary_text([FixedResult("a", "PSO", 3.0), FixedResult("a", "IK", 3.1, ms=10.2)])
+    assert text.startswith("PSO and IK are equally accurate.")
     assert "They take the same time a frame: PSO 10.0 ms and IK 10.2 ms." in text
 
 
-def test_many_trackers_and_equal_time() -> None:
-    lines: list[TrackerResult] = [Told("a", "A", 3.0, lost=2), Told("a", "B", 0.5, ms=9), Told("a", "C", 7.0, lost=1)]
-    assert said(lines, equal_ms=10) == (
-        "B follows the hand most closely of three trackers. B's mean endpoint error is 0.50 mm, A's 3.0 mm and "
-        "C's 7.0 mm. Each was given 10 ms a frame; taken were: B 9.0 ms, A 10.0 ms and C 10.0 ms. "
+def test_the_summary_of_many_trackers_with_a_time_budget() -> None:
+    results: list[TrackerResult] = [
+        FixedResult("a", "A", 3.0, lost=2),
+        FixedResult("a", "B", 0.5, ms=9),
+        FixedResult("a", "C", 7.0, lost=1),
+    ]
+    assert summary_text(results, equal_ms=10) == (
+        "B is the most accurate of three trackers. B's mean endpoint error is 0.50 mm, A's 3.0 mm and "
+        "C's 7.0 mm. The time budget was 10 ms a frame; measured: B 9.0 ms, A 10.0 ms and C 10.0 ms. "
         "The hand was lost by A in 2 of 100 frames and C in 1 of 100 frames; never by B."
     )
 
 
-def test_different_winners_are_told_apart() -> None:
-    lines: list[TrackerResult] = [Told("a", "A", 3.0), Told("a", "B", 4.0), Told("b", "A", 9.0), Told("b", "B", 1.0)]
-    assert said(lines).startswith(
-        "Neither tracker is the closest everywhere. Closest are A on a (3.0 mm mean endpoint error; B 4.0 mm) and "
-        "B on b (1.0 mm mean endpoint error; A 9.0 mm)."
+def test_the_summary_names_the_winner_of_each_recording() -> None:
+    results: list[TrackerResult] = [
+        FixedResult("a", "A", 3.0),
+        FixedResult("a", "B", 4.0),
+        FixedResult("b", "A", 9.0),
+        FixedResult("b", "B", 1.0),
+    ]
+    assert summary_text(results).startswith(
+        "Neither tracker is the most accurate on every recording. The most accurate are A on a (3.0 mm mean endpoint "
+        "error; B 4.0 mm) and B on b (1.0 mm mean endpoint error; A 9.0 mm)."
     )
     many: list[TrackerResult] = [
-        Told(str(k), label, 1.0 + (k % 3 == 0) * s) for k in range(6) for label, s in (("A", 1), ("B", 2))
+        FixedResult(str(k), label, 1.0 + (k % 3 == 0) * s) for k in range(6) for label, s in (("A", 1), ("B", 2))
     ]
-    many += [Told("6", "A", 5.0), Told("6", "B", 1.0)]
-    assert "Of 7 recordings, the closest is A on 6 and B on 1." in said(many)
+    many += [FixedResult("6", "A", 5.0), FixedResult("6", "B", 1.0)]
+    assert "Of 7 recordings, the most accurate is A on 6 and B on 1." in summary_text(many)
 
 
-def test_recordings_without_a_truth_are_left_out_of_errors() -> None:
-    lines: list[TrackerResult] = [
-        Told("a", "A", 3.0),
-        Told("a", "B", 4.0),
-        Told("b", "A", None),
-        Told("b", "B", None, e3d=1.0),
+def test_recordings_without_ground_truth_are_excluded_from_errors() -> None:
+    results: list[TrackerResult] = [
+        FixedResult("a", "A", 3.0),
+        FixedResult("a", "B", 4.0),
+        FixedResult("b", "A", None),
+        FixedResult("b", "B", None, e3d=1.0),
     ]
-    text = said(lines)
-    assert text.startswith("Where the truth is known, A follows the hand more closely than B.")
-    assert "Where no truth is known, the sensor's points lie nearest to B on 1 of 1." in text
-    assert "A's mean endpoint error is 3.0 mm on the one of two recordings with a known truth, B's 4.0 mm." in text
-    assert [round(each.error, 6) for each in standings([Told("a", "A", 3.0), Told("b", "A", 5.0)])] == [4.0]
+    text = summary_text(results)
+    assert text.startswith("On recordings with ground truth, A is more accurate than B.")
+    assert "Of the recordings without ground truth, the lowest E3D is that of B on 1 of 1." in text
+    assert "A's mean endpoint error is 3.0 mm on the one of two recordings with ground truth, B's 4.0 mm." in text
+    assert [
+        round(each.error, 6) for each in tracker_summaries([FixedResult("a", "A", 3.0), FixedResult("b", "A", 5.0)])
+    ] == [4.0]
 
 
-def test_who_finds_no_hand_is_not_judged_by_the_easy_recordings_alone() -> None:
-    lines: list[TrackerResult] = [Told("a", "A", 3.0), Told("b", "A", 9.0), Told("a", "B", 2.0), Told("b", "B", None)]
-    assert [(each.label, each.error) for each in standings(lines)] == [("A", 6.0), ("B", float("inf"))]
+def test_a_tracker_without_an_error_on_some_recording_has_an_infinite_error() -> None:
+    results: list[TrackerResult] = [
+        FixedResult("a", "A", 3.0),
+        FixedResult("b", "A", 9.0),
+        FixedResult("a", "B", 2.0),
+        FixedResult("b", "B", None),
+    ]
+    assert [(each.label, each.error) for each in tracker_summaries(results)] == [("A", 6.0), ("B", float("inf"))]
 
 
-def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
-    """Without a comparison's labels: by what is unusual of them, and where nothing is, by their folders."""
+def test_runs_without_labels_are_named_by_their_options(recording: Path, tmp_path: Path) -> None:
+    """Runs are named by options that differ from the defaults, else by their folders."""
     poses = true_poses(recording)
     more: dict[str, Any] = {"variant": "default", "particles": 64, "seed": 0}
     runs = [
@@ -325,8 +344,8 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
         write_run(tmp_path / "ik_a", recording, poses, tracker="ik", seed=0),
         write_run(tmp_path / "ik_b", recording, poses, tracker="ik", seed=0),
     ]
-    lines = tracker_results([evaluate_run(run, residuals=False) for run in runs])
-    assert [(line.label, len(line.evaluations)) for line in lines] == [
+    results = tracker_results([evaluate_run(run, residuals=False) for run in runs])
+    assert [(result.label, len(result.evaluations)) for result in results] == [
         ("PSO", 1),
         ("OIKONOMIDIS2011", 2),
         ("IK, ik_a", 1),
@@ -334,17 +353,19 @@ def test_runs_by_hand_are_told_apart(recording: Path, tmp_path: Path) -> None:
     ]
 
 
-def test_home_ground_is_told_of(evaluations: list[Evaluation], recording: Path, tmp_path: Path) -> None:
+def test_the_page_warns_of_a_comparison_that_favours_a_tracker(
+    evaluations: list[Evaluation], recording: Path, tmp_path: Path
+) -> None:
     skin = write_run(tmp_path / "skin", recording, true_poses(recording), tracker="ik", model="skin", label="Skin")
     compared = [*evaluations[:2], evaluate_run(skin, residuals=False)]
-    lines = tracker_results(compared)
-    told = bias_warning({"model": "skin"}, lines)
-    assert told.startswith("Home ground")
-    assert "that Skin fits, and Far <b> and Near do not" in told
-    assert "that Far <b> and Near fit, and Skin does not" in bias_warning({"model": "primitives"}, lines)
-    assert bias_warning({"sensor": "kinect1"}, lines) == ""
-    assert matched_model({"model": "skin"}, lines) == ("Skin",)
+    results = tracker_results(compared)
+    warning = bias_warning({"model": "skin"}, results)
+    assert warning.startswith("Biased comparison")
+    assert "that Skin fits and Far <b> and Near do not" in warning
+    assert "that Far <b> and Near fit and Skin does not" in bias_warning({"model": "primitives"}, results)
+    assert bias_warning({"sensor": "kinect1"}, results) == ""
+    assert matched_model({"model": "skin"}, results) == ("Skin",)
     write_report(compared, tmp_path / "report.html")
     text = Reader((tmp_path / "report.html").read_text(encoding="utf-8")).text
-    assert "On the home ground of Far <b> and Near, Skin follows the hand most closely of three trackers" in text
-    assert matched_model({"model": "skin"}, lines[:1]) == ()
+    assert "Skin is the most accurate of three trackers, on a hand rendered from the model of Far <b> and Near" in text
+    assert matched_model({"model": "skin"}, results[:1]) == ()

@@ -202,10 +202,10 @@ def test_a_page_has_a_legend_of_its_colours(run: Path) -> None:
         (["video", "{run}", "-o", "a.mp4", "--speed", "0"], "from 0.01 to 100"),
         (["video", ".", "-o", "a.mp4"], "holds no run"),
         (["video", "{run}", "-o", "a.mp4", "--sequence", "gone"], "gone"),
-        (["view", "{run}", "--sheet", "a.png", "--frames", "99"], "none numbered 99"),
-        (["view", "{run}", "--strip", "a.png"], "--strip is for recordings"),
-        (["view", "{run}", "--depth-range", "1", "2"], "--depth-range is for recordings"),
-        (["view", "{run}", "--camera-preset", "tum"], "--camera-preset is for recordings"),
+        (["view", "{run}", "--sheet", "a.png", "--frames", "99"], "must be frames of the run"),
+        (["view", "{run}", "--strip", "a.png"], "--strip applies to recordings"),
+        (["view", "{run}", "--depth-range", "1", "2"], "--depth-range applies to recordings"),
+        (["view", "{run}", "--camera-preset", "tum"], "--camera-preset applies to recordings"),
     ],
 )
 def test_invalid_arguments_are_reported_in_one_sentence(
@@ -224,7 +224,7 @@ def test_a_run_without_frames_has_no_video_and_no_page(
     empty = write_run(out / "empty", recording, np.empty((0, 27)))
     for arguments in (["video", str(empty), "-o", "a.mp4"], ["view", str(empty), "--sheet", "a.png"]):
         assert main(arguments) == 2
-        assert "holds no frame to show" in capsys.readouterr().err
+        assert "has no frame to show" in capsys.readouterr().err
     assert [path.name for path in out.iterdir()] == ["empty"]
 
 
