@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from depthtrack.cli import main as depthtrack
 
 SCENES = (["--model", "skin", "--sensor", "kinect1", "--background", "room"], ["--model", "primitives"])
-TRACKERS = (["ik"], ["ik", "--model", "cylinders"], ["pso", "--finish", "skin"])
+TRACKERS = (["ik"], ["ik", "--surface", "cylinders"], ["pso", "--refine"])
 
 
 def compile_kernels() -> int:
