@@ -50,6 +50,7 @@ def test_wheel_and_sdist_carry_their_data(distributions: Path, tmp_path: Path, p
     assert Path(everyday).is_file()
     assert shaders == "True"
     assert (tmp_path / "site" / "depthtrack" / "report" / "page" / "report.html.jinja").is_file()
+    assert (tmp_path / "site" / "depthtrack" / "py.typed").is_file()
 
 
 def test_sdist_holds_what_building_and_testing_need(distributions: Path) -> None:

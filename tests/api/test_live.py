@@ -1,5 +1,6 @@
 """Pushed frames: the same bits as the command, and checks of what is pushed."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,16 @@ def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, 
             assert estimate.pose is not None
             assert estimate.pose.tobytes() == pose.tobytes()
             assert estimate.energy == energy
+
+
+def test_without_colour_the_bits_are_those_of_a_recording_without_colour(path: Path, tmp_path: Path) -> None:
+    shutil.copytree(path, tmp_path / "grey")
+    (tmp_path / "grey" / "rgb.txt").unlink()
+    config, recording = dt.tracker_config("ik", resolution=64), dt.open_recording(path)
+    expected = [each.estimate.pose for each in dt.track(tmp_path / "grey", tracker=config)]
+    with dt.HandTracker(recording.camera, tracker=config) as tracker:
+        found = [tracker.update(frame.depth, timestamp=frame.timestamp).pose for frame in recording]
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_stored_units_and_doubles_mean_the_same_as_metres(path: Path) -> None:
