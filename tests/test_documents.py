@@ -9,6 +9,7 @@ import pytest
 
 from depthtrack import __version__
 from depthtrack.options import parameters
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS
 from tests.test_architecture import LAYERS
 
@@ -31,9 +32,9 @@ def command_line_options() -> set[str]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
                 found.add(node.target.id.replace("_", "-"))
-    for configuration in CONFIGURATIONS.values():
-        for each in parameters(configuration()):
-            found |= {each.name.replace("_", "-"), each.path.replace("_", "-")}
+    for prefix, make in (*(("", make) for make in CONFIGURATIONS.values()), ("segmentation.", SegmentationOptions)):
+        for each in parameters(make()):
+            found |= {prefix + each.name.replace("_", "-"), prefix + each.path.replace("_", "-")}
     return found | {f"no-{name}" for name in found}
 
 

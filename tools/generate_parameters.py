@@ -44,9 +44,9 @@ def page() -> str:
         parts += [f"## {name}\n", f"{text}\n", _table(parameters(configuration()), flag=True)]
     parts += [
         "## Segmentation\n",
-        "Entries of `segmentation` in `run.json`. `track` and `segment` take `--skin-model`. `segment` also takes\n"
-        "`--depth-only` and `--wrist-margin` (in millimetres).\n",
-        _table(parameters(SegmentationOptions()), flag=False),
+        "Entries of `segmentation` in `run.json`, and options of `track` and `segment`. The short forms are\n"
+        "`--skin-model`, `--depth-only` and `--wrist-margin` (in millimetres).\n",
+        _table(parameters(SegmentationOptions()), flag=True, prefix="segmentation."),
         "## Calibration\n",
         "Fields of `ViewChoiceOptions` and `CalibrationOptions`, which are set in Python.\n",
         _table([*parameters(ViewChoiceOptions()), *parameters(CalibrationOptions())], flag=False),
@@ -54,11 +54,11 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def _table(options: list[Parameter], flag: bool) -> str:
+def _table(options: list[Parameter], flag: bool, prefix: str = "") -> str:
     """Return a table with one row per option; names as on the command line if `flag`."""
     rows = [("option", "unit", "default", "meaning", "source"), ("---",) * 5]
     for each in options:
-        name = f"`--{each.name.replace('_', '-')}`" if flag else f"`{each.path}`"
+        name = f"`--{prefix}{each.name.replace('_', '-')}`" if flag else f"`{each.path}`"
         star = r" \*" if flag and each.advanced else ""
         rows.append((name + star, each.unit, _text(each.default), each.meaning, each.source))
     return "".join("| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |\n" for row in rows)

@@ -87,7 +87,7 @@ def _parse(name: str, arguments: list[str]) -> "RunnableCommand":
 
     module, prog = import_module(COMMANDS[name].module), f"depthtrack {name}"
     if hasattr(module, "command"):
-        # The options depend on the tracker that the arguments name.
+        # The options are those of configurations, which the arguments may name.
         command, default = module.command(arguments)
         parsed: RunnableCommand = tyro.cli(command, args=arguments, prog=prog, default=default)
     else:

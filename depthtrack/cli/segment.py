@@ -1,6 +1,8 @@
 """`depthtrack segment`: segment the hand in every frame."""
 
-from dataclasses import dataclass, field
+import dataclasses
+from collections.abc import Sequence as Arguments
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,8 +11,10 @@ import tyro
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
 from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerName
 
 if TYPE_CHECKING:
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Command:
+class SegmentCommand:
     """Segment the hand in every frame by skin colour and depth, without its bare forearm.
 
     Writes an overlay video, a contact sheet and a table. Prints the IoU with the true silhouettes if the recording has
@@ -33,34 +37,32 @@ class Command:
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FOLDER")] = None
     """Folder to write to (default: NAME-segmented in the current folder)."""
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
-    depth_only: bool = False
-    """Ignore colour."""
-    wrist_margin: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
-    """Length of the forearm to keep beyond the wrist, for comparison with silhouettes that include it."""
+    segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
+        default_factory=SegmentationShortcuts
+    )
     tracker: TrackerName | None = None
     """Tracker whose predictions guide the segmentation, as in `depthtrack track`. This is slower but finds the wrist
     more reliably."""
-    hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
+    hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)
     json: bool = False
     """Print JSON instead of text."""
+
+    @property
+    def segmentation_options(self) -> SegmentationOptions:
+        """Options of the segmentation."""
+        raise NotImplementedError
 
     def run(self) -> None:
         from json import dumps
 
         from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
-        from depthtrack.segmentation.options import SegmentationOptions
         from depthtrack.segmentation.segmenter import Segmenter
 
         if self.hands != HandOptions() and self.tracker is None:
             raise InputError("--hand and --side need a tracker: give --tracker ik or --tracker pso")
-        if not -50 <= self.wrist_margin <= 200:
-            raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
+        options = self.segmentation_options
         sequence = self.recording.open()
-        skin_model = None if self.skin_model is None else str(self.skin_model)
-        options = SegmentationOptions(not self.depth_only, skin_model, self.wrist_margin / 1000)
         segmenter = Segmenter.for_sequence(sequence, options)
         folder = self.out or Path(f"{sequence.name}-segmented")
         check_output_folder(folder)
@@ -111,6 +113,20 @@ class Command:
                 rows.writerow(row)
                 yield row
         save_picture(contact_sheet(shown, sequence.name, describe(sequence), near, far), folder / "contact-sheet.png")
+
+
+def command(arguments: Arguments[str]) -> tuple[type[SegmentCommand], SegmentCommand]:
+    """Return the command with the options of the segmentation, and its defaults."""
+    segmentation = SegmentationArguments(arguments)
+    chosen = property(lambda self: segmentation.chosen(self.segmentation, self.segmentation_shortcuts))
+    Command = dataclasses.make_dataclass(
+        "Command",
+        [segmentation.field],
+        bases=(SegmentCommand,),
+        frozen=True,
+        namespace={"__doc__": SegmentCommand.__doc__, "segmentation_options": chosen},
+    )
+    return Command, Command(recording=RecordingOptions(tyro.MISSING))
 
 
 def _text(report: dict[str, Any]) -> str:

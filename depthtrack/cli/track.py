@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.config_options import chosen_config, options_type
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.tracker_options import chosen_config, options_type, requested_run, requested_tracker
+from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
+from depthtrack.cli.tracker_options import requested_run, requested_tracker
 from depthtrack.errors import InputError
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 
 if TYPE_CHECKING:
@@ -24,8 +27,8 @@ class TrackCommand:
     """Track the hand through a recording and write its pose in every frame to a run folder.
 
     An interrupted run continues with --resume and ends with the same poses. --config repeats a run: options given
-    beside it replace those of the run. The options of the tracker follow those of the command; `--tracker NAME --help`
-    lists those of another one, and docs/parameters.md all of them.
+    beside it replace those of the run. The options of the tracker and of the segmentation follow those of the command.
+    `--tracker NAME --help` lists those of another tracker, and docs/parameters.md all of them.
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
@@ -44,12 +47,18 @@ class TrackCommand:
     """Continue the run that the folder holds."""
     threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Threads of the renderer (default: one per core). Poses do not depend on it."""
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Skin colours from `depthtrack train-skin` (default: published statistics)."""
+    segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
+        default_factory=SegmentationShortcuts
+    )
 
     @property
     def tracker_config(self) -> TrackerConfig:
         """Configuration of the tracker."""
+        raise NotImplementedError
+
+    @property
+    def segmentation_options(self) -> SegmentationOptions:
+        """Options of the segmentation."""
         raise NotImplementedError
 
     def run(self) -> None:
@@ -79,13 +88,9 @@ class TrackCommand:
         return self.recording.open(repeated)
 
     def _configuration(self, sequence: "Recording") -> "RunConfiguration":
-        from depthtrack.segmentation.options import SegmentationOptions
         from depthtrack.tracking.run import configure
 
         repeated = None if self.config is None else _load(self.config)
-        segmentation = SegmentationOptions() if repeated is None else repeated.segmentation
-        if self.skin_model is not None:
-            segmentation = dataclasses.replace(segmentation, skin_model=str(self.skin_model.resolve()))
         if repeated is not None and self.hands == HandOptions():
             hand = repeated.hand_shape(str(self.config))
         else:
@@ -95,7 +100,7 @@ class TrackCommand:
             sequence,
             self.tracker_config,
             hand,
-            segmentation,
+            self.segmentation_options,
             start=self.start,
             frames=self.frames,
             on_damage=self.recording.on_damage,
@@ -123,13 +128,18 @@ def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]
     """
     run = requested_run(arguments)
     config = requested_tracker(arguments, run)
-    options = options_type(config)
+    options = options_type(config, arguments)
+    segmentation = SegmentationArguments(arguments, None if run is None else run.segmentation)
     field = ("options", Annotated[options, tyro.conf.OmitArgPrefixes], dataclasses.field(default_factory=options))
     namespace = {
         "__doc__": TrackCommand.__doc__,
         "tracker_config": property(lambda self: chosen_config(config, self.options)),
+        "segmentation_options": property(
+            lambda self: segmentation.chosen(self.segmentation, self.segmentation_shortcuts)
+        ),
     }
-    Command = dataclasses.make_dataclass("Command", [field], bases=(TrackCommand,), frozen=True, namespace=namespace)
+    fields = [field, segmentation.field]
+    Command = dataclasses.make_dataclass("Command", fields, bases=(TrackCommand,), frozen=True, namespace=namespace)
     defaults: dict[str, Any] = {"tracker": config.name}
     recording = RecordingOptions(tyro.MISSING)
     if run is not None:

@@ -90,6 +90,16 @@ def test_a_wrist_margin_keeps_more_of_the_forearm(
     assert areas[1] > 1.02 * areas[0]
 
 
+def test_options_of_the_segmentation_are_parsed(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["segment", str(recording), "-o", str(tmp_path / "out"), "--json"]
+    assert main([*command, "--segmentation.farthest", "0.3"]) == 0
+    assert json.loads(capsys.readouterr().out)["frames_with_hand"] == 0
+    assert main([*command, "--segmentation.detection.slice-step", "0"]) == 2
+    assert "slice_step must be from 0.0001" in capsys.readouterr().err
+
+
 def test_a_model_trained_on_a_recording_segments_it(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

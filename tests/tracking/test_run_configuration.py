@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+import numpy as np
 import pytest
 
 from depthtrack.cli import main
@@ -14,10 +15,12 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.options import Parameter, from_data, parameters, to_data, with_options
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import read_configuration
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
 from depthtrack.tracking.earlier_runs import upgraded
 from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
+from tests.support.segmentation import changed_options
 
 FRAMES = 3
 KEPT = ("scoring.renderer", "search.attempts", "search.good_energy")
@@ -154,3 +157,43 @@ def test_changed_files_are_noticed(recording: Path, tmp_path: Path) -> None:
     save_synergies(load_synergies("leap-grasps"), file)
     with pytest.raises(InputError, match="has changed since"):
         RunConfiguration.load(folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("use_colour", [True, False])
+def test_a_run_with_changed_segmentation_options_is_repeated(tmp_path: Path, use_colour: bool) -> None:
+    """All options of the segmentation differ from their defaults, and so do the poses."""
+    made, model, first = tmp_path / "made", tmp_path / "skin.json", tmp_path / "first"
+    scene = ("--sensor", "kinect1", "--background", "room", "--model", "skin")
+    assert main(["synth", "everyday", str(made), "--frames", str(FRAMES), *scene]) == 0
+    assert main(["train-skin", str(made), "-o", str(model)]) == 0
+    options = changed_options(use_colour=use_colour, skin_model=str(model))
+    sequence, config = open_sequence(made), with_options(CONFIGURATIONS["ik"](), {"resolution": 64})
+    poses = {}
+    for name, segmentation in (("usual", SegmentationOptions()), ("first", options)):
+        configuration = configure(made, sequence, config, HandShape(), segmentation)
+        with TrackingRun(configuration, sequence) as run:
+            poses[name] = [each.estimate.pose for each in run.write(tmp_path / name)]
+    for usual, other in zip(poses["usual"], poses["first"], strict=True):
+        assert usual is not None
+        assert other is not None
+        assert not np.array_equal(usual, other)
+    again = ["track", str(made), "-o", str(tmp_path / "again"), "--config", str(first / "run.json")]
+    assert main(again) == 0
+    for file in ("poses.csv", "run.json"):
+        assert (tmp_path / "again" / file).read_bytes() == (first / file).read_bytes()
+
+
+def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_path: Path) -> None:
+    """Options of the tracker and of the segmentation that `--help` does not list are accepted."""
+    first = ["track", str(recording), "-o", str(tmp_path / "first"), "--tracker", "ik", "--frames", "1"]
+    more = ["--segmentation.margin", "0.05", "--segmentation.grid.max-jump", "0.02", "--wrist-margin", "10"]
+    assert main([*first, *more, "--retry-ratio", "1.4", "--start", "truth", "--depth-only"]) == 0
+    again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first")]
+    assert main([*again, "--segmentation.use-colour"]) == 0
+    for folder, use_colour in (("first", False), ("again", True)):
+        configuration = read_configuration(tmp_path / folder)
+        stored = configuration["segmentation"]
+        assert configuration["options"]["retry_ratio"] == 1.4
+        assert (stored["roi"]["margin"], stored["grid"]["max_jump"], stored["wrist_margin"]) == (0.05, 0.02, 0.01)
+        assert stored["use_colour"] == use_colour

@@ -1,0 +1,73 @@
+"""Command-line options of the segmentation."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from depthtrack.cli.config_options import chosen_config, options_type
+from depthtrack.errors import InputError
+from depthtrack.segmentation.options import SegmentationOptions
+
+PREFIX = "segmentation."
+
+
+@dataclass(frozen=True)
+class SegmentationShortcuts:
+    """Short forms of frequent options of the segmentation."""
+
+    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
+    depth_only: bool = False
+    """Ignore colour."""
+    wrist_margin: Annotated[float | None, tyro.conf.arg(metavar="MM")] = None
+    """Length of the forearm to keep beyond the wrist (default: 0), for comparison with silhouettes that include it."""
+
+    def applied(self, options: SegmentationOptions) -> SegmentationOptions:
+        """Return the options with those that were given.
+
+        Raises:
+            InputError: if the margin is out of range.
+        """
+        changed: dict[str, Any] = {}
+        if self.skin_model is not None:
+            changed["skin_model"] = str(self.skin_model)
+        if self.depth_only:
+            changed["use_colour"] = False
+        if self.wrist_margin is not None:
+            if not -50 <= self.wrist_margin <= 200:
+                raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
+            changed["wrist_margin"] = self.wrist_margin / 1000
+        return dataclasses.replace(options, **changed)
+
+
+class SegmentationArguments:
+    """Options of the segmentation on the command line, with a configuration as defaults.
+
+    arguments: those of the command.
+    """
+
+    def __init__(self, arguments: Sequence[str], options: SegmentationOptions | None = None) -> None:
+        self._options = options or SegmentationOptions()
+        self.type = options_type(self._options, arguments, PREFIX)
+
+    @property
+    def field(self) -> tuple[str, Any, Any]:
+        """Field of a command's dataclass: name, type and default."""
+        return ("segmentation", Annotated[self.type, tyro.conf.OmitArgPrefixes], dataclasses.field(default=self.type()))
+
+    def chosen(self, values: Any, shortcuts: SegmentationShortcuts) -> SegmentationOptions:
+        """Return the options that the command line chose, with an absolute path of the model.
+
+        values: value of `field`.
+
+        Raises:
+            InputError: if a value is out of range.
+        """
+        options = shortcuts.applied(chosen_config(self._options, values, PREFIX))
+        if options.skin_model is None or options.skin_model == self._options.skin_model:
+            return options
+        return dataclasses.replace(options, skin_model=str(Path(options.skin_model).resolve()))
