@@ -15,10 +15,10 @@ from tests.test_architecture import LAYERS
 
 ROOT = Path(__file__).parents[1]
 PARAMETERS = runpy.run_path(str(ROOT / "tools" / "generate_parameters.py"))
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
-PAGES = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "examples" / "README.md"])
+PAGES = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 CURRENT = pytest.mark.parametrize(
-    "path", [path for path in DOCUMENTS if path.name != "CHANGELOG.md"], ids=lambda path: path.name
+    "path", [path for path in DOCUMENTS if path.name != "CHANGELOG.md"], ids=lambda path: str(path.relative_to(ROOT))
 )
 """The changelog also names what was renamed."""
 OTHER_OPTIONS = {"check", "help", "only"}

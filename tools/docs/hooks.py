@@ -3,12 +3,12 @@
 They are README and the documents beside it, the examples, and the API.
 """
 
-import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import griffe
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
@@ -48,17 +48,18 @@ def moved(text: str) -> str:
 
 
 def examples_page() -> str:
-    """Return all examples with their descriptions."""
-    parts = ["# Examples\n\nEach script is run by the tests.\n"]
-    for path in sorted((ROOT / "examples").glob("*.py")):
-        source = path.read_text(encoding="utf-8")
-        parts.append(f"## {path.name}\n\n```python\n{source}```\n")
-    return "\n".join(parts)
+    """Return the overview of the examples, and their sources."""
+    folder = ROOT / "examples"
+    overview = (folder / "README.md").read_text(encoding="utf-8")
+    sources = (
+        f"## {path.name}\n\n```python\n{path.read_text(encoding='utf-8')}```\n" for path in sorted(folder.glob("*.py"))
+    )
+    return "\n".join([re.sub(r"\]\((\w+)\.py\)", r"](#\1py)", overview), *sources])
 
 
 def api_page(packages: list[str]) -> str:
     """Return the public names, with links to their documentation, and the list of packages."""
-    rows = [f"| [`{name}`][{place}] | {summary(place)} |" for name, place in public_names()]
+    rows = [f"| [`{name}`][{place}] | {summary} |" for name, place, summary in public_names()]
     return "\n".join(
         [
             "# API\n",
@@ -73,25 +74,12 @@ def api_page(packages: list[str]) -> str:
     )
 
 
-def public_names() -> Iterator[tuple[str, str]]:
-    """Yield public names and full names, as the imports for type checkers state them."""
-    for node in ast.walk(ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("depthtrack."):
-            yield from ((alias.asname or alias.name, f"{node.module}.{alias.name}") for alias in node.names)
-
-
-def summary(place: str) -> str:
-    """Return the first line of the documentation of a full name."""
-    module, _, name = place.rpartition(".")
-    body = ast.parse((ROOT / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8")).body
-    for number, node in enumerate(body):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name and ast.get_docstring(node):
-            return str(ast.get_docstring(node)).partition("\n")[0]
-        following = body[number + 1] if number + 1 < len(body) else None
-        assigned = isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == name for t in node.targets)
-        if assigned and isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
-            return str(following.value.value).partition("\n")[0]
-    return ""
+def public_names() -> Iterator[tuple[str, str, str]]:
+    """Yield public names, full names and first lines, by the imports for type checkers."""
+    for name, member in griffe.load("depthtrack", search_paths=[ROOT]).members.items():
+        if isinstance(member, griffe.Alias) and member.target_path.startswith("depthtrack."):
+            text = member.final_target.docstring
+            yield name, member.final_target.path, "" if text is None else text.value.partition("\n")[0]
 
 
 def package_pages() -> Iterator[tuple[str, str]]:
