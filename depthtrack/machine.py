@@ -14,7 +14,12 @@ _PACKAGES = ("numpy", "numba", "llvmlite", "scipy", "PyOpenGL", "trimesh", "embr
 
 @dataclass(frozen=True)
 class Machine:
-    """A processor, its vector instructions, versions, and `load`, the runnable processes of the last minute."""
+    """A processor and its software.
+
+    features: vector instruction sets.
+    versions: of depthtrack, Python and packages.
+    load: mean number of runnable processes over the last minute; None if the system does not report it.
+    """
 
     cpu: str
     cores: int
@@ -25,45 +30,54 @@ class Machine:
 
     @property
     def headline(self) -> str:
-        """The first line above a table of speeds."""
+        """The line above a table of speeds."""
         busy = "" if self.load is None else f", load {self.load:.1f}"
         return f"{self.cpu}, {self.cores} cores{busy}"
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use; all cores if the system does not report it."""
+    """Return the number of cores that this process may use; all if the system reports no limit."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def describe_machine() -> Machine:
-    """Return this machine as it is now."""
+    """Return a description of this machine."""
     from llvmlite.binding import get_host_cpu_features
 
     present = get_host_cpu_features()
     return Machine(
-        cpu=_cpu_model(),
+        cpu=processor_name(),
         cores=usable_cores(),
         features=tuple(name for name in _FEATURES if present.get(name)),
-        system=f"{platform.system()} {platform.release()} {platform.machine()}",
+        system=system_name(),
         versions={"depthtrack": __version__, "python": platform.python_version(), **_versions()},
         load=os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     )
 
 
-def _cpu_model() -> str:
+def system_name() -> str:
+    """Return the operating system, its release and the architecture."""
+    return f"{platform.system()} {platform.release()} {platform.machine()}"
+
+
+def processor_name() -> str:
+    """Return the processor's model name; its architecture if the system does not report the model."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(models, platform.processor() or "unknown")
 
 
+def installed_version(package: str) -> str | None:
+    """Return the version of a package, None if it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
 def _versions() -> dict[str, str]:
-    found = {}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
+    found = {package: installed_version(package) for package in _PACKAGES}
+    return {package: number for package, number in found.items() if number is not None}

@@ -1,10 +1,10 @@
 #version 330 core
-// The pixel operations of Oikonomidis et al. 2011, Eq. (2), summed over blocks of 4 x 4 pixels that end with the tile.
+// Sums of Oikonomidis et al. 2011, Eq. (2), over blocks of 4 x 4 pixels, clipped at the tile's edge.
 
-uniform sampler2D inverse_depth;  // 1/m, 0 where nothing is drawn; tiles side by side
-uniform sampler2D observation;    // depth o_d in metres, 0 where missing; silhouette o_s, 0 or 1
+uniform sampler2D inverse_depth;  // 1/m, 0 = nothing drawn; tiles of the atlas
+uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1
 uniform ivec2 tile;               // pixels
-uniform ivec2 blocks;             // of a tile
+uniform ivec2 blocks;             // blocks of a tile
 uniform float match_depth, clamp_depth;  // d_m, d_M, metres
 
 out vec4 sums;  // clamped difference in metres, o_s and r_m, o_s or r_m

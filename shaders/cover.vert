@@ -1,5 +1,5 @@
 #version 330 core
-// One triangle over the whole viewport.
+// One triangle that covers the whole viewport.
 
 void main() {
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);

@@ -1,8 +1,8 @@
 #version 330 core
-// Casts the pixel's ray at a unit ball or an open unit cylinder and writes the inverse depth of the face seen from
-// outside, or 0. Blending keeps the largest, so the nearest surface wins without a depth buffer.
+// Intersects the pixel's ray with a unit ball or an open unit cylinder. Writes the inverse depth of the face visible
+// from outside, or 0. Blending keeps the maximum, so the nearest surface wins without a depth buffer.
 
-uniform float inverse_near;  // 1/m: nothing closer is seen
+uniform float inverse_near;  // 1/m, of the near plane
 
 flat in vec4 map_x, map_y, map_1, map_w, reference;
 out float inverse_depth;
@@ -20,7 +20,7 @@ void main() {
     float C = dot(metric * map_w, map_w);
     float discriminant = B * B - A * C;
 
-    // The face seen from outside is where the form grows with w; of its two expressions, the one that adds.
+    // At the face visible from outside the quadratic increases with w. The expression that adds avoids cancellation.
     float root = sqrt(discriminant);
     bool adds = B <= 0.0;
     float w = (adds ? root - B : -A) / (adds ? C : root + B);

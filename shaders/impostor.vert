@@ -1,5 +1,5 @@
 #version 330 core
-// One instance is one primitive of one hypothesis: a rectangle of its tile, drawn as a strip of four vertices.
+// One instance is one primitive of one hypothesis: a rectangle in its tile, drawn as a strip of four vertices.
 
 uniform float atlas_side;  // pixels
 
@@ -8,7 +8,7 @@ layout(location = 1) in vec4 column_x;   // the map from (x, y, 1, w) to the uni
 layout(location = 2) in vec4 column_y;
 layout(location = 3) in vec4 column_1;
 layout(location = 4) in vec4 column_w;
-layout(location = 5) in vec4 frame;      // inverse depth of the middle, 1 for a ball and 0 for a cylinder, anchor
+layout(location = 5) in vec4 frame;      // inverse depth of the middle, 1 for a ball or 0 for a cylinder, anchor
 
 flat out vec4 map_x, map_y, map_1, map_w, reference;
 

@@ -1,9 +1,9 @@
 #version 330 core
-// One level of the reduction pyramid: the sum of every block of 4 x 4, blocks ending with their tile.
+// One level of the reduction pyramid: the sum of every block of 4 x 4 texels, clipped at the tile's edge.
 
 uniform sampler2D level;
 uniform ivec2 tile;    // texels of a tile in `level`
-uniform ivec2 blocks;  // of a tile here
+uniform ivec2 blocks;  // blocks of a tile
 
 out vec4 sums;
 

@@ -22,10 +22,12 @@ PRIMITIVE_COUNT = 37
 
 @dataclass(frozen=True)
 class Primitives:
-    """Unit primitives with the body each is fixed to.
+    """Unit primitives, each fixed to a body.
 
-    `kinds` (N,) of SPHERE or CYLINDER, `bodies` (N,), `T_body_unit` (N, 4, 4) from the unit shape to the body
-    frame in metres, projective for cones; `names` for people.
+    kinds: (N,) SPHERE or CYLINDER.
+    bodies: (N,) 0 to 15.
+    T_body_unit: (N, 4, 4) from the unit frame to the body frame, metres; projective for cones.
+    names: N unique names.
     """
 
     kinds: Index
@@ -35,7 +37,7 @@ class Primitives:
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
-        """The 37 primitives of a hand."""
+        """Return the 37 primitives of a hand."""
         parts = _palm(shape)
         for finger in range(5):
             parts += _thumb(shape) if finger == 0 else _finger(shape, finger)
@@ -44,8 +46,11 @@ class Primitives:
         scale = np.diag([shape.scale, shape.scale, shape.scale, 1])
         return cls(np.array(kinds), np.array(bodies), flip @ scale @ np.stack(matrices) @ flip, names)
 
-    def placed(self, transforms: Array) -> Array:
-        """T_camera_unit (..., N, 4, 4) for T_camera_body (..., 16, 4, 4)."""
+    def transforms(self, transforms: Array) -> Array:
+        """Return T_camera_unit (..., N, 4, 4), metres, of the primitives.
+
+        transforms: (..., 16, 4, 4) T_camera_body, metres.
+        """
         return transforms[..., self.bodies, :, :] @ self.T_body_unit
 
 
@@ -54,7 +59,7 @@ _Part = tuple[str, int, int, Array]
 
 def _palm(shape: HandShape) -> list[_Part]:
     half_breadth, half_thickness = shape.palm_breadth / 2, shape.palm_thickness / 2
-    # The caps reach the wrist and the knuckles' far side; the cylinder spans what lies between their centres.
+    # The caps end at the wrist and beyond the knuckles; the cylinder lies between their centres.
     bottom, top = -0.36 * shape.palm_length, 0.42 * shape.palm_length
     centre = (shape.bases[1:, 0].max() + shape.bases[1:, 0].min()) / 2
     cylinder = cone((centre, bottom, 0), top - bottom, 1.0, 1.0) @ np.diag([half_breadth, half_thickness, 1, 1])
@@ -106,26 +111,26 @@ def _thumb(shape: HandShape) -> list[_Part]:
 
 
 def _bone_lengths(shape: HandShape, finger: int) -> Array:
-    """Distances between sphere centres: the last one stops short, so that the tip's sphere ends at the fingertip."""
+    """Return the distances (3,) between sphere centres, metres; the tip's sphere ends at the fingertip."""
     lengths = shape.lengths[finger].copy()
     lengths[2] = max(lengths[2] - shape.radii[finger, 3], 1e-4)
     return lengths
 
 
 def sphere(y: float, radius: float) -> Array:
-    """Unit sphere to a ball of `radius` at (0, y, 0)."""
+    """Return the transform (4, 4) of the unit sphere to a ball of `radius` at (0, y, 0), metres."""
     return ellipsoid((0.0, y, 0.0), (radius, radius, radius))
 
 
 def ellipsoid(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Array:
-    """Unit sphere to an axis-aligned ellipsoid."""
+    """Return the transform (4, 4) of the unit sphere to an axis-aligned ellipsoid, metres."""
     T = np.diag([*radii, 1.0])
     T[:3, 3] = centre
     return T
 
 
 def cone(start: tuple[float, float, float], length: float, radius_start: float, radius_end: float) -> Array:
-    """Unit cylinder to a cone frustum along +y from `start`, its radius going from `radius_start` to `radius_end`.
+    """Return the transform (4, 4) of the unit cylinder to a cone frustum along +y from `start`, metres.
 
     With w = 1 + k uz and k = radius_start / radius_end - 1, the radius radius_start / w is linear in the
     distance length (1 + k) uz / w along the axis.

@@ -1,4 +1,4 @@
-"""The backends by name; none is imported before it is asked for."""
+"""Backends by name, each imported at its first use."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from depthtrack.rendering.scorer import Scorer
 
 @dataclass(frozen=True)
 class BackendEntry:
-    """Where a backend lives, the options people may give it, and those that make it what it is."""
+    """Module and class of a backend, its options, and the fixed options that select it."""
 
     module: str
     scorer: str
@@ -28,21 +28,22 @@ BACKENDS: dict[str, BackendEntry] = {
     "osmesa": BackendEntry(_OPENGL, "OpenGLScorer", ("sums",), {"platform": "osmesa"}),
     "oracle": BackendEntry("depthtrack.rendering.oracle", "OracleScorer"),
 }
-"""The default first; `oracle` is the slow truth the others are held to."""
+"""The default first; `oracle` is the slow reference."""
 
 
 def create_scorer(name: str, shape: HandShape, objective: Objective | None = None, **options: Any) -> Scorer:
-    """A scorer of the named backend; `options` as its class documents them.
+    """Return a scorer of the named backend; `options` are those of its class.
 
-    Raises InputError for a name or an option that does not exist, and DepthtrackError, naming the package to
-    install, where a backend lacks a system library.
+    Raises:
+        InputError: if the name or an option does not exist.
+        DepthtrackError: if the backend lacks a system library; it names the package to install.
     """
     if name not in BACKENDS:
         raise InputError(f"no renderer '{name}': choose one of {', '.join(BACKENDS)}")
     entry = BACKENDS[name]
     for option in options:
         if option not in entry.options:
-            known = ", ".join(entry.options) or "no options"
-            raise InputError(f"renderer '{name}' has no option '{option}': it knows {known}")
+            known = ", ".join(entry.options) or "none"
+            raise InputError(f"renderer '{name}' has no option '{option}': its options are {known}")
     scorer: Scorer = getattr(import_module(entry.module), entry.scorer)(shape, objective, **entry.fixed, **options)
     return scorer

@@ -1,4 +1,4 @@
-"""What works on this machine: versions, processor, and every backend tried in a process of its own."""
+"""Diagnosis of this machine: versions, processor, and a trial of every backend."""
 
 import json
 import os
@@ -8,12 +8,11 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Self
 
 import depthtrack
-from depthtrack.machine import usable_cores
+from depthtrack.machine import installed_version, processor_name, system_name, usable_cores
 from depthtrack.rendering.selfcheck import SelfCheck
 
 _LIBRARIES = (
@@ -24,7 +23,7 @@ _LIBRARIES = (
 
 @dataclass(frozen=True)
 class SystemInfo:
-    """What the program runs on. `libraries` maps names to versions, None where not installed."""
+    """Versions, system and processor. `libraries` maps names to versions, None if not installed."""
 
     depthtrack: str
     python: str
@@ -37,24 +36,25 @@ class SystemInfo:
 
     @classmethod
     def here(cls) -> Self:
+        """Return the description of this machine."""
         from llvmlite import binding
 
         features = binding.get_host_cpu_features()
         return cls(
             depthtrack=depthtrack.__version__,
             python=platform.python_version(),
-            system=f"{platform.system()} {platform.release()} {platform.machine()}",
-            processor=_model_name() or binding.get_host_cpu_name(),
+            system=system_name(),
+            processor=processor_name(),
             threads=usable_cores(),
             avx2=bool(features.get("avx2")),
             avx512=bool(features.get("avx512f")),
-            libraries={name: _version(name) for name in _LIBRARIES},
+            libraries={name: installed_version(name) for name in _LIBRARIES},
         )
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A backend to try, with options; `label` names it to people."""
+    """A backend to try with its options; `label` is its name in reports."""
 
     label: str
     backend: str
@@ -63,7 +63,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a trial: what it measured, or why it measured nothing. `works` only if it agrees with the oracle."""
+    """The result of a trial: its self-check, and the problem if the backend does not work.
+
+    check: None if the process failed before it reported.
+    """
 
     trial: Trial
     check: SelfCheck | None
@@ -71,11 +74,12 @@ class Outcome:
 
     @property
     def works(self) -> bool:
+        """Whether the backend ran and agrees with the oracle."""
         return self.problem is None
 
 
 def trials() -> list[Trial]:
-    """Everything there is to try on this machine."""
+    """Return all trials of this machine, the default backend first."""
     threads = usable_cores()
     parallel = [Trial(f"raster, {threads} threads", "raster", {"threads": threads})] if threads > 1 else []
     return [
@@ -91,14 +95,17 @@ def trials() -> list[Trial]:
 def examine(
     time_limit: float = 60.0, progress: Callable[[list[Trial]], Iterable[Trial]] = lambda trials: trials
 ) -> list[Outcome]:
-    """Try every backend, one after the other so that each has the machine; `time_limit` seconds each."""
+    """Try every backend, one at a time, with a time limit each (seconds)."""
     return [attempt(trial, time_limit) for trial in progress(trials())]
 
 
 def attempt(trial: Trial, time_limit: float = 60.0) -> Outcome:
-    """Self-check a backend in a process of its own, so that a driver may crash or hang there."""
+    """Self-check a backend in its own process, which contains a driver that crashes or hangs.
+
+    time_limit: seconds, after which the process is killed.
+    """
     command = [sys.executable, "-P", "-m", "depthtrack.rendering.selfcheck", trial.backend, json.dumps(trial.options)]
-    # Where the program runs from a checkout, its processes find it too.
+    # A child process finds the package of a checkout by this path.
     path = [str(Path(depthtrack.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, path))}
     with subprocess.Popen(
@@ -112,44 +119,28 @@ def attempt(trial: Trial, time_limit: float = 60.0) -> Outcome:
         start_new_session=True,
     ) as process:
         try:
-            printed, complaints = process.communicate(timeout=time_limit)
+            output, errors = process.communicate(timeout=time_limit)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             return Outcome(
-                trial, None, f"gave no answer within {time_limit:g} s: its driver hangs, or the machine is busy"
+                trial, None, f"gave no result within {time_limit:g} s: its driver hangs, or the machine is busy"
             )
         except BaseException:
             os.killpg(process.pid, signal.SIGKILL)
             raise
-    return _outcome(trial, process.returncode, printed, complaints)
+    return _outcome(trial, process.returncode, output, errors)
 
 
-def _outcome(trial: Trial, code: int, printed: str, complaints: str) -> Outcome:
-    last_words = (complaints.strip().splitlines() or ["it left no message"])[-1]
+def _outcome(trial: Trial, code: int, output: str, errors: str) -> Outcome:
+    last_line = (errors.strip().splitlines() or ["no message"])[-1]
     if code < 0:
-        return Outcome(trial, None, f"crashed with {signal.Signals(-code).name}: {last_words}")
+        return Outcome(trial, None, f"crashed with {signal.Signals(-code).name}: {last_line}")
     try:
-        # Drivers may print to standard output too: ours is the last line.
-        answer = json.loads((printed.strip().splitlines() or [""])[-1])
+        # Drivers may print to standard output too; the result is the last line.
+        answer = json.loads((output.strip().splitlines() or [""])[-1])
         if "error" in answer:
             return Outcome(trial, None, str(answer["error"]))
         check = SelfCheck(**answer)
     except (ValueError, TypeError):
-        return Outcome(trial, None, f"failed with exit code {code}: {last_words}")
-    return Outcome(trial, check, None if check.agrees else "disagrees with the oracle: its driver miscalculates")
-
-
-def _model_name() -> str | None:
-    """The processor's name for people, where the system tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return None
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), None)
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+        return Outcome(trial, None, f"failed with exit code {code}: {last_line}")
+    return Outcome(trial, check, None if check.agrees else "disagrees with the oracle: its driver computes wrongly")

@@ -1,4 +1,4 @@
-"""The surface of a posed hand, of primitives or of skin, as a camera sees it."""
+"""Rendering of a posed hand, made of primitives or a skin mesh."""
 
 from dataclasses import dataclass
 from typing import Protocol, Self
@@ -35,7 +35,7 @@ class PrimitiveHand:
     primitives: Primitives
 
     def draw(self, camera: Camera, transforms: Array, onto: RenderedSurface) -> None:
-        raycast(camera, self.primitives.kinds, self.primitives.placed(transforms), self.primitives.bodies, onto)
+        raycast(camera, self.primitives.kinds, self.primitives.transforms(transforms), self.primitives.bodies, onto)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class SkinHand:
 
 @dataclass(frozen=True)
 class HandSurface:
-    """A hand of some sizes and its drawer; `name` is "cylinders" or "skin"."""
+    """A hand and its drawer; `name` is "cylinders" or "skin"."""
 
     name: str
     model: HandModel
@@ -59,17 +59,17 @@ class HandSurface:
 
     @classmethod
     def of(cls, shape: HandShape, skin: bool) -> Self:
-        """Return the surface of a hand of these sizes.
+        """Return the surface of a hand: its skin mesh, or its primitives.
 
         Raises:
-            InputError: if no skin fits the sizes.
+            InputError: if the sizes give no closed skin.
         """
         if skin:
             return cls("skin", HandModel(shape), SkinHand(Skin.of(shape)))
         return cls("cylinders", HandModel(shape), PrimitiveHand(Primitives.of(shape)))
 
     def render(self, pose: Array, camera: Camera) -> RenderedSurface:
-        """Return what `camera` sees of the hand alone; labels are bodies 0 to 15.
+        """Return the hand rendered for `camera`; labels are bodies 0 to 15.
 
         pose (27,): metres, quaternion and radians, camera frame.
         """
@@ -93,10 +93,10 @@ class HandSurface:
         pose (27,): metres, quaternion and radians, camera frame.
         """
         points, shape = self.model.keypoints(pose), self.model.shape
-        # No flesh is farther from the nearest keypoint than this.
+        # No point of the surface is farther from the nearest keypoint.
         margin = shape.scale * max(shape.palm_breadth, shape.wrist_breadth, 2 * shape.radii.max()) / 2
         if points[:, 2].min() <= margin:
             return camera.rect
-        # Flesh reaches nearer than the bones, where it looks larger.
+        # The surface is nearer to the camera than the keypoints, where its image is larger.
         around = margin * np.array([camera.fx, camera.fy]) / (points[:, 2:].min() - margin)
         return Rect.around(camera.project(points), around).clipped(camera.rect)

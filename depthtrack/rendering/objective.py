@@ -1,4 +1,4 @@
-"""The objective of Oikonomidis et al. 2011, Eq. (1) and (2), with a plain float64 evaluation of it."""
+"""The objective of Oikonomidis et al. 2011, Eq. (1) and (2), evaluated plainly in float64."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,12 @@ from depthtrack.types import Array, Mask
 
 @dataclass(frozen=True)
 class Terms:
-    """Energies (B,) of Eq. (1) and what they are made of.
+    """Energies of Eq. (1) and their terms.
 
-    `depth` (B,): first term of Eq. (2), in `Objective.depth_unit`. `silhouette` (B,): second term of Eq. (2) before
-    lambda, 0 to 1. `kinematic` (B,): kc of Eq. (1) before lambda_k, radians.
+    energy: (B,) of Eq. (1).
+    depth: (B,) first term of Eq. (2), in `Objective.depth_unit`.
+    silhouette: (B,) second term of Eq. (2) before lambda, 0 to 1.
+    kinematic: (B,) kc of Eq. (1) before lambda_k, radians.
     """
 
     energy: Array
@@ -25,14 +27,19 @@ class Terms:
 
     @property
     def agreement(self) -> Array:
-        """The confidence (B,) in each pose, 0 to 1: how far the rendered and the observed silhouette agree."""
+        """Agreement (B,) of the rendered and the observed silhouette, 0 to 1, used as confidence."""
         return 1 - self.silhouette
 
     @classmethod
     def of_sums(
         cls, objective: Objective, poses: ArrayLike, clamped: Array, matched_silhouette: Array, union: Array
     ) -> "Terms":
-        """From the sums of Eq. (2): of min(|o_d - r_d|, d_M) in metres, of o_s and r_m, and of o_s or r_m."""
+        """Return the terms of poses (B, 27) from their sums of Eq. (2).
+
+        clamped: (B,) sum of min(|o_d - r_d|, d_M), metres.
+        matched_silhouette: (B,) pixels of o_s and r_m.
+        union: (B,) pixels of o_s or r_m.
+        """
         depth = clamped / objective.depth_unit / (union + objective.epsilon)
         silhouette = silhouette_disagreement(matched_silhouette, union)
         kinematic = finger_crossing(poses)
@@ -40,13 +47,16 @@ class Terms:
 
 
 def silhouette_disagreement(matched: Array, union: Array) -> Array:
-    """Return the silhouette term of Eq. (2), 0 to 1, from its sums; 1 if neither hand is visible."""
+    """Return the silhouette term (B,) of Eq. (2), 0 to 1; 1 if neither hand is visible."""
     total = matched + union
     return 1 - np.divide(2 * matched, total, out=np.zeros_like(total), where=total > 0)
 
 
 def finger_crossing(poses: ArrayLike) -> Array:
-    """kc of Eq. (1): how far (radians) adjacent fingers, the thumb excluded, lean across each other; (...,)."""
+    """Return kc (...,) of Eq. (1): the angle by which adjacent fingers cross, radians.
+
+    poses: (..., 27) metres, quaternion, radians. The thumb is excluded.
+    """
     abduction = np.asarray(poses, dtype=np.float64)[..., ANGLES][..., 4::4]
     phi = abduction[..., :-1] - abduction[..., 1:]
     return -np.minimum(phi, 0).sum(axis=-1)
@@ -55,11 +65,14 @@ def finger_crossing(poses: ArrayLike) -> Array:
 def evaluate(
     objective: Objective, silhouette: Mask, observed: ArrayLike, rendered: ArrayLike
 ) -> tuple[float, float, float]:
-    """Sums of Eq. (2) for one rendered depth map: clamped difference (metres), o_s and r_m, o_s or r_m.
+    """Return the three sums of Eq. (2) for one rendered depth map, as in `Terms.of_sums`.
 
-    All maps (h, w); depth in metres, 0 where there is no reading or nothing was drawn. A drawn pixel is matched
-    (r_m) when its depth lies within d_m of the observation, or the observation is missing; absent depth counts
-    as 0 in the difference, so what only one of the two shows costs the full clamp.
+    silhouette: (h, w) o_s.
+    observed: (h, w) metres, 0 = no reading.
+    rendered: (h, w) metres, 0 = nothing drawn.
+
+    A drawn pixel is matched (r_m) if its depth lies within d_m of the observation, or if the observation is missing.
+    Absent depth counts as 0 in the difference, so a pixel that only one map holds costs the full clamp.
     """
     o, r = np.asarray(observed, dtype=np.float64), np.asarray(rendered, dtype=np.float64)
     difference = np.abs(o - r)

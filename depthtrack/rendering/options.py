@@ -1,4 +1,4 @@
-"""Options of scoring: the objective of Oikonomidis et al. 2011 and the renderer that evaluates it."""
+"""Options of scoring: the objective of Oikonomidis et al. 2011 and its renderer."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,7 +13,11 @@ _OIKONOMIDIS = "Oikonomidis et al. 2011, Sec. 2.3"
 
 @dataclass(frozen=True)
 class Objective:
-    """Constants of Oikonomidis et al. 2011, Eq. (1) and (2)."""
+    """Constants of Oikonomidis et al. 2011, Eq. (1) and (2).
+
+    Raises:
+        InputError: if a depth, the unit or epsilon is not above 0 and at most 10.
+    """
 
     match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
     clamp_depth: float = option(0.04, "d_M: larger depth differences cost no more", unit="m", source=_OIKONOMIDIS)
@@ -27,11 +31,11 @@ class Objective:
     def __post_init__(self) -> None:
         for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
             if not 0 < getattr(self, name) <= 10:
-                raise InputError(f"objective {name} must lie between 0 and 10, found {getattr(self, name)!r}")
+                raise InputError(f"objective {name} must be above 0 and at most 10, found {getattr(self, name)!r}")
 
     @property
     def clamp(self) -> float:
-        """Energy of a pixel whose depth disagrees completely; thresholds on the energy are multiples of it."""
+        """The depth term of a completely wrong pixel; energy thresholds are multiples of it."""
         return self.clamp_depth / self.depth_unit
 
     def combine(self, depth: Any, silhouette: Any, kinematic: Any) -> Any:

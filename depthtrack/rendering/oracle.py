@@ -1,4 +1,4 @@
-"""The slow truth: every hypothesis through the float64 ray caster and the plain evaluation of Eq. (2)."""
+"""Reference scorer: the float64 ray caster and the plain evaluation of Eq. (2)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from depthtrack.types import Array, Depth
 
 
 class OracleScorer(ScorerBase):
-    """Reference backend: about a thousand times slower than `raster`, and what it is tested against."""
+    """Reference backend of the tests, about a thousand times slower than `raster`."""
 
     name = "oracle"
 
@@ -39,5 +39,5 @@ class OracleScorer(ScorerBase):
         return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)
 
     def _depth(self, pose: Array) -> Array:
-        T = self._primitives.placed(self._model.transforms(pose))
+        T = self._primitives.transforms(self._model.transforms(pose))
         return raycast(self.target.camera, self._primitives.kinds, T, self._primitives.bodies).depth

@@ -1,7 +1,7 @@
-"""A plain float64 ray caster for transformed unit spheres and cylinders: the truth other renderers are held to.
+"""A plain float64 ray caster of transformed unit spheres and cylinders.
 
-Every pixel's ray is taken back into the unit frame of each primitive, homogeneously, so that cones (projective
-images of the cylinder) need no special case, and intersected there with ux^2 + uy^2 (+ uz^2) = uw^2.
+Every pixel's ray is transformed to the unit frame of each primitive and intersected with
+ux^2 + uy^2 (+ uz^2) = uw^2. Homogeneous coordinates cover cones, the projective images of the cylinder.
 """
 
 import math
@@ -24,11 +24,15 @@ def raycast(
     labels: Index,
     onto: RenderedSurface | None = None,
 ) -> RenderedSurface:
-    """Render N unit primitives placed by `T_camera_unit` (N, 4, 4); returns the nearest hit at every pixel centre.
+    """Render N unit primitives; return the nearest hit at every pixel centre.
 
-    Only faces seen from outside are drawn, from NEAR onward: a primitive that holds the lens shows nothing.
-    Cylinders are open: the hand closes every end with a sphere or ellipsoid. With `onto`, that surface is drawn
-    over in place.
+    kinds: (N,) SPHERE or CYLINDER.
+    T_camera_unit: (N, 4, 4) metres, from a primitive's unit frame to the camera frame.
+    labels: (N,) written at the pixels of each primitive.
+    onto: a surface to draw over in place; a new one if None.
+
+    Only faces visible from outside and beyond NEAR are drawn, so a primitive around the optical centre is invisible.
+    Cylinders are open, since the hand closes every end with a sphere or ellipsoid.
     """
     surface = RenderedSurface.empty(camera) if onto is None else onto
     inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
@@ -47,13 +51,13 @@ def raycast(
 
 
 def _bounds(camera: Camera, kind: int, T: Array) -> Rect:
-    """Return the pixels that may see a primitive: the projected corners of its bounding box."""
+    """Return the pixels that a primitive may cover: those of its projected bounding box."""
     low = 0.0 if kind == CYLINDER else -1.0
     corners = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (low, 1.0)]) @ T.T
     points = corners[:, :3] / corners[:, 3:]
     if points[:, 2].max() < NEAR:
         return Rect(0, 0, 0, 0)
-    if points[:, 2].min() < NEAR:  # reaches behind the lens: no bound on its image
+    if points[:, 2].min() < NEAR:  # extends behind the camera: its image is unbounded
         return camera.rect
     return Rect.around(camera.project(points)).clipped(camera.rect)
 

@@ -1,4 +1,4 @@
-"""What a renderer of surfaces returns: depth, what was hit, and which way it faces."""
+"""The output of a surface renderer: depth, label and normal of every pixel."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -10,15 +10,16 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.types import Array
 
 NEAR = 1e-3
-"""Nothing closer to the lens than this (metres) is seen."""
+"""Near plane, metres: anything closer is invisible."""
 
 
 @dataclass
 class RenderedSurface:
-    """The nearest surface in every pixel of an image.
+    """The nearest surface at every pixel of an image.
 
-    `depth` (h, w) metres along the optical axis, 0 where nothing was hit; `label` (h, w) of the thing hit, -1 for
-    nothing; `normal` (h, w, 3) unit, towards the camera, camera frame.
+    depth: (h, w) metres along the optical axis, 0 = no hit.
+    label: (h, w) of the primitive or face hit, -1 = no hit.
+    normal: (h, w, 3) unit, towards the camera, camera frame.
     """
 
     depth: Array
@@ -27,5 +28,6 @@ class RenderedSurface:
 
     @classmethod
     def empty(cls, camera: Camera) -> Self:
+        """Return a surface without a hit."""
         h, w = camera.shape
         return cls(np.zeros((h, w)), np.full((h, w), -1, dtype=np.int16), np.zeros((h, w, 3)))

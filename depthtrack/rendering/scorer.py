@@ -1,4 +1,4 @@
-"""The scorer: one protocol for every backend that renders hypotheses and compares them with an observation."""
+"""The scorer protocol of all backends that render hypotheses and compare them with a target."""
 
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
@@ -13,10 +13,10 @@ from depthtrack.types import Array, Depth
 
 
 class Scores(NamedTuple):
-    """What a tracker needs of scored poses.
+    """Energies and silhouette agreements of scored poses.
 
-    energy: (B,) energies of Eq. (1).
-    agreement: (B,) agreement of rendered and observed silhouette, 0 to 1: 1 minus the silhouette term of Eq. (2).
+    energy: (B,) of Eq. (1).
+    agreement: (B,) 0 to 1: 1 minus the silhouette term of Eq. (2).
     """
 
     energy: Array
@@ -24,42 +24,47 @@ class Scores(NamedTuple):
 
 
 class Scorer(Protocol):
-    """Scores hand hypotheses against one observation at a time (Oikonomidis et al. 2011, Sec. 2.3).
+    """Scores hand hypotheses against one target at a time (Oikonomidis et al. 2011, Sec. 2.3).
 
-    Poses are (B, 27); depth is metres. Only faces seen from outside are drawn, from `rendered_surface.NEAR` onward: a
-    primitive that holds the lens shows nothing. Backends agree with `oracle` and give the same bits for any
-    number of threads. A scorer is used by one thread at a time and closed when done (or used in a `with`).
+    Poses are (B, 27): metres, quaternion, radians, camera frame. Only faces visible from outside and beyond
+    `rendered_surface.NEAR` are drawn, so a primitive around the optical centre is invisible. Backends agree with
+    `oracle` and give the same bits for any number of threads. Use a scorer in one thread at a time, and close it or use
+    it in a `with`.
     """
 
     name: str
 
     @property
     def target(self) -> Target:
-        """The observation last set by `set_target`. Raises RuntimeError before that."""
+        """The target of the last `set_target`.
+
+        Raises:
+            RuntimeError: if no target was set.
+        """
         ...
 
     def set_target(self, target: Target) -> None:
-        """Set what the next calls score against; its camera is the one hypotheses are seen with."""
+        """Set the target of the next calls; its camera renders the hypotheses."""
         ...
 
     def score(self, poses: ArrayLike) -> Array:
-        """Energies (B,) of Eq. (1)."""
+        """Return the energies (B,) of Eq. (1) of poses (B, 27)."""
         ...
 
     def evaluate(self, poses: ArrayLike) -> Scores:
-        """Return the energies of `score` with the agreement of the silhouettes."""
+        """Return the energies of poses (B, 27) with the agreement of the silhouettes."""
         ...
 
     def terms(self, poses: ArrayLike) -> Terms:
-        """Energies with the separate terms of Eq. (1) and (2)."""
+        """Return the energies of poses (B, 27) with the terms of Eq. (1) and (2)."""
         ...
 
     def render(self, pose: ArrayLike) -> Depth:
-        """Depth (h, w) of one hypothesis through the observation's camera, 0 where there is no hand."""
+        """Return the depth (h, w), metres, of a pose (27,) for the target's camera; 0 = no hand."""
         ...
 
     def close(self) -> None:
-        """Free what the backend holds; the scorer cannot be used after."""
+        """Free the backend's resources; the scorer is unusable afterwards."""
         ...
 
     def __enter__(self) -> Self: ...
@@ -70,12 +75,12 @@ class Scorer(Protocol):
 
 
 class ScorerBase:
-    """What backends share: closing by `with`, and the check of poses."""
+    """Base of the backends: the target, and closing by `with`."""
 
     _target: Target | None = None
 
     def close(self) -> None:
-        """Nothing to free unless a backend says otherwise."""
+        """Do nothing; a backend with resources overrides it."""
 
     def __enter__(self) -> Self:
         return self
@@ -89,20 +94,24 @@ class ScorerBase:
         raise NotImplementedError
 
     def evaluate(self, poses: ArrayLike) -> Scores:
-        """Return the energies with the agreement of the silhouettes."""
+        """Return the energies of poses (B, 27) with the agreement of the silhouettes."""
         terms = self.terms(poses)
-        return Scores(terms.energy, 1 - terms.silhouette)
+        return Scores(terms.energy, terms.agreement)
 
     @property
     def target(self) -> Target:
-        """The observation set by `set_target`. Raises RuntimeError before that."""
+        """The target of the last `set_target`; see `Scorer`."""
         if self._target is None:
             raise RuntimeError("call set_target(target) before scoring or rendering")
         return self._target
 
 
 def as_batch(poses: ArrayLike) -> Array:
-    """Poses as a contiguous (B, 27) float64 array. Raises ValueError for any other shape or non-finite numbers."""
+    """Return poses as a contiguous (B, 27) float64 array.
+
+    Raises:
+        ValueError: if the shape differs or a number is not finite.
+    """
     batch = np.ascontiguousarray(poses, dtype=np.float64)
     if batch.ndim != 2 or batch.shape[1] != POSE_SIZE:
         raise ValueError(f"poses must be (B, {POSE_SIZE}), found {batch.shape}")

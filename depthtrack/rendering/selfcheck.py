@@ -1,7 +1,7 @@
-"""A small scene on which a backend shows that it agrees with the oracle, and how fast it is.
+"""Self-check of a backend: its agreement with the oracle on a small scene, and its speed.
 
-`python -m depthtrack.rendering.selfcheck NAME [OPTIONS as JSON]` prints the result as JSON, or {"error": ...}: run in
-a process of its own, a driver that crashes or hangs takes nobody else with it.
+`python -m depthtrack.rendering.selfcheck NAME [OPTIONS as JSON]` prints the result as JSON, or {"error": ...}.
+A separate process contains a driver that crashes or hangs.
 """
 
 import json
@@ -26,17 +26,20 @@ from depthtrack.types import Array
 
 HYPOTHESES, SIDE = 64, 64
 _SEED = 11
-"""The first from 0 to leave no pixel within half a micrometre of d_m, where float32 could decide either way."""
+"""The first seed from 0 that leaves no pixel within half a micrometre of d_m, where float32 rounding would decide."""
 ENERGY_TOLERANCE = 1e-3
-DEPTH_TOLERANCE = 1e-4  # metres
-SILHOUETTE_TOLERANCE = 1e-3  # of the silhouette's pixels
+DEPTH_TOLERANCE = 1e-4
+"""Metres."""
+SILHOUETTE_TOLERANCE = 1e-3
+"""Share of the silhouette's pixels."""
 
 
 @dataclass(frozen=True)
 class SelfCheck:
-    """How a backend did: largest differences from the oracle, and its best speed at 64 x 64.
+    """Largest differences of a backend from the oracle, and its best speed at 64 x 64 pixels.
 
-    `silhouette_pixels` differ, of `silhouette_total`; `depth_difference` is metres, where both drew.
+    depth_difference: metres, over the pixels that both drew.
+    silhouette_pixels: pixels that differ, among the `silhouette_total` that the oracle drew.
     """
 
     renderer: str
@@ -49,7 +52,7 @@ class SelfCheck:
 
     @property
     def agrees(self) -> bool:
-        """Within the tolerances every backend is held to."""
+        """Whether all differences are within the tolerances."""
         return (
             self.energy_difference <= ENERGY_TOLERANCE
             and self.depth_difference <= DEPTH_TOLERANCE
@@ -58,7 +61,7 @@ class SelfCheck:
 
 
 def scene() -> tuple[HandShape, Target, Array]:
-    """A hand half a metre away, seen at 64 x 64 pixels, and 64 hypotheses around it."""
+    """Return a hand, its target of 64 x 64 pixels, and poses (64, 27) around the true one."""
     shape = HandShape()
     truth = within_limits(make_pose([0, 0, 0.5], [0.1, 1, 0.2, 0.1], np.full(20, 0.3)))
     rng = np.random.Generator(np.random.Philox(key=_SEED))
@@ -73,7 +76,11 @@ def scene() -> tuple[HandShape, Target, Array]:
 
 
 def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
-    """Hold a backend to the oracle on `scene`, and time it for about so long. Raises what `create_scorer` raises."""
+    """Compare a backend with the oracle on `scene`, and time it for about `seconds`.
+
+    Raises:
+        DepthtrackError: see `create_scorer`.
+    """
     shape, target, poses = scene()
     with create_scorer(name, shape, **options) as scorer, OracleScorer(shape) as oracle:
         scorer.set_target(target)
@@ -94,7 +101,7 @@ def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
 
 
 def _speed(scorer: Scorer, poses: Array, seconds: float) -> float:
-    """Hypotheses a second, by the best of the calls that fit: others' work on the machine only ever slows one."""
+    """Return hypotheses a second of the fastest call, the one least slowed by other load."""
     best, end = np.inf, time.perf_counter() + seconds
     while (start := time.perf_counter()) < end:
         scorer.score(poses)
@@ -103,7 +110,7 @@ def _speed(scorer: Scorer, poses: Array, seconds: float) -> float:
 
 
 def main() -> int:
-    """What a probing process runs; returns its exit code."""
+    """Print the self-check of the backend named on the command line; return the exit code."""
     name, *rest = sys.argv[1:]
     try:
         result: dict[str, Any] = asdict(self_check(name, **(json.loads(rest[0]) if rest else {})))

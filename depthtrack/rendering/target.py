@@ -1,4 +1,4 @@
-"""What hypotheses are scored against: the silhouette and depth maps of a region of interest, at any resolution."""
+"""The observed silhouette and depth maps that hypotheses are scored against."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ from depthtrack.types import Depth, Index, Mask
 
 @dataclass(frozen=True)
 class Target:
-    """The maps O = (o_s, o_d) of Oikonomidis et al. 2011, Sec. 2.1, that a scorer compares hypotheses with.
+    """The observed maps O = (o_s, o_d) of Oikonomidis et al. 2011, Sec. 2.1.
 
-    `camera`: of the region of interest.
-    `silhouette` (h, w): True for pixels of the hand's silhouette.
-    `depth` (h, w): metres, 0 where there is no reading of the hand.
+    camera: of the region of interest.
+    silhouette: (h, w) true for pixels of the hand.
+    depth: (h, w) metres, 0 = no reading of the hand.
 
     Raises:
-        InputError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
+        ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
     """
 
     camera: Camera
@@ -32,9 +32,9 @@ class Target:
         object.__setattr__(self, "depth", np.ascontiguousarray(self.depth, dtype=np.float32))
         for name, found in (("silhouette", self.silhouette.shape), ("depth", self.depth.shape)):
             if found != self.camera.shape:
-                raise InputError(f"the {name} map must be {self.camera.shape} as its camera says, found {found}")
+                raise ValueError(f"the {name} map must have the camera's shape {self.camera.shape}, found {found}")
         if not np.all(np.isfinite(self.depth)) or self.depth.min() < 0:
-            raise InputError("the depth map must hold finite metres, 0 where there is no reading")
+            raise ValueError("the depth map must hold finite metres, 0 where there is no reading")
 
     @classmethod
     def blank(cls, camera: Camera) -> "Target":
@@ -42,19 +42,21 @@ class Target:
         return Target(camera, np.zeros(camera.shape, np.bool_), np.zeros(camera.shape, np.float32))
 
     def crop(self, region: Rect) -> "Target":
-        """Return the part in a region, which may reach outside: nothing is observed there."""
+        """Return the part in a region, which may extend outside, where nothing is observed."""
         return Target(self.camera.crop(region), region.crop(self.silhouette), region.crop(self.depth))
 
     def reduced(self, side: int) -> "Target":
         """Return the target sampled so that its longer side has at most `side` pixels.
 
-        Depths are picked, never averaged, for an average of two surfaces lies on neither.
+        Each depth is the nearest pixel's, since the average of two surfaces lies on neither.
+
+        side: an option of the user.
 
         Raises:
             InputError: if `side` is less than 1.
         """
         if side < 1:
-            raise InputError(f"a reduced region needs at least 1 pixel a side, found {side}")
+            raise InputError(f"the resolution must be at least 1 pixel, found {side}")
         factor = side / max(self.camera.shape)
         if factor >= 1:
             return self

@@ -1,4 +1,4 @@
-"""A float64 z-buffer for triangle meshes: perspective-correct depth, label and interpolated normal."""
+"""A float64 z-buffer of triangle meshes: perspective-correct depth, label and normal."""
 
 import math
 
@@ -19,10 +19,13 @@ def rasterise(
     labels: Index,
     onto: RenderedSurface | None = None,
 ) -> RenderedSurface:
-    """Render triangles; both sides are seen, and triangles that reach in front of the lens (z < NEAR) are dropped.
+    """Render triangles from both sides; return the nearest hit at every pixel centre.
 
-    `vertices` (V, 3) metres in the camera frame, `faces` (F, 3), `vertex_normals` (V, 3) of any length, `labels`
-    (F,) written where a face is nearest. With `onto`, that surface is drawn over in place.
+    vertices: (V, 3) metres, camera frame; a triangle with a vertex nearer than NEAR is left out.
+    faces: (F, 3) vertex indices.
+    vertex_normals: (V, 3) of any length, camera frame.
+    labels: (F,) written at the pixels of each face.
+    onto: a surface to draw over in place; a new one if None.
     """
     surface = RenderedSurface.empty(camera) if onto is None else onto
     _rasterise(

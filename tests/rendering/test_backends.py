@@ -32,7 +32,7 @@ def test_an_unknown_name_lists_those_there_are() -> None:
 
 
 def test_an_unknown_option_lists_those_there_are() -> None:
-    with pytest.raises(InputError, match="'egl' has no option 'threads': it knows sums, device"):
+    with pytest.raises(InputError, match="'egl' has no option 'threads': its options are sums, device"):
         create_scorer("egl", HandShape(), threads=2)
-    with pytest.raises(InputError, match="'oracle' has no option 'platform': it knows no options"):
+    with pytest.raises(InputError, match="'oracle' has no option 'platform': its options are none"):
         create_scorer("oracle", HandShape(), platform="egl")

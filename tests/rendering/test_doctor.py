@@ -66,13 +66,13 @@ def pretend(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch, time_limit
     ("body", "problem"),
     [
         ("echo 'driver: out of luck' >&2; kill -SEGV $$", "crashed with SIGSEGV: driver: out of luck"),
-        ("sleep 60", "gave no answer within 0.5 s"),
-        ("sleep 60 & sleep 60", "gave no answer within 0.5 s"),
+        ("sleep 60", "gave no result within 0.5 s"),
+        ("sleep 60 & sleep 60", "gave no result within 0.5 s"),
         (
             "echo Traceback >&2; echo 'ImportError: no module' >&2; exit 1",
             "failed with exit code 1: ImportError: no module",
         ),
-        ("exit 0", "failed with exit code 0: it left no message"),
+        ("exit 0", "failed with exit code 0: no message"),
         ("""echo '{"hypotheses_per_s": 1}'""", "failed with exit code 0"),
         ("""echo 'driver chatter'; echo '{"error": "run  apt-get install libegl1"}'""", "run  apt-get install libegl1"),
     ],
@@ -138,7 +138,7 @@ def test_json_holds_the_machine_and_every_renderer(outcomes: list[Outcome], caps
 def test_a_default_renderer_that_fails_ends_with_code_2(
     outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    outcomes[0] = Outcome(outcomes[0].trial, None, "crashed with SIGILL: it left no message")
+    outcomes[0] = Outcome(outcomes[0].trial, None, "crashed with SIGILL: no message")
     assert main(["doctor"]) == 2
     assert "the default renderer, raster, does not work here: crashed with SIGILL" in capsys.readouterr().err
 

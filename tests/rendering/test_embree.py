@@ -80,7 +80,7 @@ def test_the_ray_caster_sees_the_primitives_as_embree_does(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape, (pose, camera) = random_shape(rng), random_view(rng)
     primitives, transforms = Primitives.of(shape), HandModel(shape).transforms(pose)
-    surface = raycast(camera, primitives.kinds, primitives.placed(transforms), primitives.bodies)
+    surface = raycast(camera, primitives.kinds, primitives.transforms(transforms), primitives.bodies)
     mesh = Tessellation.of(primitives, subdivisions=5)
     theirs = embree_depth(camera, mesh.posed(transforms), mesh.faces)
     seen, expected = surface.depth > 0, theirs > 0

@@ -145,7 +145,7 @@ def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
     intrinsics = camera.fx, camera.fy, camera.cx, camera.cy
     assert place_impostors(poses, HandTable.of(shape), intrinsics, camera.shape, 1, instances, regions) == 37
     primitives = Primitives.of(shape)
-    T = primitives.placed(HandModel(shape).transforms(poses[0]))
+    T = primitives.transforms(HandModel(shape).transforms(poses[0]))
     for k in range(37):
         v, u = np.nonzero(raycast(camera, primitives.kinds[k : k + 1], T[k : k + 1], np.zeros(1, np.int64)).depth)
         if not len(u):  # a cone seen from its wide end hides its wall

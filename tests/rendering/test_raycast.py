@@ -23,7 +23,7 @@ def directions(camera: Camera) -> np.ndarray:
     return np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(camera.shape)], axis=-1)
 
 
-def placed(kind: int, T: np.ndarray) -> np.ndarray:
+def depth_of(kind: int, T: np.ndarray) -> np.ndarray:
     return raycast(CAMERA, np.array([kind]), T[None], np.array([3])).depth
 
 
@@ -45,7 +45,7 @@ def test_sphere_depth_equals_the_closed_form(seed: int) -> None:
     a, b, c = (d * d).sum(-1), d @ centre, centre @ centre - radius**2
     D = b * b - a * c
     expected = np.where(D >= 0, (b - np.sqrt(np.maximum(D, 0))) / a, 0)
-    np.testing.assert_allclose(placed(SPHERE, T), expected, atol=1e-9)
+    np.testing.assert_allclose(depth_of(SPHERE, T), expected, atol=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -57,7 +57,7 @@ def test_cone_hits_lie_on_the_cone(seed: int) -> None:
     T = np.eye(4)
     T[:3, :3] = trimesh.transformations.random_rotation_matrix(rng.uniform(size=3))[:3, :3]
     T[:3, 3] = rng.uniform([-0.1, -0.1, 0.5], [0.1, 0.1, 0.7])
-    depth = placed(CYLINDER, T @ cone((0, 0, 0), length, r0, r1))
+    depth = depth_of(CYLINDER, T @ cone((0, 0, 0), length, r0, r1))
     hits = directions(CAMERA)[depth > 0] * depth[depth > 0][:, None]
     local = (hits - T[:3, 3]) @ T[:3, :3]
     along = local[:, 1]
@@ -80,7 +80,7 @@ def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: 
     shape = HandShape(scale=scale)
     primitives, pose = Primitives.of(shape), random_pose_in_view(seed)
     pose[:3] = [0, 0, 0.3]
-    T = primitives.placed(HandModel(shape).transforms(pose))
+    T = primitives.transforms(HandModel(shape).transforms(pose))
     exact = raycast(CAMERA, primitives.kinds, T, primitives.bodies)
     ball = trimesh.creation.icosphere(subdivisions=4)
     tube = trimesh.creation.cylinder(radius=1, segment=[[0, 0, 0], [0, 0, 1]], sections=96, cap=False)
@@ -103,7 +103,7 @@ def test_normals_are_unit_and_face_the_camera() -> None:
     surface = raycast(
         CAMERA,
         primitives.kinds,
-        primitives.placed(HandModel(shape).transforms(random_pose_in_view(3))),
+        primitives.transforms(HandModel(shape).transforms(random_pose_in_view(3))),
         primitives.bodies,
     )
     seen = surface.depth > 0
@@ -118,7 +118,7 @@ def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
     pose[:3] = [0, 0, z]
     primitives = Primitives.of(shape)
     depth = raycast(
-        CAMERA, primitives.kinds, primitives.placed(HandModel(shape).transforms(pose)), primitives.bodies
+        CAMERA, primitives.kinds, primitives.transforms(HandModel(shape).transforms(pose)), primitives.bodies
     ).depth
     assert np.all(np.isfinite(depth))
     assert np.all((depth == 0) | (depth >= NEAR))
@@ -126,8 +126,8 @@ def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
 
 
 def test_a_primitive_around_the_lens_shows_nothing() -> None:
-    assert not placed(SPHERE, ellipsoid((0, 0, 0), (0.3, 0.3, 0.3))).any()
-    assert placed(SPHERE, ellipsoid((0, 0, 0.4), (0.3, 0.3, 0.3))).any()
+    assert not depth_of(SPHERE, ellipsoid((0, 0, 0), (0.3, 0.3, 0.3))).any()
+    assert depth_of(SPHERE, ellipsoid((0, 0, 0.4), (0.3, 0.3, 0.3))).any()
 
 
 def test_drawing_onto_a_surface_keeps_what_is_nearer() -> None:

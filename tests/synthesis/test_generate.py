@@ -60,7 +60,7 @@ def test_ground_truth_is_that_of_the_hand_alone_except_for_occlusions(model: Any
     transforms = HandModel(shape).transforms(frame.pose)
     if model == "primitives":
         hand = Primitives.of(shape)
-        alone = raycast(camera, hand.kinds, hand.placed(transforms), hand.bodies)
+        alone = raycast(camera, hand.kinds, hand.transforms(transforms), hand.bodies)
     else:
         skin = Skin.of(shape)
         vertices = skin.vertices(transforms)

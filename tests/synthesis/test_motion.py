@@ -94,7 +94,7 @@ def test_grasp_occludes_most_fingertips_in_most_frames() -> None:
     poses = Viewpoint(0, 0.5).transform_poses(_sampled("grasp", rate=5))
     occluded = []
     for pose in poses:
-        surface = raycast(camera, primitives.kinds, primitives.placed(model.transforms(pose)), primitives.bodies)
+        surface = raycast(camera, primitives.kinds, primitives.transforms(model.transforms(pose)), primitives.bodies)
         tips = model.keypoints(pose)[8::4]
         u, v = np.rint(camera.project(tips)).astype(int).T
         # A fingertip is occluded if the visible surface is 1 cm or more in front of it.

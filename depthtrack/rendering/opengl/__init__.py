@@ -1,1 +1,1 @@
-"""Hypotheses drawn and compared by OpenGL, off-screen: EGL (a GPU or Mesa's software renderer) and OSMesa."""
+"""Off-screen OpenGL scorers: EGL (a GPU or Mesa's software renderer) and OSMesa."""

@@ -1,4 +1,4 @@
-"""An OpenGL context without a window, whatever platform gave it: current inside `with`, shared by turns, released."""
+"""An OpenGL context without a window, current inside `with` and shared between threads."""
 
 import atexit
 import os
@@ -13,7 +13,7 @@ Device = Literal["gpu", "software"] | int | None
 
 INSTALL: dict[Platform, str] = {
     "egl": "apt-get install libegl1 libgl1-mesa-dri libopengl0  (Debian, Ubuntu)",
-    "osmesa": "apt-get install libosmesa6  (Debian, Ubuntu; gone from Mesa 25.1 on, where egl is the one that lasts)",
+    "osmesa": "apt-get install libosmesa6  (Debian, Ubuntu; removed from Mesa 25.1 on: use egl there)",
 }
 FORKED = (
     "OpenGL was in use before this process was forked, and drivers do not survive a fork: use multiprocessing's 'spawn'"
@@ -22,32 +22,42 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swr ", "software")
 
 
 class OpenGLError(DepthtrackError):
-    """OpenGL cannot be used here; the message says what is missing and how to get it."""
+    """OpenGL is unusable here; the message names what is missing and how to install it."""
 
 
 class Binding(Protocol):
-    """A platform's context: how to make it the calling thread's current one, and how to end it."""
+    """The context of a platform."""
 
-    def bind(self) -> None: ...
-
-    def unbind(self) -> None:
-        """Put back whatever was current before."""
+    def bind(self) -> None:
+        """Make the context current in the calling thread."""
         ...
 
-    def destroy(self) -> None: ...
+    def unbind(self) -> None:
+        """Restore the context that was current before."""
+        ...
+
+    def destroy(self) -> None:
+        """Destroy the context."""
+        ...
 
 
 class Context:
-    """An OpenGL 3.3 core context. Inside `with context as gl:` it is current, and only there.
+    """An OpenGL 3.3 core context, current only inside `with context as gl:`.
 
-    `renderer` and `version` are what the driver says of itself; `software` tells that no GPU is behind it.
-    Threads take turns. Forked children are refused: drivers do not survive a fork.
+    renderer, version: the driver's own description.
+    software: whether the renderer runs on the CPU.
+    max_side: largest side of a texture, pixels.
+
+    Threads take turns.
+
+    Raises:
+        OpenGLError: if it is used in a forked child or after `close`.
     """
 
     def __init__(self, gl: Any, binding: Binding) -> None:
         self._gl, self._binding = gl, binding
         self._lock, self._depth, self._process = threading.RLock(), 0, os.getpid()
-        self._doomed: list[int] = []
+        self._discarded: list[int] = []
         self.closed = False
         self.renderer = "OpenGL"
         with self:
@@ -67,8 +77,8 @@ class Context:
             except BaseException:
                 self._lock.release()
                 raise
-            while self._doomed:
-                self._gl.glDeleteTextures(1, [self._doomed.pop()])
+            while self._discarded:
+                self._gl.glDeleteTextures(1, [self._discarded.pop()])
         self._depth += 1
         return self._gl
 
@@ -81,15 +91,15 @@ class Context:
         self._lock.release()
         if isinstance(error, self._gl.GLError):
             is_full = error.err == self._gl.GL_OUT_OF_MEMORY
-            what = "is out of memory: reduce the region" if is_full else f"failed with OpenGL error {error.err}"
-            raise OpenGLError(f"{self.renderer} {what}") from error
+            problem = "is out of memory: reduce the region" if is_full else f"failed with OpenGL error {error.err}"
+            raise OpenGLError(f"{self.renderer} {problem}") from error
 
     def discard_texture(self, name: int) -> None:
-        """Delete a texture when the context is next current: safe from any thread and from a destructor."""
-        self._doomed.append(name)
+        """Delete a texture when the context is next current; any thread or destructor may call it."""
+        self._discarded.append(name)
 
     def close(self) -> None:
-        """End the context and all that lives in it. In a forked child, where that would hang, nothing happens."""
+        """Destroy the context and its objects; do nothing in a forked child, where that would hang."""
         if self._process == os.getpid() and not self.closed:
             with self._lock:
                 self.closed = True
@@ -97,7 +107,11 @@ class Context:
                 atexit.unregister(self.close)
 
     def require_own_process(self) -> None:
-        """Raise OpenGLError in a forked child."""
+        """Check that the process is the one that opened the context.
+
+        Raises:
+            OpenGLError: in a forked child.
+        """
         if self._process != os.getpid():
             raise OpenGLError(FORKED)
 

@@ -1,6 +1,6 @@
-"""EGL contexts without a surface: on a GPU, or on Mesa's software renderer.
+"""EGL contexts without a surface, on a GPU or on Mesa's software renderer.
 
-Displays are never terminated: two requests for the same one share it, and ending it would end the other's contexts.
+Displays are never terminated: two requests may share a display, and its end would end the contexts of both.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ _MAX_DEVICES = 64
 
 
 class Egl(NamedTuple):
-    """PyOpenGL's modules: EGL itself, and its extensions that list devices and open displays by platform."""
+    """PyOpenGL's EGL modules: core, device enumeration, and displays by platform."""
 
     core: Any
     devices: Any
@@ -27,7 +27,7 @@ class Egl(NamedTuple):
 
 @dataclass(frozen=True)
 class EglDevice:
-    """A device EGL offers, by its place in the list; `software` is the device's own word."""
+    """An EGL device and its index in EGL's list; `software` is reported by the device."""
 
     index: int
     description: str
@@ -36,7 +36,12 @@ class EglDevice:
 
 
 class EglBinding:
-    """A context of OpenGL 3.3 on an initialised display. Raises OpenGLError or PyOpenGL's EGLError."""
+    """An OpenGL 3.3 core context on an initialised display.
+
+    Raises:
+        OpenGLError: if the display gives no such context.
+        EGLError: of PyOpenGL, if EGL rejects a call.
+    """
 
     def __init__(self, egl: Egl, display: Any) -> None:
         self._egl, self._display = egl.core, display
@@ -70,9 +75,12 @@ class EglBinding:
 
 
 def open_egl(egl: Egl, device: Device, context_of: Callable[[Binding], Context]) -> Context:
-    """The first context that works on the device asked for, as `opening.open_context` describes.
+    """Return the first context that works on `device`; see `opening.open_context`.
 
-    A missing vendor driver falls back to software silently, so what was asked for is checked on the renderer.
+    A missing vendor driver falls back to software silently, so the kind of device is checked on the renderer.
+
+    Raises:
+        OpenGLError: if no display gives a context on such a device; it lists the displays tried.
     """
     found = []
     for name, open_display in _displays(egl, device):
@@ -90,12 +98,12 @@ def open_egl(egl: Egl, device: Device, context_of: Callable[[Binding], Context])
         found.append(f"{name}: {context.renderer}")
         context.close()
     missing = {"gpu": "finds no GPU", "software": "finds no software renderer"}.get(str(device), "gives no OpenGL 3.3")
-    mend = "a GPU needs its vendor's EGL driver" if device == "gpu" else f"run  {INSTALL['egl']}"
-    raise OpenGLError(f"EGL {missing}; tried {', '.join(found) or 'nothing, for it lists no device'}: {mend}")
+    remedy = "a GPU needs its vendor's EGL driver" if device == "gpu" else f"run  {INSTALL['egl']}"
+    raise OpenGLError(f"EGL {missing}; tried {', '.join(found) or 'nothing, since it lists no device'}: {remedy}")
 
 
 def list_devices(egl: Egl) -> list[EglDevice]:
-    """All devices EGL offers; none where it cannot list them."""
+    """Return all EGL devices; none if EGL cannot list them."""
     core, query = egl.core, egl.devices
     if "EGL_EXT_device_base" not in _names(egl) and "EGL_EXT_device_enumeration" not in _names(egl):
         return []
@@ -109,21 +117,21 @@ def list_devices(egl: Egl) -> list[EglDevice]:
 
 
 def _described(egl: Egl, index: int, handle: Any) -> EglDevice:
-    def ask(what: int) -> str:
+    def query(attribute: int) -> str:
         try:
-            return (egl.devices.eglQueryDeviceStringEXT(handle, what) or b"").decode(errors="replace")
+            return (egl.devices.eglQueryDeviceStringEXT(handle, attribute) or b"").decode(errors="replace")
         except egl.core.EGLError:
             return ""
 
-    extensions = ask(egl.core.EGL_EXTENSIONS)
+    extensions = query(egl.core.EGL_EXTENSIONS)
     software = "EGL_MESA_device_software" in extensions
-    file = ask(_DRM_DEVICE_FILE) if "EGL_EXT_device_drm" in extensions.split() else ""
+    file = query(_DRM_DEVICE_FILE) if "EGL_EXT_device_drm" in extensions.split() else ""
     description = "software" if software else file or extensions or "unnamed"
     return EglDevice(index, description, software, handle)
 
 
 def _displays(egl: Egl, device: Device) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """What to try for a device, in order: a name for people and how to open its display."""
+    """Yield the displays to try for a device, in order: its name and the function that opens it."""
     devices = list_devices(egl)
     if isinstance(device, int):
         if not 0 <= device < len(devices):
@@ -149,7 +157,7 @@ def _display(egl: Egl, platform: int, native: Any) -> Any:
 
 
 def _names(egl: Egl) -> list[str]:
-    """Extensions EGL has before any display is opened."""
+    """Return the client extensions, which exist before a display is opened."""
     try:
         return (egl.core.eglQueryString(egl.core.EGL_NO_DISPLAY, egl.core.EGL_EXTENSIONS) or b"").decode().split()
     except egl.core.EGLError:
@@ -157,7 +165,7 @@ def _names(egl: Egl) -> list[str]:
 
 
 def _config(egl: Egl, display: Any) -> Any:
-    """A configuration for a context that draws into textures only: none at all, where that is allowed."""
+    """Return a configuration for drawing into textures only; None if EGL needs none."""
     core = egl.core
     if "EGL_KHR_no_config_context" in core.eglQueryString(display, core.EGL_EXTENSIONS).decode().split():
         return None

@@ -1,9 +1,9 @@
-"""From poses to impostors: one screen rectangle a primitive, with the matrix that takes a pixel back to its unit frame.
+"""Impostors of poses: a rectangle a primitive and the map of its pixels to the unit frame.
 
-A point of the ray through a pixel, at inverse depth w, is (dx, dy, 1, w) up to scale, and the inverse of the matrix
-that places a primitive takes it to the unit frame. Written in pixels (x, y) from an anchor inside the rectangle, and
-in the inverse depth beyond that of the primitive's middle, that map has columns of order one, so the fragment shader
-solves its quadratic in float32 without cancellation. Everything before the shader is float64.
+A point at inverse depth w on the ray of a pixel is (dx, dy, 1, w) up to scale. The inverse of T_camera_unit maps it to
+the primitive's unit frame. Pixels (x, y) are counted from an anchor inside the rectangle, and w from that of the
+primitive's middle. The map then has columns of order one, so the fragment shader solves its quadratic in float32
+without cancellation. All steps before the shader use float64.
 """
 
 import math
@@ -19,15 +19,20 @@ from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.types import Array, Array32, Index
 
 VECTORS = 6
-"""An impostor is six 4-vectors: its rectangle in the atlas (left, top, right, bottom edges, pixels); the columns of
-its map that multiply x, y, 1 and w; and (w of its middle, 1 for a ball or 0 for a cylinder, anchor in the atlas)."""
+"""Number of 4-vectors of an impostor.
+
+0: its rectangle in the atlas: left, top, right, bottom edges, pixels.
+1 to 4: the columns of its map that multiply x, y, 1 and w.
+5: w of its middle, 1 for a ball or 0 for a cylinder, and the anchor in the atlas (2), pixels.
+"""
 
 
 class HandTable(NamedTuple):
-    """What of a hand does not depend on its pose, as the kernels read it; metres.
+    """The pose-independent constants of a hand for the kernels.
 
-    `chain`: see `Chain`; `kinds` (N,), `bodies` (N,), `T_body_unit` (N, 4, 4) of `Primitives`, and their inverses
-    `T_unit_body`.
+    chain: see `Chain`.
+    kinds, bodies, T_body_unit: (N,), (N,) and (N, 4, 4), metres; see `Primitives`.
+    T_unit_body: (N, 4, 4) inverses of T_body_unit.
     """
 
     chain: Chain
@@ -38,6 +43,7 @@ class HandTable(NamedTuple):
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
+        """Return the constants of a hand."""
         primitives = Primitives.of(shape)
         return cls(
             Chain.of(shape),
@@ -58,32 +64,34 @@ def place_impostors(
     instances: Array32,
     regions: Index,
 ) -> int:
-    """Write the impostors of all poses (B, 27), tile by tile from the atlas' first corner; returns how many.
+    """Write the impostors of all poses, tile by tile; return their number.
 
-    `intrinsics` fx, fy, cx, cy in pixels; `tile` (height, width); `columns` tiles make a row of the atlas.
-    `instances` (>= 37 B, 6, 4) receives what VECTORS says, primitives out of sight left out. `regions` (B, 4)
-    receives the pixels of each tile that may be drawn, in the order of `geometry.rectangle.Rect`.
+    poses: (B, 27) metres, quaternion, radians, camera frame.
+    intrinsics: fx, fy, cx, cy, pixels.
+    tile: (height, width), pixels; `columns` tiles make a row of the atlas.
+    instances: (>= 37 B, 6, 4) written as `VECTORS` describes; invisible primitives are left out.
+    regions: (B, 4) written: the pixels of each tile that may be drawn, in the order of `geometry.rectangle.Rect`.
     """
-    placed = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
+    bodies = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
     T, M, map_ = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     region = np.empty(4, np.int64)
     height, width = tile
     fx, fy, cx, cy = intrinsics
     count = 0
     for n in range(poses.shape[0]):
-        forward_kinematics(hand.chain, poses[n], placed)
+        forward_kinematics(hand.chain, poses[n], bodies)
         left, top = n % columns * width, n // columns * height
         regions[n, 0], regions[n, 1], regions[n, 2], regions[n, 3] = width, height, 0, 0
         for k in range(hand.kinds.shape[0]):
             body, is_cylinder = hand.bodies[k], hand.kinds[k] == CYLINDER
-            _compose(placed.T[body], hand.T_body_unit[k], T)
+            _compose(bodies.T[body], hand.T_body_unit[k], T)
             middle = _bounds(T, is_cylinder, intrinsics, tile, region)
             u0, v0, u1, v1 = region
             if middle <= 0.0 or u1 <= u0 or v1 <= v0:
                 continue
             regions[n, 0], regions[n, 1] = min(regions[n, 0], u0), min(regions[n, 1], v0)
             regions[n, 2], regions[n, 3] = max(regions[n, 2], u1), max(regions[n, 3], v1)
-            _uncompose(hand.T_unit_body[k], placed.T[body], M)
+            _uncompose(hand.T_unit_body[k], bodies.T[body], M)
             anchor_u, anchor_v, w = (u0 + u1) // 2, (v0 + v1) // 2, 1.0 / middle
             dx, dy = (anchor_u - cx) / fx, (anchor_v - cy) / fy
             for i in range(4):
@@ -102,7 +110,7 @@ def place_impostors(
 
 @numba.njit(cache=True)
 def _compose(B: Array, T_body_unit: Array, T: Array) -> None:
-    """Write T_camera_unit = T_camera_body T_body_unit (4, 4) to `T`; `B` (3, 4) is T_camera_body."""
+    """Write T_camera_unit = T_camera_body T_body_unit to `T`; `B` (3, 4) is T_camera_body."""
     for j in range(4):
         x, y, z, w = T_body_unit[0, j], T_body_unit[1, j], T_body_unit[2, j], T_body_unit[3, j]
         for i in range(3):
@@ -112,9 +120,9 @@ def _compose(B: Array, T_body_unit: Array, T: Array) -> None:
 
 @numba.njit(cache=True)
 def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
-    """Write T_unit_camera = T_unit_body T_body_camera to `M` (4, 4); `B` = [R t] (3, 4) is T_camera_body.
+    """Write T_unit_camera = T_unit_body T_body_camera to `M` (4, 4).
 
-    The inverse of [R t; 0 1] is [R' -R't; 0 1].
+    B = [R t] (3, 4) is T_camera_body; the inverse of [R t; 0 1] is [R' -R't; 0 1].
     """
     for i in range(4):
         x, y, z = T_unit_body[i, 0], T_unit_body[i, 1], T_unit_body[i, 2]
@@ -128,17 +136,17 @@ def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
 def _bounds(
     T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], region: Index
 ) -> float:
-    """Write the pixels of the tile that a placed primitive may cover, in the order of `geometry.rectangle.Rect`.
+    """Write the pixels of the tile that a primitive may cover to `region`, ordered like `Rect`.
 
-    The image of a ball is bounded by the planes through the lens that touch it, and a cone's by those of its two
-    end discs. Returns the depth of the middle of what lies before NEAR, or 0 where nothing does.
+    T: (4, 4) T_camera_unit. Tangent planes through the optical centre bound the image of a ball. Those of the two end
+    discs bound a cone. Returns the middle depth, metres, of the part beyond NEAR, or 0 if there is none.
     """
     fx, fy, cx, cy = intrinsics
     height, width = tile
     x_low, x_high, y_low, y_high = math.inf, -math.inf, math.inf, -math.inf
     z_low, z_high = math.inf, -math.inf
     for end in range(2 if is_cylinder else 1):
-        # Centre, and the sums of products of the axes: what bounds a ball's outline, or a disc's.
+        # The centre and the sums of products of the axes bound the outline of a ball or disc.
         w = T[3, 3] + end * T[3, 2]
         px, py, pz = (T[0, 3] + end * T[0, 2]) / w, (T[1, 3] + end * T[1, 2]) / w, (T[2, 3] + end * T[2, 2]) / w
         xx, yy, xz, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -148,7 +156,7 @@ def _bounds(
         z_low, z_high = min(z_low, pz - math.sqrt(zz)), max(z_high, pz + math.sqrt(zz))
         a = pz * pz - zz
         if a > 0.0:
-            # The planes (x - s z = 0) that touch it solve a s^2 - 2 b s + c = 0; likewise for y.
+            # The tangent planes x - s z = 0 solve a s^2 - 2 b s + c = 0; likewise for y.
             b = px * pz - xz
             root = math.sqrt(max(b * b - a * (px * px - xx), 0.0))
             x_low, x_high = min(x_low, (b - root) / a), max(x_high, (b + root) / a)
@@ -157,7 +165,7 @@ def _bounds(
             y_low, y_high = min(y_low, (b - root) / a), max(y_high, (b + root) / a)
     if z_high < NEAR:
         return 0.0
-    if z_low < 0.01 * NEAR:  # reaches the lens' plane: no bound on its image
+    if z_low < 0.01 * NEAR:  # reaches the plane z = 0: its image is unbounded
         region[0], region[1], region[2], region[3] = 0, 0, width, height
     else:
         slack = 1e-6

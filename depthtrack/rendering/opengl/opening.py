@@ -1,7 +1,7 @@
-"""Opens OpenGL contexts; the one module that imports PyOpenGL.
+"""Opening of OpenGL contexts; the only module that imports PyOpenGL.
 
-PyOpenGL binds itself to one platform at its first import, by an environment variable, so a process can use EGL or
-OSMesa but not both, and nothing else here may import it.
+PyOpenGL binds itself to one platform at its first import, by an environment variable. So a process can use EGL or
+OSMesa but not both, and no other module may import PyOpenGL.
 """
 
 import ctypes
@@ -27,10 +27,13 @@ _MODULES: dict[Platform, tuple[str, ...]] = {
 
 
 def open_context(platform: Platform, device: Device = None) -> Context:
-    """A new context, released by `close` or when the process ends.
+    """Return a new context, released by `close` or at the end of the process.
 
-    `device` (EGL only): "gpu", "software", an index into `egl.list_devices`, or None for a GPU where there is one and
-    software otherwise. Raises OpenGLError naming the package to install, what was tried, or the platform in use.
+    device: "gpu", "software", an index into `egl.list_devices` (EGL only), or None for a GPU if there is one.
+
+    Raises:
+        OpenGLError: if there is no context; it names the package to install, the displays tried, or the platform in
+            use.
     """
     if platform == "osmesa":
         if device not in (None, "software"):
@@ -47,11 +50,15 @@ def open_context(platform: Platform, device: Device = None) -> Context:
 
 _load_lock = threading.Lock()
 _loaded_in: int | None = None
-"""The process that loaded OpenGL."""
+"""ID of the process that loaded OpenGL."""
 
 
 def load(platform: Platform) -> list[Any]:
-    """PyOpenGL's modules for a platform, as `_MODULES` lists them. Raises OpenGLError when that cannot be."""
+    """Return PyOpenGL's modules of a platform, in the order of `_MODULES`.
+
+    Raises:
+        OpenGLError: if a library is missing, another platform is in use, or the process was forked.
+    """
     global _loaded_in
     with _load_lock:
         if _loaded_in not in (None, os.getpid()):
@@ -67,7 +74,7 @@ def load(platform: Platform) -> list[Any]:
         except (ImportError, AttributeError, OSError, TypeError) as error:
             raise OpenGLError(f"PyOpenGL cannot load {platform} ({error}): run  {INSTALL[platform]}") from error
         finally:
-            # Child processes choose for themselves.
+            # A child process may choose another platform.
             if before is None:
                 del os.environ[_VARIABLE]
             else:
@@ -82,7 +89,7 @@ def _refuse_contradictions(platform: Platform) -> None:
         if bound != platform:
             raise OpenGLError(
                 f"this process already uses OpenGL through {bound}, and PyOpenGL allows one platform a process: "
-                f"run {platform} in a process of its own"
+                f"run {platform} in a separate process"
             )
     elif os.environ.get(_VARIABLE, platform) != platform:
         raise OpenGLError(

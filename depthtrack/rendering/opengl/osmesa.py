@@ -1,4 +1,4 @@
-"""OSMesa contexts: Mesa's software renderer in plain memory, no driver and no display."""
+"""OSMesa contexts: Mesa's software renderer in plain memory, without driver and display."""
 
 import ctypes
 from typing import Any
@@ -6,11 +6,15 @@ from typing import Any
 from depthtrack.rendering.opengl.context import OpenGLError
 
 _SIDE = 4
-"""Of the framebuffer OSMesa insists on, pixels; everything is drawn into textures instead."""
+"""Pixels of the framebuffer that OSMesa requires; all drawing goes to textures instead."""
 
 
 class OSMesaBinding:
-    """A context of OpenGL 3.3. Raises OpenGLError where OSMesa gives none."""
+    """An OpenGL 3.3 core context.
+
+    Raises:
+        OpenGLError: if OSMesa gives no such context.
+    """
 
     def __init__(self, osmesa: Any, gl: Any) -> None:
         self._osmesa, self._type = osmesa, gl.GL_UNSIGNED_BYTE
@@ -22,7 +26,7 @@ class OSMesaBinding:
         )
         self._context = osmesa.OSMesaCreateContextAttribs((ctypes.c_int * len(attributes))(*attributes), None)
         if not self._context:
-            raise OpenGLError("OSMesa gives no OpenGL 3.3 core context: a newer libosmesa6 is needed")
+            raise OpenGLError("OSMesa gives no OpenGL 3.3 core context: install a newer libosmesa6")
 
     def bind(self) -> None:
         if not self._osmesa.OSMesaMakeCurrent(self._context, self._state, self._type, _SIDE, _SIDE):

@@ -1,4 +1,4 @@
-"""Compiles the GLSL files of `shaders/`."""
+"""Programs compiled from the GLSL files of `shaders/`."""
 
 from typing import Any
 
@@ -7,28 +7,32 @@ from depthtrack.resources import resource_folder
 
 
 class Program:
-    """A linked pair of shaders of the current context, with its uniforms by name."""
+    """A linked vertex and fragment shader of the current context.
+
+    Raises:
+        OpenGLError: if the driver rejects a shader or the program; it quotes the driver's message.
+    """
 
     def __init__(self, gl: Any, vertex: str, fragment: str) -> None:
-        """Compile `shaders/<vertex>` and `shaders/<fragment>`. Raises OpenGLError with the driver's own words."""
+        """Compile `shaders/<vertex>` and `shaders/<fragment>`."""
         self._gl, self._name = gl, gl.glCreateProgram()
         for kind, file in ((gl.GL_VERTEX_SHADER, vertex), (gl.GL_FRAGMENT_SHADER, fragment)):
             shader = gl.glCreateShader(kind)
             gl.glShaderSource(shader, (resource_folder("shaders") / file).read_text(encoding="utf-8"))
             gl.glCompileShader(shader)
             if not gl.glGetShaderiv(shader, gl.GL_COMPILE_STATUS):
-                raise OpenGLError(f"the driver refuses shaders/{file}: {_words(gl.glGetShaderInfoLog(shader))}")
+                raise OpenGLError(f"the driver rejects shaders/{file}: {_text(gl.glGetShaderInfoLog(shader))}")
             gl.glAttachShader(self._name, shader)
-            gl.glDeleteShader(shader)  # lives on for as long as the program does
+            gl.glDeleteShader(shader)  # takes effect when the program is deleted
         gl.glLinkProgram(self._name)
         if not gl.glGetProgramiv(self._name, gl.GL_LINK_STATUS):
             raise OpenGLError(
-                f"the driver cannot link {vertex} with {fragment}: {_words(gl.glGetProgramInfoLog(self._name))}"
+                f"the driver cannot link {vertex} with {fragment}: {_text(gl.glGetProgramInfoLog(self._name))}"
             )
         self._uniforms: dict[str, int] = {}
 
     def use(self, **uniforms: float | int | tuple[int, int]) -> None:
-        """Make it current with these uniforms: a float, an int (texture unit), or two ints (ivec2)."""
+        """Make the program current and set its uniforms: float, int (texture unit) or two ints."""
         gl = self._gl
         gl.glUseProgram(self._name)
         for name, value in uniforms.items():
@@ -43,5 +47,5 @@ class Program:
                 gl.glUniform1f(location, value)
 
 
-def _words(log: bytes | str) -> str:
+def _text(log: bytes | str) -> str:
     return (log.decode(errors="replace") if isinstance(log, bytes) else log).strip()

@@ -1,4 +1,4 @@
-"""Draws tiles of hypotheses on one OpenGL context, and reduces them to the sums of Eq. (2): what all scorers share."""
+"""The renderer of an OpenGL context: tiles of hypotheses and their sums of Eq. (2)."""
 
 import ctypes
 import threading
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.rendering.opengl.context import Context, Device, Platform
+from depthtrack.rendering.opengl.context import Context, Device, OpenGLError, Platform
 from depthtrack.rendering.opengl.impostors import VECTORS
 from depthtrack.rendering.opengl.opening import open_context
 from depthtrack.rendering.opengl.programs import Program
@@ -16,14 +16,14 @@ from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.types import Array, Array32
 
 _BLOCK = 4
-"""Side of the blocks that one level of the pyramid sums; the shaders say the same."""
+"""Side of the blocks that one level of the pyramid sums, in pixels; the shaders repeat it."""
 _SIDE_SOFTWARE, _SIDE_HARDWARE = 1024, 2048
-"""Side of an atlas in pixels: what stays in a processor's cache, and what keeps a GPU busy."""
+"""Side of an atlas, pixels. The small one fits a processor's cache, the large one keeps a GPU busy."""
 
 
 @dataclass(frozen=True)
 class TileGrid:
-    """Tiles of `height` x `width` pixels, `columns` a row, at most `capacity` of them in an atlas."""
+    """Tiles of `height` x `width` pixels in an atlas: `columns` a row, at most `capacity`."""
 
     height: int
     width: int
@@ -31,33 +31,41 @@ class TileGrid:
     capacity: int
 
     def rows(self, count: int) -> int:
-        """Rows that `count` tiles fill, the last perhaps in part."""
+        """Return the rows that `count` tiles fill, the last one perhaps in part."""
         return -(-count // self.columns)
 
     def extent(self, count: int) -> tuple[int, int]:
-        """(height, width) in pixels of the part of the atlas that `count` tiles fill."""
+        """Return the (height, width), pixels, of the part of the atlas that `count` tiles fill."""
         return self.rows(count) * self.height, min(count, self.columns) * self.width
 
 
 class Atlas:
-    """A square float texture to draw tiles into; create, use and delete it while the context is current."""
+    """A square float texture to draw tiles into; its context must be current.
 
-    def __init__(self, gl: Any, side: int, internal: int, layout: int) -> None:
+    Raises:
+        OpenGLError: if the driver cannot draw into such a texture.
+    """
+
+    def __init__(self, gl: Any, side: int, internal_format: int, pixel_format: int) -> None:
         self.side = side
         self.texture, self.framebuffer = _texture(gl), gl.glGenFramebuffers(1)
-        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, internal, side, side, 0, layout, gl.GL_FLOAT, None)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, internal_format, side, side, 0, pixel_format, gl.GL_FLOAT, None)
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self.framebuffer)
         gl.glFramebufferTexture2D(gl.GL_FRAMEBUFFER, gl.GL_COLOR_ATTACHMENT0, gl.GL_TEXTURE_2D, self.texture, 0)
         if gl.glCheckFramebufferStatus(gl.GL_FRAMEBUFFER) != gl.GL_FRAMEBUFFER_COMPLETE:
-            raise InputError(f"this OpenGL driver cannot draw into float textures of {side} x {side}")
+            raise OpenGLError(f"this OpenGL driver cannot draw into float textures of {side} x {side} pixels")
 
     def delete(self, gl: Any) -> None:
+        """Delete the texture and its framebuffer."""
         gl.glDeleteFramebuffers(1, [self.framebuffer])
         gl.glDeleteTextures(1, [self.texture])
 
 
 class Renderer:
-    """Programs, buffers and atlases of one context. Methods need the context current: `with renderer.context as gl`."""
+    """Programs, buffers and atlases of one context.
+
+    Methods need the context to be current: `with renderer.context as gl`.
+    """
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -73,7 +81,11 @@ class Renderer:
         self._side = min(_SIDE_SOFTWARE if context.software else _SIDE_HARDWARE, context.max_side)
 
     def grid(self, gl: Any, height: int, width: int) -> TileGrid:
-        """How tiles of a size are laid out; the atlases grow when a single one does not fit."""
+        """Return the grid of tiles of a size, pixels; enlarge the atlases if one does not fit.
+
+        Raises:
+            InputError: if the tile is larger than the renderer's largest texture.
+        """
         if max(height, width) > self.context.max_side:
             raise InputError(
                 f"{self.context.renderer} draws at most {self.context.max_side} pixels a side, "
@@ -84,15 +96,15 @@ class Renderer:
             outgrown, self._atlases, self._pyramid = self._atlases + self._pyramid, [], []
             for atlas in outgrown:
                 atlas.delete(gl)
-            # Two atlases: one is read back while the other is drawn.
+            # One atlas is read back while the other is drawn.
             self._atlases = [Atlas(gl, self._side, gl.GL_R32F, gl.GL_RED) for _ in range(2)]
-        # Tiles narrower than a block still take one of the pyramid.
+        # A tile narrower than a block still takes one block of the pyramid.
         columns, rows = self._side // max(width, _BLOCK), self._side // max(height, _BLOCK)
         columns, rows = max(columns, 1), max(rows, 1)
         return TileGrid(height, width, columns, columns * rows)
 
     def draw(self, gl: Any, which: int, grid: TileGrid, count: int, instances: Array32) -> None:
-        """Draw the impostors (N, 6, 4) of `count` tiles into atlas `which`; returns before it is done."""
+        """Start to draw the impostors (N, 6, 4) of `count` tiles into atlas `which`."""
         atlas = self._atlases[which]
         height, width = grid.extent(count)
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, atlas.framebuffer)
@@ -110,7 +122,10 @@ class Renderer:
         gl.glFlush()
 
     def read(self, gl: Any, which: int, pixels: Array32) -> None:
-        """Inverse depth in 1/m of the first tiles of atlas `which` into `pixels` (rows, columns), once it is drawn."""
+        """Write the inverse depth, 1/m, of an atlas' first pixels to `pixels` (rows, columns).
+
+        The call waits until they are drawn.
+        """
         height, width = pixels.shape
         gl.glBindFramebuffer(gl.GL_FRAMEBUFFER, self._atlases[which].framebuffer)
         gl.glReadPixels(0, 0, width, height, gl.GL_RED, gl.GL_FLOAT, pixels)
@@ -118,13 +133,15 @@ class Renderer:
     def sum(
         self, gl: Any, which: int, grid: TileGrid, count: int, observation: int, match_depth: float, clamp_depth: float
     ) -> Array:
-        """Sums of Eq. (2) over the tiles of atlas `which`: (count, 3).
+        """Return the sums (count, 3) of Eq. (2) over the tiles of an atlas; see `sums.sum_tiles`.
 
-        `observation` is a texture filled by `upload`. The first level of the pyramid compares, the next ones add, until
-        one texel a tile is left (Sec. 2.5).
+        observation: a texture written by `upload`.
+        match_depth, clamp_depth: d_m and d_M, metres.
+
+        The first level of the pyramid compares and the next ones add, until one texel a tile is left (Sec. 2.5).
         """
         if not self._pyramid:
-            # Blocks take at most 2/5 of an atlas' side, for tiles of 5 pixels.
+            # Blocks take at most 2/5 of an atlas' side, reached by tiles of 5 pixels.
             self._pyramid = [Atlas(gl, self._side // 2, gl.GL_RGBA32F, gl.GL_RGBA) for _ in range(2)]
         gl.glDisable(gl.GL_BLEND)
         gl.glDisable(gl.GL_SCISSOR_TEST)
@@ -147,8 +164,9 @@ class Renderer:
     def _add_blocks(
         self, gl: Any, program: Program, source: Atlas, target: Atlas, tiles: tuple[int, int], size: tuple[int, int]
     ) -> tuple[int, int]:
-        """Run a program that turns each 4 x 4 block of `tiles` (columns, rows) of `size` (width, height) into a texel.
+        """Reduce each block of 4 x 4 texels of the tiles to one texel with a program.
 
+        tiles: (columns, rows). size: (width, height) of a tile in `source`, texels.
         Returns the size of a tile in `target`, whose framebuffer stays bound.
         """
         blocks = -(-size[0] // _BLOCK), -(-size[1] // _BLOCK)
@@ -160,11 +178,11 @@ class Renderer:
         return blocks
 
     def new_texture(self, gl: Any) -> int:
-        """A texture for `upload`, to be given back by `context.discard_texture`."""
+        """Return a texture for `upload`; `context.discard_texture` deletes it."""
         return _texture(gl)
 
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
-        """Fill a texture, whatever its size was, with depth (metres) and silhouette (0 or 1): (h, w, 2)."""
+        """Write an observation (h, w, 2) to a texture: depth (metres) and silhouette (0 or 1)."""
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
         gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RG32F, width, height, 0, gl.GL_RG, gl.GL_FLOAT, observation)
@@ -180,7 +198,7 @@ class Renderer:
 
 
 def _texture(gl: Any) -> int:
-    """A new texture, bound, read by texel only."""
+    """Return a new texture, bound, without interpolation."""
     texture = int(gl.glGenTextures(1))
     gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
     gl.glTexParameteri(gl.GL_TEXTURE_2D, gl.GL_TEXTURE_MIN_FILTER, gl.GL_NEAREST)
@@ -193,9 +211,12 @@ _shared_lock = threading.Lock()
 
 
 def shared_renderer(platform: Platform, device: Device = None) -> Renderer:
-    """The process' renderer for a device, opened at first use and kept until the process ends.
+    """Return the renderer of a device, which the scorers of this process share.
 
-    Scorers are cheap because contexts and compiled shaders are shared. Raises OpenGLError as `open_context` does.
+    It is opened at its first use and kept until the process ends.
+
+    Raises:
+        OpenGLError: see `open_context`.
     """
     with _shared_lock:
         renderer = _shared.get((platform, device))

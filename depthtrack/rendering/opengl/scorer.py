@@ -1,4 +1,7 @@
-"""The `egl` and `osmesa` backends: hypotheses drawn as impostors, many tiles at once (Oikonomidis 2011, Sec. 2.5)."""
+"""The `egl` and `osmesa` backends: hypotheses drawn as impostors in tiles of an atlas.
+
+Source: Oikonomidis et al. 2011, Sec. 2.5.
+"""
 
 import weakref
 from typing import Any, Literal
@@ -22,15 +25,22 @@ from depthtrack.types import Array, Array32, Depth, Index
 Sums = Literal["gpu", "cpu"]
 
 _PARTS, _SMALLEST_PART = 2, 16
-"""A software renderer gets a batch in parts, so that one is placed and another summed while a third is drawn."""
+"""A software renderer gets a batch in parts: one is summed while the next is drawn."""
 
 
 class OpenGLScorer(ScorerBase):
-    """Scores hypotheses drawn by OpenGL; `renderer` and `software` tell what draws them.
+    """Scores hypotheses drawn by OpenGL; `renderer` and `software` describe the renderer.
 
-    `platform` is "egl" or "osmesa"; `device` as in `opening.open_context`. `sums` says where Eq. (2) is summed: by
-    shaders ("gpu"), or by the CPU once tiles are read back ("cpu"), which is the default on a software renderer.
-    Scorers of one device share its context and may live together. Raises OpenGLError where OpenGL cannot be used.
+    platform: "egl" or "osmesa".
+    sums: where Eq. (2) is summed: by shaders ("gpu") or after reading tiles back ("cpu"). The default is "cpu" for a
+        software renderer, else "gpu".
+    device: see `opening.open_context`.
+
+    Scorers of one device share its context.
+
+    Raises:
+        InputError: if `platform` or `sums` has another value.
+        OpenGLError: if OpenGL is unusable here.
     """
 
     def __init__(
@@ -44,7 +54,7 @@ class OpenGLScorer(ScorerBase):
         if platform not in ("egl", "osmesa"):
             raise InputError(f"the OpenGL platform must be 'egl' or 'osmesa', found {platform!r}")
         if sums not in (None, "gpu", "cpu"):
-            raise InputError(f"sums are taken by 'gpu' or 'cpu', found {sums!r}")
+            raise InputError(f"sums must be 'gpu' or 'cpu', found {sums!r}")
         self.name: str = platform
         self._objective = objective or Objective()
         self._hand = HandTable.of(shape)
@@ -59,7 +69,7 @@ class OpenGLScorer(ScorerBase):
 
     def set_target(self, target: Target) -> None:
         camera = target.camera
-        # Floats, whatever the camera file held: one compiled kernel serves all.
+        # A camera file may hold integers; floats need only one compiled kernel.
         self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._silhouette = target.silhouette.astype(np.float32)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
@@ -106,7 +116,7 @@ class OpenGLScorer(ScorerBase):
     @property
     def _open(self) -> Renderer:
         if self._renderer is None:
-            raise RuntimeError("this scorer was closed")
+            raise RuntimeError("this scorer is closed: create a new one")
         return self._renderer
 
     def _part_size(self, grid: TileGrid, count: int) -> int:

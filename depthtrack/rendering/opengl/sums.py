@@ -1,4 +1,4 @@
-"""The sums of Eq. (2) over tiles read back from the renderer, on the CPU."""
+"""The sums of Eq. (2) over tiles read back from the renderer, computed on the CPU."""
 
 import numba
 import numpy as np
@@ -6,7 +6,7 @@ import numpy as np
 from depthtrack.types import Array, Array32, Index
 
 
-# Sums may be reordered, so that they vectorise; 0 and infinity behave as IEEE says.
+# Reordered sums vectorise; 0 and infinity keep their IEEE behaviour.
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
 def sum_tiles(
     inverse_depth: Array32,
@@ -19,11 +19,14 @@ def sum_tiles(
     clamp_depth: float,
     sums: Array,
 ) -> None:
-    """Write (B, 3) `sums`: min(|o_d - r_d|, d_M) in metres, o_s and r_m, o_s or r_m, over each of B tiles.
+    """Write the sums of Eq. (2) of B tiles.
 
-    `inverse_depth` (rows, >= columns * w), 1/m, 0 where nothing is drawn: tiles of the size of `depth` (h, w; metres,
-    0 = missing) and `silhouette` (h, w; 0 or 1). Only `regions` (B, 4) of the tiles, in the order of
-    `geometry.rectangle.Rect`, can hold drawn pixels; `empty` are the sums of a tile without any.
+    inverse_depth: (rows, >= columns * w) 1/m, 0 = nothing drawn; tiles of (h, w) pixels.
+    regions: (B, 4) the part of each tile that may be drawn, in the order of `geometry.rectangle.Rect`.
+    depth: (h, w) metres, 0 = no reading.
+    silhouette: (h, w) 0 or 1.
+    empty: sums of a tile in which nothing is drawn.
+    sums: (B, 3) written: min(|o_d - r_d|, d_M) in metres, pixels of o_s and r_m, pixels of o_s or r_m.
     """
     height, width = depth.shape
     match_, clamp = np.float32(match_depth), np.float32(clamp_depth)

@@ -1,18 +1,18 @@
-"""The rasteriser: quadrics into an inverse depth buffer, sixteen pixels at a time, then the sums of Eq. (2).
+"""Rasteriser kernels: quadrics to inverse depth, sixteen pixels at a time, and Eq. (2).
 
-The buffer holds 0 where nothing is drawn, so the depth test is a maximum, and whatever must not be seen only has to
-be 0, less, or NaN. Only blocks that something reached are compared with the observation and cleared again; what an
-empty image would cost is known beforehand.
+The buffer holds 0 where nothing is drawn, so the depth test is a maximum. A value that must not be drawn only has to be
+0, negative or NaN. Only tiles that a primitive may cover are compared with the observation and cleared again, since
+the sums of an empty image are computed once.
 """
 
 import numba
 import numpy as np
 
-from depthtrack.rendering.raster import layout
+from depthtrack.rendering.raster import hand_constants as constants
 from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.spans import find_spans
-from depthtrack.rendering.raster.tiles import BLOCK, COLUMNS, ROWS
+from depthtrack.rendering.raster.tiles import TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import (
     estimated_reciprocal,
@@ -35,20 +35,20 @@ from depthtrack.types import Array, Array32, Index
 
 _load = loader(F32X16)
 _fill = filler(F32X16)
-_LANE_COLUMN: Array32 = np.arange(BLOCK, dtype=np.float32) % COLUMNS
-_LANE_ROW: Array32 = np.arange(BLOCK, dtype=np.float32) // COLUMNS
+_LANE_COLUMN: Array32 = np.arange(TILE_PIXELS, dtype=np.float32) % TILE_WIDTH
+_LANE_ROW: Array32 = np.arange(TILE_PIXELS, dtype=np.float32) // TILE_WIDTH
 _W_NEAR = np.float32(1 / NEAR)
-_ACTIVE = layout.ACTIVE
-_LARGE = 64
-"""Blocks of a bounding box from which on it pays to find out which of them are needed."""
+_ACTIVE = constants.ACTIVE
+_LARGE_BOX = 64
+"""Tiles of a bounding box above which tighter spans save time."""
 
 
 @kernel_part
-def _draw(slot, is_segment, crosses_near, table, buffer, blocks, first, last, low, high):
-    """Draw one primitive; `low` and `high` keep the blocks of each stripe that were reached."""
+def _draw(slot, is_segment, crosses_near, table, buffer, tile_rows, first, last, low, high):
+    """Draw one primitive; extend `low` and `high`, the drawn tile rows of each tile column."""
     left, right = int(table[q.LEFT * q.SLOTS + slot]), int(table[q.RIGHT * q.SLOTS + slot])
     box_top, box_bottom = int(table[q.TOP * q.SLOTS + slot]), int(table[q.BOTTOM * q.SLOTS + slot])
-    is_large = (right - left + 1) * (box_bottom - box_top + 1) > _LARGE and table[q.D_VV * q.SLOTS + slot] < 0.0
+    is_large = (right - left + 1) * (box_bottom - box_top + 1) > _LARGE_BOX and table[q.D_VV * q.SLOTS + slot] < 0.0
     if is_large:
         find_spans(slot, is_segment, table, right - left + 1, box_top, box_bottom, first, last)
     beta, beta_u = table[q.BETA * q.SLOTS + slot], table[q.BETA_U * q.SLOTS + slot]
@@ -60,82 +60,82 @@ def _draw(slot, is_segment, crosses_near, table, buffer, blocks, first, last, lo
     axis_low, axis_high = _fill(table[q.AXIS_LOW * q.SLOTS + slot]), _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
     sigma = table[q.SIGMA * q.SLOTS + slot]
     is_special = crosses_near or sigma < 0.0
-    for stripe in range(left, right + 1):
+    for tile_column in range(left, right + 1):
         top, bottom = box_top, box_bottom
         if is_large:
-            top, bottom = first[stripe - left], last[stripe - left]
+            top, bottom = first[tile_column - left], last[tile_column - left]
             if bottom < top:
                 continue
-        low[stripe], high[stripe] = min(low[stripe], top), max(high[stripe], bottom)
-        # What depends on the column alone stays in registers down the stripe.
-        x = _load(_LANE_COLUMN, 0) + np.float32((stripe - left) * COLUMNS)
+        low[tile_column], high[tile_column] = min(low[tile_column], top), max(high[tile_column], bottom)
+        # Values that depend on the column alone stay in registers along the tile column.
+        x = _load(_LANE_COLUMN, 0) + np.float32((tile_column - left) * TILE_WIDTH)
         column_beta, column_d, column_d_v = x * beta_u + beta, x * (x * d_uu + d_u) + d, x * d_uv + d_v
         column_axis = x * axis_u + axis
-        y = _load(_LANE_ROW, 0) + np.float32((top - box_top) * ROWS)
-        start = (stripe * blocks + top) * BLOCK
-        for index in range(start, start + (bottom - top + 1) * BLOCK, BLOCK):
+        y = _load(_LANE_ROW, 0) + np.float32((top - box_top) * TILE_HEIGHT)
+        start = (tile_column * tile_rows + top) * TILE_PIXELS
+        for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             # A Newton step: with r near 1 / sqrt(D / 4), sqrt(D) is D / 4 r (3 - D / 4 r^2). NaN where D <= 0.
             quarter = y * (y * d_vv + column_d_v) + column_d
             r = estimated_reciprocal_sqrt(quarter)
             half = quarter * r
-            rest, line = np.float32(3.0) - half * r, y * beta_v + column_beta
+            correction, line = np.float32(3.0) - half * r, y * beta_v + column_beta
             if is_special:
-                w = half * sigma * rest + line
+                w = half * sigma * correction + line
                 w = select(w < _W_NEAR, w, 0.0)
             else:
-                w = half * rest + line
+                w = half * correction + line
             if is_segment:
                 e = y * axis_v + column_axis
                 w = vmin(w, vmin(e - w * axis_low, w * axis_high - e))
             store(buffer, index, max_or(w, _load(buffer, index)))
-            y = y + np.float32(ROWS)
+            y = y + np.float32(TILE_HEIGHT)
 
 
 @kernel_part
 def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high):
-    """Draw all primitives into a cleared buffer; returns how many blocks a stripe has."""
-    blocks = buffer.shape[0] // (low.shape[0] * BLOCK)
+    """Draw all primitives into a cleared buffer; return the number of tile rows."""
+    tile_rows = buffer.shape[0] // (low.shape[0] * TILE_PIXELS)
     set_up(pose, hand, camera, scratch, table)
-    crosses_near = pose[2] < hand[8 * layout.REACH] + NEAR
+    crosses_near = pose[2] < hand[8 * constants.BOUNDING_RADIUS] + NEAR
     for n in range(_ACTIVE.shape[0]):
         slot = _ACTIVE[n]
-        if slot < layout.CONES or slot > layout.GENERAL:
-            _draw(slot, False, crosses_near, table, buffer, blocks, first, last, low, high)
+        if slot < constants.CONES or slot > constants.GENERAL:
+            _draw(slot, False, crosses_near, table, buffer, tile_rows, first, last, low, high)
         else:
-            _draw(slot, True, crosses_near, table, buffer, blocks, first, last, low, high)
-    return blocks
+            _draw(slot, True, crosses_near, table, buffer, tile_rows, first, last, low, high)
+    return tile_rows
 
 
 @kernel_part
-def _compare(observed, silhouette, buffer, blocks, low, high, match_depth, clamp_depth):
-    """What the drawn pixels change in the sums of Eq. (2); clears the buffer on the way.
+def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth):
+    """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
     Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
     """
     clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
     nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
-    for stripe in range(low.shape[0]):
-        top, bottom = low[stripe], high[stripe]
-        low[stripe], high[stripe] = blocks, -1
-        start = (stripe * blocks + top) * BLOCK
-        # Summed by the stripe first: one long float32 sum over a large image would lose the energy's third digit.
-        in_stripe = nothing
-        for index in range(start, start + (bottom - top + 1) * BLOCK, BLOCK):
+    for tile_column in range(low.shape[0]):
+        top, bottom = low[tile_column], high[tile_column]
+        low[tile_column], high[tile_column] = tile_rows, -1
+        start = (tile_column * tile_rows + top) * TILE_PIXELS
+        # Partial sums a column: one long float32 sum over a large image would lose the energy's third digit.
+        in_column = nothing
+        for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             w = _load(buffer, index)
             o = _load(observed, index)
             drawn = w > 0.0
             z = estimated_reciprocal(w)
             z = z + z * (one - w * z)
             difference = vabs(o - z)
-            # Beyond the image (o = NaN) both minima are the clamp, and nothing matches.
-            in_stripe = in_stripe + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
-            # A missing reading (o = 0) matches anything that is drawn.
+            # Outside the image (o = NaN) both minima are the clamp, and nothing matches.
+            in_column = in_column + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
+            # A missing reading (o = 0) matches every drawn pixel.
             allowed = select(o > 0.0, _fill(match_depth), np.float32(3e38))
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
             on_silhouette = on_silhouette + hit * _load(silhouette, index)
             store(buffer, index, nothing)
-        clamped = clamped + in_stripe
+        clamped = clamped + in_column
     return vsum(clamped), vsum(on_silhouette), vsum(matched)
 
 
@@ -160,19 +160,25 @@ def score_poses(
     sums: Array,
     energies: Array,
 ) -> None:
-    """Score poses `start` to `stop` of a batch.
+    """Score poses `start` to `stop` of a batch (Oikonomidis et al. 2011, Eq. 1 and 2).
 
-    `poses` (B, 27) camera frame; `observed` depth (metres, NaN beyond the image) and `silhouette` (0 or 1) in stripes.
-    `empty` (3,): the sums of Eq. (2) for an empty image. `objective` (6,): d_m, d_M, unit, epsilon, lambda, lambda_k.
-    Writes `sums` (B, 3) and `energies` (B,). Other calls may score other poses of the same batch at the same time,
-    if each has arrays of its own for the rest: `scratch`, `table`, `buffer` (stripes, all 0), `first` and `last` (one
-    element a stripe and one more), `low` (one a stripe, all large) and `high` (one a stripe, all -1).
+    poses: (B, 27) metres, quaternion, radians, camera frame.
+    hand, camera: see `posing.set_up`.
+    observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
+    silhouette: 0 or 1, tiled.
+    empty: (3,) sums of Eq. (2) for an empty image.
+    objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
+    sums, energies: (B, 3) and (B,), written.
+
+    Concurrent calls may score other poses of the same batch if each has its own workspace. It holds `scratch` and
+    `table` (see `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
+    `low` and `high` have one element a tile column: the number of tile rows, and -1.
     """
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
     for n in range(start, stop):
-        blocks = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
+        tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
         clamped, on_silhouette, matched = _compare(
-            observed, silhouette, buffer, blocks, low, high, match_depth, clamp_depth
+            observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth
         )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
@@ -182,7 +188,7 @@ def score_poses(
 
 @kernel_part
 def _energy(pose, sums, objective):
-    """Eq. (1) from the sums of Eq. (2), as `objective.Terms.of_sums` does for batches."""
+    """Return the energy of Eq. (1) from the sums of Eq. (2), like `objective.Terms.of_sums`."""
     depth = sums[0] / objective[2] / (sums[2] + objective[3])
     total = sums[1] + sums[2]
     silhouette = 1.0 - 2.0 * sums[1] / total if total > 0.0 else 1.0
@@ -206,6 +212,9 @@ def draw_pose(
     low: Index,
     high: Index,
 ) -> None:
-    """Leave the inverse depth of one pose in the buffer, for the caller to clear; arrays as in `score_poses`."""
-    blocks = _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high)
-    low[:], high[:] = blocks, -1
+    """Draw the inverse depth of one pose, 1/m, into the buffer, which the caller clears.
+
+    Arrays are those of `score_poses`.
+    """
+    tile_rows = _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, high)
+    low[:], high[:] = tile_rows, -1

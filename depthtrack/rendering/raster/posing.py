@@ -1,8 +1,8 @@
-"""From a pose to the quadrics of all primitives: the kinematics, a finger a lane, in float64."""
+"""Forward kinematics from a pose to the quadrics of all primitives, a finger a lane."""
 
 import math
 
-from depthtrack.rendering.raster import layout
+from depthtrack.rendering.raster import hand_constants as constants
 from depthtrack.rendering.raster.quadrics import span, write_cones, write_general, write_spheres
 from depthtrack.simd.functions import first, vfloor
 from depthtrack.simd.vectors import F64X8, filler, kernel_part, loader, select
@@ -14,28 +14,30 @@ _fill = filler(F64X8)
 
 @kernel_part
 def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array32) -> None:
-    """Fill the coefficient table for one pose.
+    """Write the coefficient table of one pose: `HandModel.transforms` for all fingers at once.
 
-    `pose` (27,), `hand` from `layout.constants`, `camera` (8,): fx, fy, cx, cy, 1/fx, 1/fy, width, height; `scratch`
-    (32,); `table` (COEFFICIENT_ROWS * SLOTS,) float32 out. Fingers are lanes: the kinematics of
-    `hand.kinematics.HandModel.transforms`, all fingers at once.
+    pose: (27,) metres, quaternion, radians, camera frame.
+    hand: (ROWS * 8,) from `hand_constants.hand_constants`.
+    camera: (8,) fx, fy, cx, cy, 1/fx, 1/fy, width, height, pixels.
+    scratch: (32,) overwritten.
+    table: (COEFFICIENT_ROWS * SLOTS,) float32, written.
     """
     R = _palm_rotation(pose[3], pose[4], pose[5], pose[6])
     x, y, z = _rotated(R, hand, 0, 3), _rotated(R, hand, 1, 3), _rotated(R, hand, 2, 3)
-    p = _rotated(R, hand, layout.BASE_POSITION, 1)
+    p = _rotated(R, hand, constants.BASE_POSITION, 1)
     p = (p[0] + pose[0], p[1] + pose[1], p[2] + pose[2])
     for finger in range(5):
         for k in range(4):
             scratch[8 * k + finger] = pose[7 + 4 * finger + k]
-    s, c = _sine_cosine(_load(scratch, 0) * _load(hand, 8 * layout.MIRROR))
+    s, c = _sine_cosine(_load(scratch, 0) * _load(hand, 8 * constants.MIRROR))
     y, x = _turn(s, c, y, x)
     s1, c1 = _sine_cosine(_load(scratch, 8))
     s2, c2 = _sine_cosine(_load(scratch, 16))
     s3, c3 = _sine_cosine(_load(scratch, 24))
-    # Joint by joint: spheres sit at the joints, cones between them.
+    # Spheres sit at the joints, cones between them.
     bounds = write_spheres(table, 0, hand, camera, p)
     y, z = _turn(s1, c1, y, z)
-    thumb = _load(hand, 8 * layout.IS_THUMB) > 0.5
+    thumb = _load(hand, 8 * constants.IS_THUMB) > 0.5
     write_general(
         table,
         hand,
@@ -46,16 +48,16 @@ def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array
         _with_thumb(thumb, R[2], R[5], R[8], z),
         _with_thumb(thumb, pose[0], pose[1], pose[2], p),
     )
-    p, bounds = _phalanx(table, 0, layout.LENGTH, hand, camera, bounds, p, y)
+    p, bounds = _phalanx(table, 0, constants.LENGTH, hand, camera, bounds, p, y)
     y, z = _turn(s2, c2, y, z)
-    p, bounds = _phalanx(table, 1, layout.LENGTH + 1, hand, camera, bounds, p, y)
+    p, bounds = _phalanx(table, 1, constants.LENGTH + 1, hand, camera, bounds, p, y)
     y, z = _turn(s3, c3, y, z)
-    _phalanx(table, 2, layout.TIP_LENGTH, hand, camera, bounds, p, y)
+    _phalanx(table, 2, constants.TIP_LENGTH, hand, camera, bounds, p, y)
 
 
 @kernel_part
 def _palm_rotation(qw, qx, qy, qz):
-    """Rotation matrix of a quaternion of any length, row by row."""
+    """Return the rotation matrix of a quaternion of any length except zero, row by row."""
     n = 2.0 / (qw * qw + qx * qx + qy * qy + qz * qz)
     return (
         1 - n * (qy * qy + qz * qz), n * (qx * qy - qw * qz), n * (qx * qz + qw * qy),
@@ -66,7 +68,7 @@ def _palm_rotation(qw, qx, qy, qz):
 
 @kernel_part
 def _rotated(R, hand, row, stride):
-    """R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
+    """Return R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
     b0, b1, b2 = _load(hand, 8 * row), _load(hand, 8 * (row + stride)), _load(hand, 8 * (row + 2 * stride))
     return (
         R[0] * b0 + R[1] * b1 + R[2] * b2,
@@ -77,7 +79,7 @@ def _rotated(R, hand, row, stride):
 
 @kernel_part
 def _turn(s, c, a, b):
-    """Axes a and b turned in their plane: a towards b."""
+    """Return the axes a and b turned in their plane, a towards b."""
     return (
         (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2]),
         (c * b[0] - s * a[0], c * b[1] - s * a[1], c * b[2] - s * a[2]),
@@ -86,7 +88,7 @@ def _turn(s, c, a, b):
 
 @kernel_part
 def _sine_cosine(x):
-    """Sine and cosine to 1e-11, by their series about the nearest multiple of pi."""
+    """Return sine and cosine to 1e-11, by their series about the nearest multiple of pi."""
     n = vfloor(x * (1 / math.pi) + 0.5)
     r = x - n * math.pi
     sign = 1.0 - 2.0 * (n - 2.0 * vfloor(n * 0.5))
@@ -111,7 +113,7 @@ def _sine_cosine(x):
 
 @kernel_part
 def _with_thumb(mask, palm0, palm1, palm2, fingers):
-    """The palm's vector in every lane, but for the thumb's ellipsoid: the first finger's."""
+    """Return the palm's vector in every lane except the ellipsoid's, which holds the thumb's."""
     return (
         select(mask, first(fingers[0]), _fill(palm0)),
         select(mask, first(fingers[1]), _fill(palm1)),
@@ -121,7 +123,10 @@ def _with_thumb(mask, palm0, palm1, palm2, fingers):
 
 @kernel_part
 def _phalanx(table, k, length_row, hand, camera, bounds, p, y):
-    """Cones k from joints `p` along `y`, and the spheres at their far end; returns those with their bounds."""
+    """Write cones k from joints `p` along `y` and the spheres at their far ends.
+
+    Returns the far ends, metres, camera frame, and the pixel bounds of their spheres.
+    """
     length = _load(hand, 8 * length_row)
     end = (p[0] + y[0] * length, p[1] + y[1] * length, p[2] + y[2] * length)
     end_bounds = write_spheres(table, k + 1, hand, camera, end)

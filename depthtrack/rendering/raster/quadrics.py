@@ -1,12 +1,13 @@
-"""What every primitive looks like in the image, as polynomials of the pixel.
+"""Images of the primitives as polynomials of the pixel.
 
-A ray (dx, dy, 1) / w meets a quadric where C w^2 + 2 B w + A = 0, with w the inverse depth. C does not depend on the
-pixel, B is linear and A quadratic in it, so the face seen from outside is w = beta + sigma sqrt(D), beta = -B / C
-linear, D = beta^2 - A / C quadratic, sigma the sign of C. Everything is computed in float64, a lane a primitive.
+A ray (dx, dy, 1) / w meets a quadric at C w^2 + 2 B w + A = 0, with w the inverse depth. C does not depend on the
+pixel, B is linear and A quadratic in it. So the face visible from outside is w = beta + sigma sqrt(D), with
+beta = -B / C linear, D = beta^2 - A / C quadratic, and sigma the sign of C.
+Everything is computed in float64, a lane a primitive.
 """
 
-from depthtrack.rendering.raster import layout
-from depthtrack.rendering.raster import tiles as tiles
+from depthtrack.rendering.raster import hand_constants as constants
+from depthtrack.rendering.raster import tiles
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import narrow, vabs, vfloor, vsqrt
 from depthtrack.simd.vectors import F64X8, either, filler, kernel_part, loader, select, store, vmax, vmin
@@ -15,9 +16,9 @@ from depthtrack.types import Array32
 _load = loader(F64X8)
 _fill = filler(F64X8)
 
-SLOTS = layout.SLOTS
-# Rows of the coefficient table: SLOTS entries each. Pixel offsets (u, v) count from the first pixel of block TOP of
-# stripe LEFT. D is kept by the quarter, which saves the kernel a halving.
+SLOTS = constants.SLOTS
+# Rows of the coefficient table, SLOTS entries each. Pixel offsets (u, v) count from the first pixel of the tile at
+# column LEFT and row TOP. D is stored divided by four, which saves the kernel a halving.
 BETA, BETA_U, BETA_V = 0, 1, 2
 D, D_U, D_V, D_UU, D_UV, D_VV = 3, 4, 5, 6, 7, 8
 SIGMA = 9
@@ -27,8 +28,8 @@ HALF, AXIS_NEAR, AXIS_FAR, ROWS_PER_AXIS = 19, 20, 21, 22
 COEFFICIENT_ROWS = 23
 
 STEEP = 1e20
-"""Factor on all that concerns the axis. What is to be >= 0 is then above any w a hair inside the segment, and far below
-0 outside: the least of it and w is w where the segment is, and nothing elsewhere."""
+"""Factor on the axis coefficients. The two conditions >= 0 then exceed any w just inside the segment, and are far below
+0 outside. So their minimum with w is w inside the segment, and negative elsewhere."""
 
 
 @kernel_part
@@ -38,25 +39,26 @@ def _put(table: Array32, row: int, slot: int, value) -> None:
 
 @kernel_part
 def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):
-    """Pixels (low, high) an ellipsoid spans along one image axis: the two planes through the lens that touch it.
+    """Return the pixels (low, high) that an ellipsoid spans along one image axis.
 
-    `c` and `cz` are its centre across and along the view, s_.. the entries of R diag(radii^2) R^T.
+    The bounds are the two tangent planes through the optical centre. c, cz: centre, metres, along the image axis and
+    the optical axis; s_..: entries of R diag(radii^2) R^T, metres^2; size: pixels of the image along the axis.
     """
     a = cz * cz - s_zz
     b = c * cz - s_cz
     root = vsqrt(vmax(b * b - a * (c * c - s_cc), 0.0))
     low = vmax(vfloor((b - root) / a * focal + principal), 0.0)
     high = vmin(vfloor((b + root) / a * focal + principal) + 1.0, size - 1.0)
-    # What holds the lens' plane has no such planes and may be anywhere; what lies behind it is nowhere.
-    touched = a > 0.0
-    low, high = select(touched, low, 0.0), select(touched, high, size - 1.0)
-    seen = select(touched, cz, 1.0) > 0.0
-    return select(seen, low, 0.0), select(seen, high, -1.0)
+    # An ellipsoid that crosses the plane z = 0 has no tangent planes and no bound; one behind it is invisible.
+    has_tangents = a > 0.0
+    low, high = select(has_tangents, low, 0.0), select(has_tangents, high, size - 1.0)
+    is_visible = select(has_tangents, cz, 1.0) > 0.0
+    return select(is_visible, low, 0.0), select(is_visible, high, -1.0)
 
 
 @kernel_part
 def span(size, low_a, high_a, za, low_b, high_b, zb):
-    """Pixels spanned by two ends together: anywhere when the lens' plane lies between them."""
+    """Return the pixels (low, high) spanned by two ends, all if z = 0 is between them."""
     across = za * zb < 0.0
     low, high = vmin(low_a, low_b), vmax(high_a, high_b)
     return select(across, 0.0, low), select(across, size - 1.0, high)
@@ -64,15 +66,15 @@ def span(size, low_a, high_a, za, low_b, high_b, zb):
 
 @kernel_part
 def _write(table, slot, camera, bounds, q, G, C):
-    """Coefficients of A = d^T G d, -B = d.q and C; returns the pixel (u, v) they count from.
+    """Write the coefficients of A = d^T G d, -B = d.q and C; return their origin, a pixel (u, v).
 
-    `bounds` (u_low, u_high, v_low, v_high) pixels; G symmetric as (xx, yy, zz, xy, xz, yz). A vanishing C would mean
-    a lens on the surface; it is kept from dividing.
+    bounds: (u_low, u_high, v_low, v_high), pixels; G: symmetric, as (xx, yy, zz, xy, xz, yz).
+    C vanishes if the optical centre lies on the surface; a floor avoids the division by zero.
     """
     ex, ey = camera[4], camera[5]
-    left, right = vfloor(bounds[0] * (1 / tiles.COLUMNS)), vfloor(bounds[1] * (1 / tiles.COLUMNS))
-    top, bottom = vfloor(bounds[2] * (1 / tiles.ROWS)), vfloor(bounds[3] * (1 / tiles.ROWS))
-    u, v = left * tiles.COLUMNS, top * tiles.ROWS
+    left, right = vfloor(bounds[0] * (1 / tiles.TILE_WIDTH)), vfloor(bounds[1] * (1 / tiles.TILE_WIDTH))
+    top, bottom = vfloor(bounds[2] * (1 / tiles.TILE_HEIGHT)), vfloor(bounds[3] * (1 / tiles.TILE_HEIGHT))
+    u, v = left * tiles.TILE_WIDTH, top * tiles.TILE_HEIGHT
     xx, yy, zz, xy, xz, yz = G
     dx, dy = (u - camera[2]) * ex, (v - camera[3]) * ey
     i = 1.0 / select(vabs(C) > 1e-12, C, 1e-12)
@@ -99,10 +101,10 @@ def _write(table, slot, camera, bounds, q, G, C):
 
 @kernel_part
 def _write_segment(table, slot, camera, pixel, a, low, length, z, end_z, radius):
-    """The part of an axis `a` that exists: e - low w >= 0 and high w - e >= 0, where e = d.a.
+    """Write the segment on axis `a`: e - low w >= 0 and high w - e >= 0, with e = d.a.
 
-    From the depths of its ends and how far (`radius`) the surface reaches out of them follow bounds on w, and from
-    these AXIS_NEAR and AXIS_FAR, between which e lies wherever the segment is seen.
+    The depths z and end_z of its ends and `radius`, the reach of the surface around them, bound w. These bounds give
+    AXIS_NEAR and AXIS_FAR: e lies between them wherever the segment is visible.
     """
     dx, dy = (pixel[0] - camera[2]) * camera[4], (pixel[1] - camera[3]) * camera[5]
     e_v, high = a[1] * camera[5], low + length
@@ -120,9 +122,12 @@ def _write_segment(table, slot, camera, pixel, a, low, length, z, end_z, radius)
 
 @kernel_part
 def write_cones(table, k, hand, camera, bounds, p, a):
-    """Cones of phalanx k from joints `p` along unit axes `a`: |x - p|^2 - s^2 = (r - slope s)^2, s = (x - p).a."""
-    slope, radius = _load(hand, 8 * (layout.CONE_SLOPE + k)), _load(hand, 8 * (layout.CONE_RADIUS + k))
-    length = _load(hand, 8 * (layout.CONE_LENGTH + k))
+    """Write the cones of phalanx k from joints `p`, metres, camera frame, along unit axes `a`.
+
+    A cone is |x - p|^2 - s^2 = (r - slope s)^2 with s = (x - p).a.
+    """
+    slope, radius = _load(hand, 8 * (constants.CONE_SLOPE + k)), _load(hand, 8 * (constants.CONE_RADIUS + k))
+    length = _load(hand, 8 * (constants.CONE_LENGTH + k))
     m = p[0] * a[0] + p[1] * a[1] + p[2] * a[2]
     g = radius + slope * m
     eta = m + slope * g
@@ -137,7 +142,7 @@ def write_cones(table, k, hand, camera, bounds, p, a):
         0.0 - w * a[0] * a[2],
         0.0 - w * a[1] * a[2],
     )
-    slot = layout.CONES + 8 * k
+    slot = constants.CONES + 8 * k
     pixel = _write(table, slot, camera, bounds, q, G, C)
     widest = vmax(radius, radius - slope * length)
     _write_segment(table, slot, camera, pixel, a, m, length, p[2], p[2] + length * a[2], widest)
@@ -145,11 +150,14 @@ def write_cones(table, k, hand, camera, bounds, p, a):
 
 @kernel_part
 def write_general(table, hand, camera, scratch, x, y, z, p):
-    """Palm cylinder, caps and the thumb's ellipsoid: axes x, y, z and body positions p, a lane each."""
+    """Write the palm cylinder, its caps and the thumb's ellipsoid, a lane each.
+
+    x, y, z: axes of their bodies, unit; p: origins of their bodies, metres. Both in the camera frame.
+    """
     c0, c1, c2 = (
-        _load(hand, 8 * layout.GENERAL_CENTRE),
-        _load(hand, 8 * layout.GENERAL_CENTRE + 8),
-        _load(hand, 8 * layout.GENERAL_CENTRE + 16),
+        _load(hand, 8 * constants.GENERAL_CENTRE),
+        _load(hand, 8 * constants.GENERAL_CENTRE + 8),
+        _load(hand, 8 * constants.GENERAL_CENTRE + 16),
     )
     p = (
         x[0] * c0 + y[0] * c1 + z[0] * c2 + p[0],
@@ -157,9 +165,9 @@ def write_general(table, hand, camera, scratch, x, y, z, p):
         x[2] * c0 + y[2] * c1 + z[2] * c2 + p[2],
     )
     s0, s1, s2 = (
-        _load(hand, 8 * layout.GENERAL_SQUARE),
-        _load(hand, 8 * layout.GENERAL_SQUARE + 8),
-        _load(hand, 8 * layout.GENERAL_SQUARE + 16),
+        _load(hand, 8 * constants.GENERAL_SQUARE),
+        _load(hand, 8 * constants.GENERAL_SQUARE + 8),
+        _load(hand, 8 * constants.GENERAL_SQUARE + 16),
     )
     S_zz = s0 * x[2] * x[2] + s1 * y[2] * y[2] + s2 * z[2] * z[2]
     u_low, u_high = _bound(
@@ -174,7 +182,7 @@ def write_general(table, hand, camera, scratch, x, y, z, p):
         s0 * x[1] * x[2] + s1 * y[1] * y[2] + s2 * z[1] * z[2],
         S_zz,
     )  # fmt: skip
-    # Lane 0, the cylinder, spans what its two end discs (lanes 4 and 5) span.
+    # Lane 0, the cylinder, spans its two end discs (lanes 4 and 5).
     store(scratch, 0, p[2])
     across = scratch[4] * scratch[5] < 0.0
     u_low, v_low = (
@@ -185,9 +193,9 @@ def write_general(table, hand, camera, scratch, x, y, z, p):
     v_high = _first_from_discs(scratch, v_high, across, camera[7] - 1.0, False)
 
     i0, i1, i2 = (
-        _load(hand, 8 * layout.GENERAL_INVERSE),
-        _load(hand, 8 * layout.GENERAL_INVERSE + 8),
-        _load(hand, 8 * layout.GENERAL_INVERSE + 16),
+        _load(hand, 8 * constants.GENERAL_INVERSE),
+        _load(hand, 8 * constants.GENERAL_INVERSE + 8),
+        _load(hand, 8 * constants.GENERAL_INVERSE + 16),
     )
     h0 = i0 * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2])
     h1 = i1 * (y[0] * p[0] + y[1] * p[1] + y[2] * p[2])
@@ -204,11 +212,11 @@ def write_general(table, hand, camera, scratch, x, y, z, p):
         i0 * x[0] * x[2] + i1 * y[0] * y[2] + i2 * z[0] * z[2],
         i0 * x[1] * x[2] + i1 * y[1] * y[2] + i2 * z[1] * z[2],
     )
-    low, length = y[0] * p[0] + y[1] * p[1] + y[2] * p[2], _load(hand, 8 * layout.GENERAL_LENGTH)
-    # An ellipsoid that holds the lens shows nothing; a cylinder without ends may hold it and be seen.
+    low, length = y[0] * p[0] + y[1] * p[1] + y[2] * p[2], _load(hand, 8 * constants.GENERAL_LENGTH)
+    # An ellipsoid around the optical centre is invisible; an open cylinder around it may be visible.
     u_high = select(either(C > 0.0, length > 0.0), u_high, -1.0)
-    pixel = _write(table, layout.GENERAL, camera, (u_low, u_high, v_low, v_high), q, G, C)
-    _write_segment(table, layout.GENERAL, camera, pixel, y, low, length, p[2], p[2] + length * y[2], vsqrt(S_zz))
+    pixel = _write(table, constants.GENERAL, camera, (u_low, u_high, v_low, v_high), q, G, C)
+    _write_segment(table, constants.GENERAL, camera, pixel, y, low, length, p[2], p[2] + length * y[2], vsqrt(S_zz))
 
 
 @kernel_part
@@ -223,12 +231,13 @@ def _first_from_discs(scratch, bound, across, anywhere, low):
 
 @kernel_part
 def write_spheres(table, k, hand, camera, p):
-    """Spheres k of all fingers at `p`; returns their bounds."""
-    radius = _load(hand, 8 * (layout.SPHERE_RADIUS + k))
+    """Write spheres k of all fingers at `p`, metres, camera frame; return their pixel bounds."""
+    radius = _load(hand, 8 * (constants.SPHERE_RADIUS + k))
     square, zero, one = radius * radius, _fill(0.0), _fill(1.0)
     u_low, u_high = _bound(camera[0], camera[2], camera[6], p[0], p[2], square, zero, square)
     v_low, v_high = _bound(camera[1], camera[3], camera[7], p[1], p[2], square, zero, square)
     C = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - square
-    seen = (u_low, select(C > 0.0, u_high, -1.0), v_low, v_high)  # a sphere that holds the lens shows nothing
-    _write(table, layout.SPHERES + 8 * k, camera, seen, p, (one, one, one, zero, zero, zero), C)
+    # A sphere around the optical centre is invisible.
+    bounds = (u_low, select(C > 0.0, u_high, -1.0), v_low, v_high)
+    _write(table, constants.SPHERES + 8 * k, camera, bounds, p, (one, one, one, zero, zero, zero), C)
     return u_low, u_high, v_low, v_high

@@ -1,4 +1,4 @@
-"""The `raster` backend: prepares the arrays of the kernel and divides a batch among threads."""
+"""The `raster` backend: the kernel's arrays, and a batch divided among threads."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -12,34 +12,34 @@ from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import Terms, silhouette_disagreement
 from depthtrack.rendering.options import Objective
-from depthtrack.rendering.raster import kernel, layout, quadrics
-from depthtrack.rendering.raster import tiles as tiles
+from depthtrack.rendering.raster import hand_constants as constants
+from depthtrack.rendering.raster import kernel, quadrics, tiles
 from depthtrack.rendering.scorer import ScorerBase, Scores, as_batch
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Array32, Depth, Index
 
 _THREAD_PIXELS = 500_000
-"""Pixels, over all poses of a batch, that justify a thread: a worker takes about 60 us to wake, a tenth of the time
-that this many take to score. So 64 poses of 96 x 96 pixels stay in the calling thread."""
+"""Pixels, over all poses of a batch, that justify a thread. A worker takes about 60 us to wake, a tenth of the time to
+score these pixels. So 64 poses of 96 x 96 pixels stay in the calling thread."""
 
 
 @dataclass
 class _Workspace:
-    """The arrays that one thread owns: see `kernel.score_poses`."""
+    """Arrays of one thread: see `kernel.score_poses`."""
 
     buffer: Depth
     first: Index
     last: Index
     low: Index
     high: Index
-    scratch: Array = field(default_factory=lambda: np.zeros(4 * layout.LANES))
+    scratch: Array = field(default_factory=lambda: np.zeros(4 * constants.LANES))
     table: Array32 = field(default_factory=lambda: np.zeros(quadrics.COEFFICIENT_ROWS * quadrics.SLOTS, np.float32))
 
     @classmethod
     def of(cls, shape: tuple[int, int]) -> Self:
-        count, blocks = tiles.stripe_counts(shape)
-        first, last = np.zeros((2, count + 1), np.int64)
-        return cls(tiles.new_stripes(shape), first, last, np.full(count, blocks), np.full(count, -1))
+        columns, rows = tiles.tile_counts(shape)
+        first, last = np.zeros((2, columns + 1), np.int64)
+        return cls(tiles.new_tiled_image(shape), first, last, np.full(columns, rows), np.full(columns, -1))
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
@@ -47,12 +47,12 @@ class _Workspace:
 
 
 class RasterScorer(ScorerBase):
-    """CPU rasteriser; up to `threads` threads share a batch, and their number does not change the energies.
+    """CPU rasteriser; the number of threads does not change the energies.
 
-    Each thread scores a chunk of whole poses. Small batches stay in the calling thread.
+    Up to `threads` threads share a batch. Each scores a chunk of whole poses. Small batches stay in the calling thread.
 
     Raises:
-        InputError: `threads` is not within 1 to 256.
+        InputError: if `threads` is not within 1 to 256.
     """
 
     name = "raster"
@@ -61,12 +61,12 @@ class RasterScorer(ScorerBase):
         if not 1 <= threads <= 256:
             raise InputError(f"the rasteriser runs on 1 to 256 threads, found {threads}")
         self._objective = o = objective or Objective()
-        self._hand = layout.constants(shape)
-        self._constants = np.array(
+        self._hand = constants.hand_constants(shape)
+        self._objective_constants = np.array(
             [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.silhouette_weight, o.kinematic_weight]
         )
         self._camera, self._empty = np.empty(8), np.empty(3)
-        self._make_room(256)
+        self._allocate(256)
         self._threads = threads
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="depthtrack-raster")
 
@@ -74,9 +74,9 @@ class RasterScorer(ScorerBase):
         shape = target.camera.shape
         if self._target is None or self._target.camera.shape != shape:
             self._workspaces = [_Workspace.of(shape) for _ in range(self._threads)]
-            self._observed, self._silhouette = tiles.new_stripes(shape), tiles.new_stripes(shape)
-        tiles.write_stripes(target.depth, np.nan, self._observed)
-        tiles.write_stripes(target.silhouette, 0, self._silhouette)
+            self._observed, self._silhouette = tiles.new_tiled_image(shape), tiles.new_tiled_image(shape)
+        tiles.write_tiled(target.depth, np.nan, self._observed)
+        tiles.write_tiled(target.silhouette, 0, self._silhouette)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty[:] = clamped, 0.0, np.count_nonzero(target.silhouette)
         c = target.camera
@@ -99,20 +99,20 @@ class RasterScorer(ScorerBase):
         shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
         space = self._workspaces[0]
         kernel.draw_pose(batch[0], self._hand, self._camera, *space.arrays)
-        inverse = tiles.read_stripes(space.buffer, shape)
+        inverse = tiles.read_tiled(space.buffer, shape)
         depth = np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
         space.buffer[:] = 0
         return depth
 
     def close(self) -> None:
-        """End the threads; the scorer cannot be used after."""
+        """End the threads; the scorer is unusable afterwards."""
         self._pool.shutdown()
 
     def _sums_and_energies(self, poses: Array) -> tuple[Array, Array]:
         height, width = self.target.camera.shape
         count = len(poses)
         if count > len(self._poses):
-            self._make_room(count)
+            self._allocate(count)
         self._poses[:count] = poses
         chunks = max(1, min(self._threads, count, count * height * width // _THREAD_PIXELS))
         bounds = [count * n // chunks for n in range(chunks + 1)]
@@ -132,11 +132,11 @@ class RasterScorer(ScorerBase):
             self._observed,
             self._silhouette,
             self._empty,
-            self._constants,
+            self._objective_constants,
             *self._workspaces[thread].arrays,
             self._sums,
             self._energies,
         )
 
-    def _make_room(self, count: int) -> None:
+    def _allocate(self, count: int) -> None:
         self._poses, self._sums, self._energies = np.empty((count, POSE_SIZE)), np.empty((count, 3)), np.empty(count)

@@ -1,13 +1,13 @@
-"""Which blocks of each stripe a primitive can reach: less than its bounding box, never less than it covers.
+"""Spans of tiles that a primitive may cover, tighter than its bounding box.
 
-Down a column of pixels a quadric is seen between the roots of D, and a segment of its axis between two rows; both in
-closed form, for sixteen columns at once.
+In a column of pixels a quadric is visible between the roots of D, and a segment of its axis between two rows. Both have
+a closed form, evaluated for sixteen columns at once.
 """
 
 import numpy as np
 
 from depthtrack.rendering.raster import quadrics as q
-from depthtrack.rendering.raster import tiles as tiles
+from depthtrack.rendering.raster import tiles
 from depthtrack.simd.functions import estimated_reciprocal_sqrt, highest_of_halves, lowest_of_halves
 from depthtrack.simd.vectors import F32X16, kernel_part, loader, select, vmax, vmin
 from depthtrack.types import Array32
@@ -15,14 +15,16 @@ from depthtrack.types import Array32
 _load = loader(F32X16)
 _COLUMNS: Array32 = np.arange(16, dtype=np.float32)
 _SLACK = np.float32(0.25)
-"""Rows; the float32 roots are good to a hundredth, and the lanes decide exactly."""
+"""Rows. The float32 roots are accurate to a hundredth, and the lanes decide exactly."""
 
 
 @kernel_part
 def find_spans(slot, is_segment, table, count, top, bottom, first, last):
-    """Blocks first[n] to last[n] of stripe LEFT + n, for `count` stripes; none where the primitive misses a stripe.
+    """Write the first and last tile that a primitive may cover, for `count` columns from LEFT.
 
-    Needs D_VV < 0, and room for one stripe more in `first` and `last`.
+    first, last: (count + 1,) tile rows; first[n] > last[n] if the primitive misses column LEFT + n. If `count` is odd,
+    the extra element is written too.
+    Needs D_VV < 0.
     """
     d, d_u, d_v = table[q.D * q.SLOTS + slot], table[q.D_U * q.SLOTS + slot], table[q.D_V * q.SLOTS + slot]
     d_uu, d_uv = table[q.D_UU * q.SLOTS + slot], table[q.D_UV * q.SLOTS + slot]
@@ -30,9 +32,9 @@ def find_spans(slot, is_segment, table, count, top, bottom, first, last):
     axis, axis_u = table[q.AXIS * q.SLOTS + slot], table[q.AXIS_U * q.SLOTS + slot]
     axis_near, axis_far = table[q.AXIS_NEAR * q.SLOTS + slot], table[q.AXIS_FAR * q.SLOTS + slot]
     per_row = table[q.ROWS_PER_AXIS * q.SLOTS + slot]
-    height = np.float32((bottom - top + 1) * tiles.ROWS)
+    height = np.float32((bottom - top + 1) * tiles.TILE_HEIGHT)
     for n in range(0, count, 2):
-        x = _load(_COLUMNS, 0) + np.float32(n * tiles.COLUMNS)
+        x = _load(_COLUMNS, 0) + np.float32(n * tiles.TILE_WIDTH)
         b = x * d_uv + d_v
         discriminant = b * b - (x * (x * d_uu + d_u) + d) * four_a
         root = discriminant * estimated_reciprocal_sqrt(discriminant)

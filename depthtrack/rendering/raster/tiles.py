@@ -1,7 +1,7 @@
-"""How the kernels keep an image: in stripes of eight columns, each stored from top to bottom.
+"""Tiled memory layout of images: tiles of 8 x 2 pixels, one column of tiles after the other.
 
-Sixteen neighbouring floats are then a block of two rows by eight columns: one cache line, one AVX-512 register. The
-parts of a hand fill such blocks better than sixteen pixels of a row, and a walk down a stripe is one through memory.
+A tile is sixteen adjacent floats: one cache line and one AVX-512 register. The parts of a hand fill such tiles better
+than sixteen pixels of a row. Moving down a column of tiles reads memory in order.
 """
 
 import numpy as np
@@ -9,36 +9,39 @@ from numpy.typing import NDArray
 
 from depthtrack.types import Array32
 
-COLUMNS, ROWS = 8, 2
-BLOCK = COLUMNS * ROWS
-"""Pixels of a block."""
+TILE_WIDTH, TILE_HEIGHT = 8, 2
+"""Pixels."""
+TILE_PIXELS = TILE_WIDTH * TILE_HEIGHT
 _CACHE_LINE = 64
 
 
-def stripe_counts(shape: tuple[int, int]) -> tuple[int, int]:
-    """Stripes, and blocks in each, that hold an image of (height, width)."""
-    return -(-shape[1] // COLUMNS), -(-shape[0] // ROWS)
+def tile_counts(shape: tuple[int, int]) -> tuple[int, int]:
+    """Return the columns and rows of tiles that hold an image of `shape` (height, width)."""
+    return -(-shape[1] // TILE_WIDTH), -(-shape[0] // TILE_HEIGHT)
 
 
-def new_stripes(shape: tuple[int, int]) -> Array32:
-    """Zeros (stripes * blocks * BLOCK,) for an image of (height, width), aligned to cache lines."""
-    tiles, blocks = stripe_counts(shape)
-    size = tiles * blocks * BLOCK
+def new_tiled_image(shape: tuple[int, int]) -> Array32:
+    """Return zeros (columns * rows * TILE_PIXELS,) for an image of `shape` (height, width).
+
+    The memory is aligned to cache lines.
+    """
+    columns, rows = tile_counts(shape)
+    size = columns * rows * TILE_PIXELS
     memory = np.zeros(size + _CACHE_LINE // 4, np.float32)
     start = -memory.ctypes.data % _CACHE_LINE // 4
     return memory[start : start + size]
 
 
-def write_stripes(image: NDArray[np.generic], beyond: float, stored: Array32) -> None:
-    """Store an image (h, w); what the last blocks hold beyond it becomes `beyond`."""
-    (height, width), (tiles, blocks) = image.shape, stripe_counts(image.shape)
-    rows = np.full((blocks * ROWS, tiles * COLUMNS), beyond, np.float32)
-    rows[:height, :width] = image
-    stored.reshape(tiles, blocks * ROWS, COLUMNS)[:] = rows.reshape(-1, tiles, COLUMNS).swapaxes(0, 1)
+def write_tiled(image: NDArray[np.generic], beyond: float, tiled: Array32) -> None:
+    """Write an image (h, w) to `tiled`; pixels outside the image become `beyond`."""
+    (height, width), (columns, rows) = image.shape, tile_counts(image.shape)
+    padded = np.full((rows * TILE_HEIGHT, columns * TILE_WIDTH), beyond, np.float32)
+    padded[:height, :width] = image
+    tiled.reshape(columns, rows * TILE_HEIGHT, TILE_WIDTH)[:] = padded.reshape(-1, columns, TILE_WIDTH).swapaxes(0, 1)
 
 
-def read_stripes(stored: Array32, shape: tuple[int, int]) -> Array32:
-    """The image (h, w) of that shape."""
-    tiles, blocks = stripe_counts(shape)
-    rows = stored.reshape(tiles, blocks * ROWS, COLUMNS).swapaxes(0, 1).reshape(-1, tiles * COLUMNS)
-    return rows[: shape[0], : shape[1]]
+def read_tiled(tiled: Array32, shape: tuple[int, int]) -> Array32:
+    """Return the image (h, w) of `shape` that `write_tiled` stored."""
+    columns, rows = tile_counts(shape)
+    padded = tiled.reshape(columns, rows * TILE_HEIGHT, TILE_WIDTH).swapaxes(0, 1).reshape(-1, columns * TILE_WIDTH)
+    return padded[: shape[0], : shape[1]]

@@ -183,7 +183,7 @@ def test_skin_and_primitives_agree(angles: Array, mean_mm: float, p95_mm: float)
     """Distance from the primitives' visible surface to the skin; the palm's square wrist corners differ most."""
     skin, model, primitives = Skin.of(DEFAULT), HandModel(DEFAULT), Primitives.of(DEFAULT)
     transforms = model.transforms(posed(angles))
-    surface = _visible_surface(primitives, primitives.placed(transforms))
+    surface = _visible_surface(primitives, primitives.transforms(transforms))
     vertices = skin.vertices(transforms)
     points = np.concatenate([vertices, vertices[skin.faces].mean(axis=1)])
     distance = np.asarray(cKDTree(points).query(surface)[0]) * 1000
@@ -191,11 +191,11 @@ def test_skin_and_primitives_agree(angles: Array, mean_mm: float, p95_mm: float)
     assert np.quantile(distance, 0.95) < p95_mm
 
 
-def _visible_surface(primitives: Primitives, placed: Array) -> Array:
+def _visible_surface(primitives: Primitives, T_palm_unit: Array) -> Array:
     """Points of every primitive's surface that lie inside no other one."""
     rng = np.random.default_rng(0)
     points, owners = [], []
-    for n, (kind, T) in enumerate(zip(primitives.kinds, placed, strict=True)):
+    for n, (kind, T) in enumerate(zip(primitives.kinds, T_palm_unit, strict=True)):
         unit = rng.normal(size=(400, 3))
         unit /= np.linalg.norm(unit, axis=-1, keepdims=True)
         if kind != SPHERE:
@@ -206,7 +206,7 @@ def _visible_surface(primitives: Primitives, placed: Array) -> Array:
         owners.append(np.full(400, n))
     surface, owner = np.concatenate(points), np.concatenate(owners)
     free = np.ones(len(surface), dtype=bool)
-    for n, (kind, T) in enumerate(zip(primitives.kinds, placed, strict=True)):
+    for n, (kind, T) in enumerate(zip(primitives.kinds, T_palm_unit, strict=True)):
         u = np.c_[surface, np.ones(len(surface))] @ np.linalg.inv(T).T
         u = u[:, :3] / u[:, 3:]
         inside = np.sum(u[:, : 3 if kind == SPHERE else 2] ** 2, axis=-1) < 0.999

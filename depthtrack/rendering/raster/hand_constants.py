@@ -1,8 +1,9 @@
-"""The hand's primitives as the kernels read them: eight lanes a vector, one finger a lane.
+"""Constants of a hand for the rasteriser's kernels: rows of eight lanes, one finger a lane.
 
-Slots, eight lanes each: four groups of spheres (base joint to fingertip), three of cones (one a phalanx), and one
-general group: palm cylinder, its two caps, the thumb's ellipsoid, and two discs that only bound the cylinder's ends.
-The sizes are read back from the matrices of `hand.primitives`, which stay the one place that defines the model.
+A primitive's slot is its group's first slot plus its lane. There are four groups of spheres (base joint to fingertip)
+and three of cones (one a phalanx). The last group is general: palm cylinder, its two caps, the thumb's ellipsoid, and
+two discs that only bound the cylinder's ends. All sizes come from the matrices of `hand.primitives`, which alone
+define the model.
 """
 
 import numpy as np
@@ -15,23 +16,24 @@ from depthtrack.types import Array, Index
 
 LANES = 8
 SPHERES, CONES, GENERAL, SLOTS = 0, 32, 56, 64
-"""First slot of each group, and how many slots there are."""
+"""First slot of each group, and the number of slots."""
 
-# Rows of the constants: eight lanes each.
+# Rows of the constants, eight lanes each.
 BASE_ROTATION, BASE_POSITION, LENGTH, MIRROR = 0, 9, 12, 15
 SPHERE_RADIUS, TIP_LENGTH, CONE_RADIUS, CONE_SLOPE, CONE_LENGTH = 16, 20, 21, 24, 27
-GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH, IS_THUMB, REACH, ROWS = 30, 33, 36, 39, 40, 41, 42
+GENERAL_CENTRE, GENERAL_INVERSE, GENERAL_SQUARE, GENERAL_LENGTH = 30, 33, 36, 39
+IS_THUMB, BOUNDING_RADIUS, ROWS = 40, 41, 42
 
 ACTIVE: Index = np.array(
     [GENERAL + k for k in range(4)]
     + [SPHERES + LANES * k + f for k in range(4) for f in range(5) if (k, f) != (0, 0)]
     + [CONES + LANES * k + f for k in range(3) for f in range(5) if (k, f) != (0, 0)]
 )
-"""The 37 slots that are drawn; the thumb's first phalanx is an ellipsoid."""
+"""The 37 slots that are drawn. The thumb's first phalanx is an ellipsoid."""
 
 
-def constants(shape: HandShape) -> Array:
-    """Everything about a hand that does not depend on its pose: (ROWS * 8,) float64, metres."""
+def hand_constants(shape: HandShape) -> Array:
+    """Return the pose-independent constants (ROWS * 8,) of a hand, float64, metres, palm frame."""
     model, primitives = HandModel(shape), Primitives.of(shape)
     matrix = dict(zip(primitives.names, primitives.T_body_unit, strict=True))
     rows = np.zeros((ROWS, LANES))
@@ -47,12 +49,12 @@ def constants(shape: HandShape) -> Array:
                 _read_cone(rows, k, lane, cone)
         rows[TIP_LENGTH, lane] = matrix[f"{finger}_sphere_3"][1, 3]
     _read_general(rows, matrix)
-    rows[REACH] = _reach(model, primitives)
+    rows[BOUNDING_RADIUS] = _bounding_radius(model, primitives)
     return rows.ravel()
 
 
 def _read_cone(rows: Array, k: int, lane: int, T: Array) -> None:
-    taper = T[3, 2]  # radius at the start over radius at the end, less one: see primitives.cone
+    taper = T[3, 2]  # start radius / end radius - 1: see primitives.cone
     length, radius = T[1, 2] / (1 + taper), abs(T[0, 0])
     rows[CONE_RADIUS + k, lane] = radius
     rows[CONE_LENGTH + k, lane] = length
@@ -69,15 +71,15 @@ def _read_general(rows: Array, matrix: dict[str, Array]) -> None:
     parts += [(start, cross_section), (start + np.array([0, length, 0]), cross_section)]
     for lane, (centre, radii) in enumerate(parts):
         rows[GENERAL_CENTRE : GENERAL_CENTRE + 3, lane] = centre
-        # A radius of 0 marks a direction without end: it drops out of the quadric.
+        # A radius of 0 marks an unbounded direction, which drops out of the quadric.
         rows[GENERAL_INVERSE : GENERAL_INVERSE + 3, lane] = np.divide(1, radii, out=np.zeros(3), where=radii > 0)
         rows[GENERAL_SQUARE : GENERAL_SQUARE + 3, lane] = radii**2
     rows[GENERAL_LENGTH, 0] = length
     rows[IS_THUMB, 3] = 1
 
 
-def _reach(model: HandModel, primitives: Primitives) -> float:
-    """Metres from the palm's centre that nothing of the hand is ever beyond."""
+def _bounding_radius(model: HandModel, primitives: Primitives) -> float:
+    """Return the radius, metres, of a ball about the palm's centre that holds every pose."""
     fingers = np.linalg.norm(model.base_transforms[:, :3, 3], axis=1) + model.lengths.sum(axis=1)
     # Cylinders and cones lie within the spheres and ellipsoids at their ends.
     T = primitives.T_body_unit[primitives.kinds == SPHERE]
