@@ -58,7 +58,7 @@ def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):
 
 @kernel_part
 def span(size, low_a, high_a, za, low_b, high_b, zb):
-    """Return the pixels (low, high) spanned by two ends, all if z = 0 is between them."""
+    """Return the pixels (low, high) of two ends together, all if z = 0 is between them."""
     across = za * zb < 0.0
     low, high = vmin(low_a, low_b), vmax(high_a, high_b)
     return select(across, 0.0, low), select(across, size - 1.0, high)
