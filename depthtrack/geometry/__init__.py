@@ -1,1 +1,1 @@
-"""Cameras, rectangles, rotations, alignment: geometry without a hand in it."""
+"""Cameras, rectangles, rotations, alignment and surfaces, independent of the hand."""

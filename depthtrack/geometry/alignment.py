@@ -1,4 +1,4 @@
-"""The rigid motion between corresponding points, in closed form."""
+"""Rigid alignment of corresponding points in closed form."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -7,10 +7,13 @@ from depthtrack.types import Array
 
 
 def rigid_alignment(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> tuple[Array, Array]:
-    """Rotation (..., 3, 3) and translation (..., 3) that bring `source` (..., N, 3) closest to `target` (..., N, 3).
+    """Return the rotation (..., 3, 3) and translation (..., 3) that best align two point sets.
 
-    Least squares, weighted by `weights` (..., N), of which some must be positive: Horn, "Closed-form solution of
-    absolute orientation", JOSA A 4(4), 1987, solved by the SVD of Kabsch, Acta Cryst. A32, 1976. Never a reflection.
+    source, target: (..., N, 3) corresponding points, any unit.
+    weights: (..., N) not negative, at least one positive; all 1 if None.
+
+    Weighted least squares, never a reflection. Source: Horn, "Closed-form solution of
+    absolute orientation", JOSA A 4(4), 1987, solved by the SVD of Kabsch, Acta Cryst. A32, 1976.
     """
     p, q = np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64)
     w = np.ones(q.shape[:-1]) if weights is None else np.asarray(weights, dtype=np.float64)

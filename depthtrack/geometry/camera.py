@@ -1,4 +1,7 @@
-"""Pinhole cameras. Camera frame: x right, y down, z forward; pixel centres at integer coordinates."""
+"""Pinhole cameras.
+
+Camera frame: x right, y down, z forward. Pixel centres have integer coordinates.
+"""
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,14 +16,17 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Array, Depth
 
 MAX_SIDE = 8192
-"""Largest image side accepted, in pixels: bounds the memory an absurd header can ask for."""
+"""Largest image side accepted, pixels: a bound on the memory that a damaged header requests."""
 
 
 @dataclass(frozen=True)
 class Camera:
     """Intrinsics of an undistorted pinhole camera, in pixels.
 
-    `depth_scale` is what one unit of a stored 16-bit depth image is worth, in metres.
+    depth_scale: metres per unit of a stored 16-bit depth image.
+
+    Raises:
+        InputError: if a value is out of range.
     """
 
     width: int
@@ -37,11 +43,11 @@ class Camera:
             if not (isinstance(side, int) and 1 <= side <= MAX_SIDE):
                 raise InputError(f"camera {name} must be a whole number from 1 to {MAX_SIDE} pixels, found {side!r}")
         for name in ("fx", "fy"):
-            # A region of a few pixels has any ratio of focal length to side; `from_fields` is stricter with files.
+            # A region may have any ratio of focal length to side; `from_fields` is stricter with files.
             if not (_is_number(getattr(self, name)) and 1e-3 <= getattr(self, name) <= 1e6):
                 raise InputError(f"camera {name} must be a focal length in pixels, found {getattr(self, name)!r}")
         for name in ("cx", "cy"):
-            # A region of an image may lie far from the principal point, so only nonsense is refused.
+            # A region may lie far from the principal point, so the range is wide.
             if not (_is_number(getattr(self, name)) and abs(getattr(self, name)) <= 4 * MAX_SIDE):
                 raise InputError(f"camera {name} must be a principal point in pixels, found {getattr(self, name)!r}")
         if not (_is_number(self.depth_scale) and 1e-6 <= self.depth_scale <= 0.1):
@@ -60,13 +66,13 @@ class Camera:
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], dtype=np.float64)
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels (..., 2) of camera-frame points (..., 3), in metres; points with z <= 0 give NaN."""
+        """Return the pixels (..., 2) of camera-frame points (..., 3), metres; NaN if z <= 0."""
         p = np.asarray(points, dtype=np.float64)
         z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
         return np.stack([self.fx * p[..., 0] / z + self.cx, self.fy * p[..., 1] / z + self.cy], axis=-1)
 
     def unproject(self, pixels: ArrayLike, depth: ArrayLike) -> Array:
-        """Camera-frame points (..., 3) in metres of pixels (..., 2) at depth (...)."""
+        """Return the camera-frame points (..., 3), metres, of pixels (..., 2) at depths (...)."""
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth, dtype=np.float64)
         return np.stack([(uv[..., 0] - self.cx) / self.fx * z, (uv[..., 1] - self.cy) / self.fy * z, z], axis=-1)
@@ -81,9 +87,9 @@ class Camera:
         return Rect(0, 0, self.width, self.height)
 
     def rect_around(self, centre: ArrayLike, reach: float) -> Rect:
-        """Return the part of the image, at least a pixel, that may show points near `centre`.
+        """Return the part of the image, at least one pixel, that points near `centre` may cover.
 
-        centre (3,): metres, camera frame, before the camera.
+        centre: (3,) metres, camera frame, z > 0.
         reach: metres across the line of sight.
         """
         point = np.asarray(centre, dtype=np.float64)
@@ -94,13 +100,13 @@ class Camera:
         return Rect(left, top, right, bottom)
 
     def crop(self, region: Rect) -> Self:
-        """Return the camera of a region of the image; the region may reach outside."""
+        """Return the camera of a region of the image; the region may extend outside."""
         return replace(
             self, width=region.width, height=region.height, cx=self.cx - region.left, cy=self.cy - region.top
         )
 
     def resized(self, factor: float) -> Self:
-        """Camera of the image resampled by `factor` (0.5 halves both sides), pixel areas aligned at the corner."""
+        """Return the camera of the image resampled by `factor`, with fixed outer corners."""
         return replace(
             self,
             width=max(1, round(self.width * factor)),
@@ -119,7 +125,8 @@ class Camera:
     def from_json(cls, path: Path) -> Self:
         """Return the camera of a `camera.json`.
 
-        Raises: InputError if the file is missing or malformed, or describes no usable camera.
+        Raises:
+            InputError: if the file is missing or malformed, or a value is out of range.
         """
         return read_json(path, "the camera file", cls.from_fields)
 
@@ -127,13 +134,14 @@ class Camera:
     def from_fields(cls, fields: Any) -> Self:
         """Return the camera of the parsed contents of a `camera.json`.
 
-        Raises: InputError if an entry is missing or the field of view is below 0.5 or above 170 degrees.
+        Raises:
+            InputError: if an entry is missing, or the field of view is below 0.5 or above 170 degrees.
         """
         required = ("width", "height", "fx", "fy", "cx", "cy")
         if not isinstance(fields, dict) or any(name not in fields for name in required):
             raise InputError(f"a camera must be a JSON object with {', '.join(required)} (and depth_scale)")
         camera = cls(**{name: fields[name] for name in (*required, "depth_scale") if name in fields})
-        # Outside that range, units or columns were mixed up.
+        # A value outside this range has another unit or is another column.
         for name in ("fx", "fy"):
             focal = getattr(camera, name)
             if not 0.04 <= focal / max(camera.shape) <= 120:
@@ -150,7 +158,7 @@ PRESETS: dict[str, Camera] = {
     "kinect1": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.001),
     "kinect2": Camera(512, 424, 365.5, 365.5, 255.5, 211.5, 0.001),
     "realsense": Camera(640, 480, 475.0, 475.0, 319.5, 239.5, 0.000125),
-    # What the TUM RGB-D benchmark recommends for its registered recordings, and its depth unit of 1/5000 m.
+    # Recommended by the TUM RGB-D benchmark for registered recordings; its depth unit is 1/5000 m.
     "tum": Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 0.0002),
 }
-"""Cameras by sensor name, for recordings and synthesis that bring none of their own."""
+"""Cameras by sensor name, for synthesis and for recordings without intrinsics."""

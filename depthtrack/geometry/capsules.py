@@ -1,4 +1,4 @@
-"""Distance to a tapered capsule: the union of balls along a segment, their radius changing linearly.
+"""Distance to a tapered capsule, the union of balls along a segment with linear radius.
 
 The surface between the balls is the cone that touches them. Its normal leans towards the thinner end, so the nearest
 ball is not the one straight across the axis. Functions take scalars or arrays; the `compiled_` forms serve kernels.
@@ -21,7 +21,7 @@ def nearest_ball(along: Array, across: Array, taper: float, length: float) -> Ar
 
 
 def capsule_distance(along: Array, across: Array, radius: float, taper: float, length: float) -> Array:
-    """Return the signed distance, metres, of points to the surface of a tapered capsule; see `nearest_ball`.
+    """Return the signed distance, metres, of points to a tapered capsule; see `nearest_ball`.
 
     radius: metres, at the start of the axis.
     """

@@ -1,8 +1,10 @@
-"""Turns an implicit solid, negative inside, into a closed triangle mesh: surface nets (Gibson 1998), then relaxation.
+"""Closed triangle meshes of implicit solids, negative inside, by surface nets.
+
+Source: Gibson, "Constrained elastic surface nets", MICCAI 1998. Relaxation then spreads the vertices evenly.
 
 Surface nets put one vertex into every grid cell that the surface crosses and one quad across every grid edge that
-it crosses. Where a cell holds two sheets of the surface the net would touch itself; such cells are filled first, so
-that the mesh is a closed manifold whatever the solid.
+it crosses. If two parts of the surface cross a cell, the net would touch itself. Such cells are filled first, so
+that the mesh is always a closed manifold.
 """
 
 from collections.abc import Callable
@@ -13,23 +15,24 @@ from scipy.sparse import csr_array
 from depthtrack.types import Array, Faces, Index, Mask
 
 Field = Callable[[Array], Array]
-"""Signed values (N,), about the distance in metres near the surface, of points (N, 3)."""
+"""Signed values (N,) of points (N, 3): about the distance, metres, near the surface."""
 
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1]
 
 
 def polygonise(field: Field, low: Array, high: Array, cell: float, rounds: int = 3) -> tuple[Array, Faces]:
-    """Vertices (V, 3) and outward faces (F, 3) of the surface `field = 0` within the box from `low` to `high`.
+    """Return the vertices (V, 3) and outward faces (F, 3) of the surface `field = 0` in a box.
 
-    The box must enclose the solid with a cell to spare. `rounds` of relaxation spread the vertices evenly over the
-    surface and put them exactly on it.
+    low, high: (3,) corners of the box, metres; it must enclose the solid with a margin of one cell.
+    cell: metres.
+    rounds: rounds of relaxation, which spread the vertices evenly and put them on the surface.
     """
     shape = np.ceil((high - low) / cell).astype(np.int64) + 1
     axes = [low[a] + cell * np.arange(shape[a]) for a in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = field(points.reshape(-1, 3)).reshape(points.shape[:3])
-    vertices, quads = surface_nets(without_double_sheets(values))
+    vertices, quads = surface_nets(without_ambiguous_cells(values))
     vertices = low + cell * vertices
     faces = _triangles(vertices, quads)
     for _ in range(rounds):
@@ -39,7 +42,10 @@ def polygonise(field: Field, low: Array, high: Array, cell: float, rounds: int =
 
 
 def surface_nets(values: Array) -> tuple[Array, Index]:
-    """Vertices (V, 3) in grid units and outward quads (Q, 4) around the negative nodes of a grid (nx, ny, nz)."""
+    """Return vertices (V, 3), grid units, and outward quads (Q, 4) around the negative nodes.
+
+    values: (nx, ny, nz), of either sign.
+    """
     cells = _cell_values(values)
     inside = cells < 0
     crossed = inside.any(axis=-1) & ~inside.all(axis=-1)
@@ -58,7 +64,7 @@ def surface_nets(values: Array) -> tuple[Array, Index]:
 
 
 def _quads_across(inside: Mask, index: Index, axis: int) -> Index:
-    """Quads (Q, 4) of the four cells around every crossed grid edge along `axis`."""
+    """Return the quads (Q, 4) of the four cells around every crossed grid edge along `axis`."""
     inside, index = np.moveaxis(inside, axis, 0), np.moveaxis(index, axis, 0)
     start, end = inside[:-1, 1:-1, 1:-1], inside[1:, 1:-1, 1:-1]
     around = [index[:, :-1, :-1], index[:, 1:, :-1], index[:, 1:, 1:], index[:, :-1, 1:]]
@@ -71,13 +77,13 @@ def _quads_across(inside: Mask, index: Index, axis: int) -> Index:
 
 
 def _cell_values(values: Array) -> Array:
-    """(nx - 1, ny - 1, nz - 1, 8) values at the corners of every cell."""
+    """Return the values (nx - 1, ny - 1, nz - 1, 8) at the corners of every cell."""
     nx, ny, nz = values.shape
     return np.stack([values[i : nx - 1 + i, j : ny - 1 + j, k : nz - 1 + k] for i, j, k in _CORNERS], axis=-1)
 
 
-def without_double_sheets(values: Array) -> Array:
-    """The grid with the corners of every ambiguous cell pushed inside until no cell holds two sheets."""
+def without_ambiguous_cells(values: Array) -> Array:
+    """Return the grid with the corners of ambiguous cells made negative until none is left."""
     values, bits = values.copy(), 1 << np.arange(8)
     while True:
         double = _AMBIGUOUS[(_cell_values(values) < 0) @ bits]
@@ -89,7 +95,10 @@ def without_double_sheets(values: Array) -> Array:
 
 
 def _ambiguous() -> Mask:
-    """(256,) whether a cell's inside or outside corners, one bit each, fall into pieces or a face is a checkerboard."""
+    """Return (256,) whether a cell is ambiguous, indexed by its inside corners, one bit each.
+
+    Its inside or outside corners are then not connected, or a face is a checkerboard.
+    """
     table = np.zeros(256, dtype=np.bool_)
     faces = [[c for c in range(8) if _CORNERS[c, axis] == side] for axis in range(3) for side in (0, 1)]
     for code in range(256):
@@ -108,7 +117,7 @@ _AMBIGUOUS = _ambiguous()
 
 
 def _triangles(vertices: Array, quads: Index) -> Faces:
-    """Quads (Q, 4) cut along their shorter diagonal."""
+    """Return the triangles (2 Q, 3) of quads (Q, 4), cut along the shorter diagonal."""
     a, b, c, d = quads.T
     first = np.linalg.norm(vertices[a] - vertices[c], axis=-1) <= np.linalg.norm(vertices[b] - vertices[d], axis=-1)
     one = np.where(first[:, None], np.stack([a, b, c], -1), np.stack([a, b, d], -1))
@@ -117,7 +126,7 @@ def _triangles(vertices: Array, quads: Index) -> Faces:
 
 
 def neighbour_average(faces: Faces, count: int) -> csr_array:
-    """Sparse (V, V): each row takes the mean over a vertex's neighbours."""
+    """Return the sparse matrix (V, V) whose rows average over a vertex's neighbours."""
     rows = np.concatenate([faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()])
     columns = np.concatenate([faces[:, [1, 2, 0]].ravel(), faces[:, [0, 1, 2]].ravel()])
     links = csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
@@ -126,12 +135,12 @@ def neighbour_average(faces: Faces, count: int) -> csr_array:
 
 
 def _relax(vertices: Array, faces: Faces) -> Array:
-    """Each vertex moved halfway towards the middle of its neighbours; projection undoes the inward part."""
+    """Return the vertices moved halfway to the mean of their neighbours."""
     return 0.5 * (vertices + neighbour_average(faces, len(vertices)) @ vertices)
 
 
 def _project(field: Field, vertices: Array, step: float) -> Array:
-    """One Newton step along the gradient onto the surface, never further than ten steps."""
+    """Return the vertices after a Newton step along the gradient, of at most ten `step`."""
     value = field(vertices)
     # Four tetrahedral offsets give the gradient.
     offsets = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], dtype=np.float64)

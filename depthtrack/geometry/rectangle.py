@@ -13,8 +13,7 @@ Element = TypeVar("Element", bound=np.generic)
 class Rect(NamedTuple):
     """The pixels from `left` and `top`, included, to `right` and `bottom`, excluded.
 
-    A rectangle may reach outside the image. It is the only convention for rectangles in this program: compiled
-    kernels take the same four integers in the same order.
+    A rectangle may extend outside the image. Compiled kernels take the same four integers in the same order.
     """
 
     left: int
@@ -44,8 +43,8 @@ class Rect(NamedTuple):
     def around(cls, pixels: ArrayLike, margin: ArrayLike = 0.0) -> Self:
         """Return the smallest rectangle that holds points and `margin` around them.
 
-        pixels (N, 2): finite image coordinates, pixels, at least one.
-        margin (2,) or a scalar: pixels along x and y.
+        pixels: (N, 2) finite image coordinates, pixels, at least one.
+        margin: (2,) or a scalar, pixels along x and y.
         """
         points = np.asarray(pixels, dtype=np.float64)
         low = np.floor(points.min(axis=0) - margin)
@@ -102,7 +101,7 @@ class Rect(NamedTuple):
     def paste(self, part: NDArray[Element], outer: "Rect") -> NDArray[Element]:
         """Return an image of `outer` with `part` at this rectangle's place and zeros elsewhere.
 
-        part (height, width, ...): the image of this rectangle. What lies outside `outer` is dropped.
+        part: (height, width, ...) the image of this rectangle; pixels outside `outer` are dropped.
         """
         out = np.zeros((*outer.shape, *part.shape[2:]), dtype=part.dtype)
         common = self.clipped(outer)

@@ -1,7 +1,7 @@
-"""Rotations as quaternions w x y z, rotation vectors and matrices: for numpy arrays, and compiled for scalars.
+"""Rotations as quaternions w x y z, rotation vectors and matrices.
 
 The numpy functions broadcast over leading axes. The `compiled_` functions take and return scalars; numba kernels call
-them. Tests hold both kinds to each other and to the axioms of rotations.
+them.
 """
 
 import math
@@ -19,7 +19,7 @@ _SMALL_ANGLE = 1e-9
 
 
 def normalised(quaternion: ArrayLike) -> Array:
-    """Return the unit quaternion (..., 4) with w >= 0, so that a rotation has one representation."""
+    """Return the unit quaternion (..., 4) with w >= 0, unique for a rotation."""
     q = np.asarray(quaternion, dtype=np.float64)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0, -q, q)
@@ -100,7 +100,7 @@ def compiled_exp(x: float, y: float, z: float) -> Quaternion:
 
 @numba.njit(cache=True, nogil=True)
 def compiled_log(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return the rotation vector (rad), of angle at most pi, of a quaternion of any length except zero."""
+    """Return the rotation vector (rad), of angle at most pi, of a quaternion except zero."""
     w, x, y, z = compiled_normalised(w, x, y, z)
     sine = math.sqrt(x * x + y * y + z * z)
     share = 2 * math.atan2(sine, w) / sine if sine > 1e-12 else 2.0

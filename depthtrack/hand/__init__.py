@@ -1,1 +1,1 @@
-"""The hand itself: pose vector, sizes, joint limits, kinematics, primitives and skin. Knows nothing of images."""
+"""The hand model: pose vector, sizes, joint limits, kinematics, primitives, skin, synergies."""

@@ -1,6 +1,6 @@
-"""Compiled forward kinematics of the hand, one pose at a time, and the retraction that solvers step by.
+"""Compiled forward kinematics and retraction of the hand, one pose at a time.
 
-`HandModel` wraps them for batches; the tests hold them to `reference_kinematics`.
+`HandModel` wraps them for batches. The tests compare them with `reference_kinematics`.
 """
 
 import math
@@ -18,9 +18,11 @@ BODY_COUNT = 16
 
 
 class Chain(NamedTuple):
-    """The constants of a hand: T_palm_base with all angles zero, phalanx lengths, and the side.
+    """The kinematic constants of a hand.
 
-    base: (5, 3, 4) metres, palm frame; lengths: (5, 3) metres, scaled; mirror: +1 for a right hand, -1 for a left one.
+    base: (5, 3, 4) T_palm_base with all angles zero, metres.
+    lengths: (5, 3) of the phalanges, metres, scaled.
+    mirror: +1 for a right hand, -1 for a left one.
     """
 
     base: Array
@@ -44,7 +46,9 @@ class Chain(NamedTuple):
 class BodyPoses(NamedTuple):
     """A posed hand in the camera frame, metres.
 
-    T: (16, 3, 4) T_camera_body; axes: (20, 3) unit axis of each finger angle; origins: (20, 3) a point on that axis.
+    T: (16, 3, 4) T_camera_body.
+    axes: (20, 3) unit axis of each finger angle.
+    origins: (20, 3) a point on each axis.
     """
 
     T: Array
@@ -66,7 +70,10 @@ class BodyPoses(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
-    """Place the bodies in a pose (27,), its quaternion of any length except zero: Eq. (1) of Schroeder et al. 2014."""
+    """Write the bodies in a pose (27,) to `bodies`: Eq. (1) of Schroeder et al. 2014.
+
+    The quaternion may have any length except zero.
+    """
     T, axes, origins = bodies.T, bodies.axes, bodies.origins
     compiled_matrix(pose[3], pose[4], pose[5], pose[6], T[0])
     for i in range(3):
@@ -118,16 +125,16 @@ def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def retract(pose: Array, tangent: Array, out: Array) -> None:
-    """Write the pose reached from `pose` (27,) by a tangent step (26,) to `out` (27,); see `pose.retract`."""
+    """Write the pose `out` (27,) reached from `pose` by a step (26,); see `pose.retract`."""
     retract_unnormalised(pose, tangent, out)
     out[3], out[4], out[5], out[6] = compiled_normalised(out[3], out[4], out[5], out[6])
 
 
 @numba.njit(cache=True, nogil=True)
 def retract_unnormalised(pose: Array, tangent: Array, out: Array) -> None:
-    """Write the retraction to `out` (27,), its quaternion unit only to rounding, and of either sign.
+    """Write the retraction to `out` (27,) without normalising its quaternion.
 
-    That is enough for a single step, as forward kinematics accepts a quaternion of any length.
+    The quaternion is unit up to rounding, of either sign. Forward kinematics accepts any length.
     """
     for i in range(3):
         out[i] = pose[i] + tangent[i]

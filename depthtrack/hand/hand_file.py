@@ -1,4 +1,4 @@
-"""Load a hand: sizes from a hand file, or a user's rigged mesh with the sizes measured on it."""
+"""Reading of a hand: sizes from a hand file, or measured on a user's rigged mesh."""
 
 from pathlib import Path
 
@@ -14,10 +14,10 @@ def load_hand(path: Path, side: Side | None = None) -> HandShape:
 
     A hand of a rigged mesh refers to it (`HandShape.rig`): surface fits and pictures then use that mesh.
 
-    `side`: the hand to read from a rig with both, or the side that the file must have; as found if None.
+    side: the hand to read from a rig with both, or the side that the file must have; any if None.
 
     Raises:
-        InputError: if the file is missing or damaged, is no hand, or is the other side's.
+        InputError: if the file is missing or damaged, holds no hand, or holds the other side's.
         MissingExtraError: if the file is a rig and pygltflib is not installed.
     """
     if is_rig(path):

@@ -1,4 +1,4 @@
-"""Forward kinematics of the 16 joints, the phalanx endpoints and keypoints, and the Jacobian of any point.
+"""Forward kinematics of joints, endpoints and keypoints, and the Jacobian of any point.
 
 Bodies: 0 is the palm; 1 + 3 f + k is phalanx k (from the palm outward) of finger f. Each phalanx has its origin at
 its own joint, y along the bone, z towards the pad; flexion turns about +x, abduction about z, positive towards the
@@ -24,7 +24,7 @@ ENDPOINT_NAMES = tuple(
     f"{finger}_{point}" for finger in FINGERS for point in (_THUMB_POINTS if finger == "thumb" else _FINGER_POINTS)
 )
 KEYPOINT_NAMES = ("wrist", *ENDPOINT_NAMES)
-"""The 21 public keypoints, in MediaPipe's order: the wrist, then thumb to little finger, root to tip."""
+"""The 21 keypoints in MediaPipe's order: wrist, then thumb to little finger, base to tip."""
 
 
 def body_of(finger: int, phalanx: int) -> int:
@@ -33,7 +33,7 @@ def body_of(finger: int, phalanx: int) -> int:
 
 
 def _moves() -> Mask:
-    """Return whether an angle moves a body (16, 20). Abduction and first flexion move the whole finger."""
+    """Return (16, 20) whether an angle moves a body."""
     moves = np.zeros((BODY_COUNT, 20), dtype=np.bool_)
     for finger in range(5):
         for phalanx in range(3):
@@ -46,12 +46,15 @@ MOVES = _moves()
 
 @dataclass(frozen=True)
 class HandModel:
-    """Kinematics of a hand of given sizes. All methods broadcast over leading axes of the pose (..., 27)."""
+    """Kinematics of a hand. All methods broadcast over leading axes of the pose (..., 27)."""
 
     shape: HandShape
 
     def transforms(self, pose: ArrayLike) -> Array:
-        """Return T_camera_body (..., 16, 4, 4), metres, of poses (..., 27): Eq. (1) of Schroeder et al. 2014."""
+        """Return T_camera_body (..., 16, 4, 4), metres, of poses (..., 27).
+
+        Source: Schroeder et al. 2014, Eq. (1).
+        """
         p = np.asarray(pose, dtype=np.float64)
         flat = np.ascontiguousarray(p.reshape(-1, POSE_SIZE))
         T = np.empty((len(flat), BODY_COUNT, 4, 4))
@@ -60,7 +63,7 @@ class HandModel:
 
     @cached_property
     def chain(self) -> Chain:
-        """The constants of the hand that compiled kinematics takes."""
+        """The constants of the hand for compiled kinematics."""
         return Chain.of(self.shape)
 
     @property
@@ -76,31 +79,38 @@ class HandModel:
         return T
 
     def wrist(self, pose: ArrayLike) -> Array:
-        """Return the wrist (..., 3), metres, camera frame, of poses (..., 27), without placing the fingers."""
+        """Return the wrist (..., 3), metres, camera frame, of poses (..., 27)."""
         p = np.asarray(pose, dtype=np.float64)
         return np.einsum("...ij,j->...i", rotation_matrix(p[..., ORIENTATION]), self.shape.wrist) + p[..., POSITION]
 
     def joints(self, pose: ArrayLike) -> Array:
-        """Return the 16 joints (..., 16, 3), metres, camera frame: the wrist, then the origin of each phalanx."""
+        """Return the joints (..., 16, 3), metres, camera frame: wrist, then phalanx origins."""
         joints = self.transforms(pose)[..., :3, 3].copy()
         joints[..., 0, :] = self.wrist(pose)
         return joints
 
     def endpoints(self, pose: ArrayLike) -> Array:
-        """Return the 20 phalanx endpoints (..., 20, 3), metres, camera frame: base, two joints and tip a finger."""
+        """Return the phalanx endpoints (..., 20, 3), metres, camera frame, four a finger."""
         return self.endpoints_of(self.transforms(pose))
 
     def keypoints(self, pose: ArrayLike) -> Array:
-        """Return the 21 keypoints (..., 21, 3), metres, camera frame, in MediaPipe's order."""
+        """Return the keypoints (..., 21, 3), metres, camera frame, in MediaPipe's order."""
         return np.concatenate([self.wrist(pose)[..., None, :], self.endpoints(pose)], axis=-2)
 
     def transform_points(self, pose: ArrayLike, bodies: ArrayLike, local_points: ArrayLike) -> Array:
-        """Return the camera-frame positions (..., N, 3), metres, of points (N, 3) fixed to `bodies` (N,)."""
+        """Return the camera-frame positions (..., N, 3), metres, of points fixed to bodies.
+
+        bodies: (N,) 0 to 15.
+        local_points: (N, 3) metres, frames of the bodies.
+        """
         T = self.transforms(pose)[..., np.asarray(bodies), :, :]
         return np.einsum("...nij,nj->...ni", T[..., :3, :3], np.asarray(local_points)) + T[..., :3, 3]
 
     def point_jacobian(self, pose: ArrayLike, bodies: ArrayLike, points: ArrayLike) -> Array:
-        """Return the derivative (..., N, 3, 26) of camera-frame points (..., N, 3) fixed to `bodies` (N,).
+        """Return the Jacobian (..., N, 3, 26) of points fixed to bodies.
+
+        bodies: (N,) 0 to 15.
+        points: (..., N, 3) metres, camera frame.
 
         Columns follow the tangent space of `pose.retract`. A revolute joint moves a point by the cross product of
         its axis and the lever arm (Schroeder et al. 2014, Eq. 5).
@@ -135,7 +145,7 @@ class HandModel:
         return axes, origins
 
     def endpoints_of(self, T: Array) -> Array:
-        """Return the 20 phalanx endpoints (..., 20, 3), metres, of placed bodies `T` (..., 16, 4, 4)."""
+        """Return the phalanx endpoints (..., 20, 3), metres, of bodies T (..., 16, 4, 4)."""
         points = np.empty((*T.shape[:-3], 20, 3))
         for finger in range(5):
             for phalanx in range(3):

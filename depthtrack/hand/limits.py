@@ -1,12 +1,13 @@
 """Range of motion of the 20 finger angles.
 
-Sources: ranges of motion of the American Academy of Orthopaedic Surgeons (Greene and Heckman, "The Clinical
-Measurement of Joint Motion", 1994) and the reference values of the American Society for Surgery of the Hand
-(MCP 0-45 hyperextension to 90, PIP 0-100, DIP 0-80, thumb MCP -10 to 55, thumb IP -15 to 80 degrees); abduction
-of the MCP joints as Lin, Wu and Huang, "Modeling the Constraints of Human Hand Motion", 2000 (-15 to 15 degrees),
-shifted for index, ring and little finger, whose zero is the middle finger's direction here rather than their own
-resting one. The thumb's CMC range (Cooney et al., "The kinesiology of the thumb trapeziometacarpal joint", 1981:
-53 degrees flexion-extension, 42 abduction-adduction) is taken about the resting direction of `HandShape`.
+Sources:
+- Flexion: Greene and Heckman, "The Clinical Measurement of Joint Motion", 1994, of the American Academy of Orthopaedic
+  Surgeons. Also the reference values of the American Society for Surgery of the Hand, in degrees: MCP 0-45
+  hyperextension to 90, PIP 0-100, DIP 0-80, thumb MCP -10 to 55, thumb IP -15 to 80.
+- Abduction of the MCP joints: Lin, Wu and Huang, "Modeling the Constraints of Human Hand Motion", 2000: -15 to 15
+  degrees. The ranges of index, ring and little finger are shifted, since zero is here the middle finger's direction.
+- CMC joint: Cooney et al., "The kinesiology of the thumb trapeziometacarpal joint", 1981. Its ranges, 53 degrees of
+  flexion and 42 of abduction, are centred on the resting direction of `HandShape`.
 """
 
 import numpy as np
@@ -33,13 +34,13 @@ _DEGREES = np.array(
 )
 
 LOWER: Array = np.radians(_DEGREES[..., 0]).ravel()
-"""Smallest value of each finger angle, (20,) radians, in the order of the pose vector."""
+"""(20,) smallest finger angles, radians, in the order of the pose vector."""
 UPPER: Array = np.radians(_DEGREES[..., 1]).ravel()
-"""Largest value of each finger angle, (20,) radians."""
+"""(20,) largest finger angles, radians."""
 
 
 def within_limits(pose: ArrayLike) -> Array:
-    """The pose (..., 27) with every finger angle moved to the nearest point of its range."""
+    """Return the pose (..., 27) with every finger angle clipped to its range."""
     nearest = np.array(pose, dtype=np.float64)
     nearest[..., ANGLES] = np.clip(nearest[..., ANGLES], LOWER, UPPER)
     return nearest

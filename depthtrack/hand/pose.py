@@ -1,4 +1,4 @@
-"""The 27-float pose vector and the 26-dimensional tangent space that solvers step in.
+"""The 27-float pose vector and its 26-dimensional tangent space.
 
 Layout: position of the palm's centre (3, metres, camera frame), orientation quaternion w x y z of the palm in
 the camera frame (4), finger angles (20, radians): thumb, index, middle, ring, little, each abduction and then
@@ -37,10 +37,13 @@ def make_pose(position: ArrayLike, quaternion: ArrayLike, angles: ArrayLike) -> 
 
 
 def retract(pose: ArrayLike, tangent: ArrayLike) -> Array:
-    """Return the pose (..., 27) reached from `pose` (..., 27) by a step (..., 26) in its tangent space.
+    """Return the pose (..., 27) reached from `pose` by a step in its tangent space.
 
-    The step holds the translation (3, m), the rotation vector applied about the palm's centre in the camera
-    frame (3, rad), and the change of the angles (20, rad). `compiled_kinematics.retract` is its compiled form.
+    pose: (..., 27).
+    tangent: (..., 26) translation (3, metres), rotation vector about the palm's centre (3, radians), both in the camera
+        frame, and change of the finger angles (20, radians).
+
+    `compiled_kinematics.retract` is the compiled form.
     """
     p, t = np.asarray(pose, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
     quaternion = quaternion_product(quaternion_exp(t[..., 3:6]), p[..., ORIENTATION])
@@ -48,9 +51,9 @@ def retract(pose: ArrayLike, tangent: ArrayLike) -> Array:
 
 
 def tangent_between(start: ArrayLike, end: ArrayLike) -> Array:
-    """Return the step (..., 26) with `retract(start, step) == end`; its rotation angle is at most pi.
+    """Return the step (..., 26) with `retract(start, step) == end`.
 
-    start, end: poses (..., 27).
+    start, end: poses (..., 27). The rotation angle of the step is at most pi.
     """
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     conjugate = a[..., ORIENTATION] * np.array([1.0, -1.0, -1.0, -1.0])

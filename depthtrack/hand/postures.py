@@ -1,11 +1,14 @@
-"""A few typical postures, for searches that start from nothing: finger angles (20,) in radians, within the limits."""
+"""Typical postures for searches without a previous pose.
+
+Finger angles (20,), radians, within the joint limits.
+"""
 
 import numpy as np
 
 from depthtrack.types import Array
 
-# Degrees, finger by finger: abduction, then three flexions from the palm outward. Flexions of a finger follow one
-# another as they do in natural movement (DIP about two thirds of PIP).
+# Degrees, finger by finger: abduction, then three flexions from the palm outward. The flexions of a finger are coupled
+# as in natural movement (DIP about two thirds of PIP).
 _OPEN = [(0, 0, 0, 0), (12, 0, 0, 0), (2, 0, 0, 0), (-8, 0, 0, 0), (-18, 0, 0, 0)]
 _RELAXED = [(5, 5, 10, 15), (6, 20, 25, 12), (0, 25, 28, 14), (-6, 28, 30, 15), (-12, 30, 30, 15)]
 _GRASP = [(15, 10, 20, 20), (8, 40, 45, 25), (0, 42, 48, 26), (-6, 45, 48, 26), (-10, 45, 45, 25)]

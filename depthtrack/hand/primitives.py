@@ -1,9 +1,9 @@
-"""The sphere and cylinder model of the hand (Oikonomidis et al. 2011, Sec. 2.2): 37 transformed unit primitives.
+"""The hand of 37 spheres and cylinders of Oikonomidis et al. 2011, Sec. 2.2.
 
-A palm of one elliptic cylinder and two ellipsoid caps; four fingers of three cones and four spheres; a thumb of an
+The palm has one elliptic cylinder and two ellipsoid caps. A finger has three cones and four spheres. The thumb has an
 ellipsoid, two cones and three spheres. A unit sphere is |u| <= 1; a unit cylinder is ux^2 + uy^2 <= 1, 0 <= uz <= 1.
-The 4x4 matrix that places a primitive is affine for spheres, ellipsoids and cylinders, and projective for cones:
-a cylinder seen through a homography is a cone, so two shapes suffice, as on the GPU (Sec. 2.5).
+The 4x4 matrix T_body_unit is affine for spheres, ellipsoids and cylinders, and projective for cones:
+the image of a cylinder under a homography is a cone, so two shapes suffice, as on the GPU (Sec. 2.5).
 """
 
 from dataclasses import dataclass
@@ -111,26 +111,26 @@ def _thumb(shape: HandShape) -> list[_Part]:
 
 
 def _bone_lengths(shape: HandShape, finger: int) -> Array:
-    """Return the distances (3,) between sphere centres, metres; the tip's sphere ends at the fingertip."""
+    """Return the distances (3,) between sphere centres, metres; the last sphere ends at the tip."""
     lengths = shape.lengths[finger].copy()
     lengths[2] = max(lengths[2] - shape.radii[finger, 3], 1e-4)
     return lengths
 
 
 def sphere(y: float, radius: float) -> Array:
-    """Return the transform (4, 4) of the unit sphere to a ball of `radius` at (0, y, 0), metres."""
+    """Return the transform (4, 4), metres, of the unit sphere to a ball at (0, y, 0)."""
     return ellipsoid((0.0, y, 0.0), (radius, radius, radius))
 
 
 def ellipsoid(centre: tuple[float, float, float], radii: tuple[float, float, float]) -> Array:
-    """Return the transform (4, 4) of the unit sphere to an axis-aligned ellipsoid, metres."""
+    """Return the transform (4, 4), metres, of the unit sphere to an axis-aligned ellipsoid."""
     T = np.diag([*radii, 1.0])
     T[:3, 3] = centre
     return T
 
 
 def cone(start: tuple[float, float, float], length: float, radius_start: float, radius_end: float) -> Array:
-    """Return the transform (4, 4) of the unit cylinder to a cone frustum along +y from `start`, metres.
+    """Return the transform (4, 4), metres, of the unit cylinder to a cone frustum along +y.
 
     With w = 1 + k uz and k = radius_start / radius_end - 1, the radius radius_start / w is linear in the
     distance length (1 + k) uz / w along the axis.

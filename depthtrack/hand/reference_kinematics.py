@@ -1,6 +1,6 @@
-"""Forward kinematics in plain numpy: the reference that tests hold the compiled and the vectorised ones to.
+"""Forward kinematics in plain numpy, the reference of the tests.
 
-The skin is built with it, since every tracked pose depends on the last bits of the skin at rest.
+The skin is built with it too, so that its bits do not depend on the compiled kinematics.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from depthtrack.types import Array
 
 
 def reference_transforms(chain: Chain, pose: ArrayLike) -> Array:
-    """Return T_camera_body (..., 16, 4, 4), metres, of poses (..., 27): Eq. (1) of Schroeder et al. 2014."""
+    """Return T_camera_body (..., 16, 4, 4), metres, of poses (..., 27); see `HandModel`."""
     p = np.asarray(pose, dtype=np.float64)
     batch = p.shape[:-1]
     T = np.zeros((*batch, BODY_COUNT, 4, 4))

@@ -1,7 +1,7 @@
-"""Sizes of one person's hand, in one small JSON that people can read.
+"""Sizes of one person's hand, and their JSON file.
 
-Palm frame, for both hands: origin at the palm's centre, y towards the fingers, z out of the palm (palmar), and x
-to the right of somebody who looks at the palm: towards the thumb on a right hand, away from it on a left hand.
+Palm frame of both hands: origin at the palm's centre, y towards the fingers, z out of the palm (palmar), x to the right
+if the palm faces the viewer. So x points towards the thumb of a right hand and away from that of a left hand.
 All sizes are stored for a right hand; a left hand is its mirror image in x.
 """
 
@@ -54,14 +54,17 @@ _SOURCE = "depthtrack default: Buryanov and Kotiuk 2010; Greiner 1991; Garrett 1
 class HandShape:
     """Sizes of one hand, and the file of its surface if that is a user's rigged mesh.
 
-    Lengths are metres here and millimetres in the JSON file. `scale` multiplies all of them. Arrays are read-only and
+    Lengths are metres here and millimetres in the JSON file. `scale` multiplies them all. Arrays are read-only and
     hold the right hand, unscaled, in the palm frame.
 
-    `lengths` (5, 3): phalanges from the palm outward.
-    `radii` (5, 4): half the thickness at the base, at two joints and at the tip.
-    `bases` (5, 3): base joints.
-    `thumb_direction`, `thumb_pad` (3,): directions of the resting thumb and of its pad.
-    `rig`: the mesh that the sizes were measured on; None if the surface is built from the sizes (`Skin.of`).
+    lengths: (5, 3) phalanges from the palm outward.
+    radii: (5, 4) half the thickness at the base, at two joints and at the tip.
+    bases: (5, 3) base joints.
+    thumb_direction, thumb_pad: (3,) directions of the resting thumb and of its pad.
+    rig: the mesh that the sizes were measured on; None if the surface is built from the sizes (`Skin.of`).
+
+    Raises:
+        InputError: if a size, the scale or the side is out of range.
     """
 
     side: Side = "right"
@@ -106,11 +109,15 @@ class HandShape:
 
     @property
     def wrist(self) -> Array:
-        """(3,) wrist joint in the palm frame, metres, scaled."""
+        """The wrist joint (3,), metres, palm frame, scaled."""
         return np.array([0.0, -self.palm_length / 2 * self.scale, 0.0])
 
     def with_(self, **changes: Any) -> Self:
-        """A copy with some sizes changed; all of them are checked again."""
+        """Return a copy with some fields replaced and all checked again.
+
+        Raises:
+            InputError: if a size is out of range.
+        """
         return replace(self, **changes)
 
     def to_json(self) -> str:
@@ -140,7 +147,8 @@ class HandShape:
     def from_json(cls, path: Path) -> Self:
         """Return the hand of a `hand.json`; the path of its rig is relative to the file's folder.
 
-        Raises: InputError if the file is missing or malformed, or a size is missing or out of range.
+        Raises:
+            InputError: if the file is missing or malformed, or a size is missing or out of range.
         """
         shape = read_json(path, "the hand file", cls.from_fields, made_by="depthtrack synth")
         return shape if shape.rig is None else shape.with_(rig=shape.rig.beside(path.parent.resolve()))
@@ -149,7 +157,9 @@ class HandShape:
     def from_fields(cls, fields: dict[str, Any]) -> Self:
         """Return the hand of the parsed contents of a `hand.json`.
 
-        Raises: KeyError, TypeError, ValueError or InputError if an entry is missing or malformed.
+        Raises:
+            KeyError, TypeError, ValueError: if an entry is missing or malformed.
+            InputError: if a size is out of range.
         """
         fingers = [fields["fingers"][finger] for finger in FINGERS]
         return cls(
@@ -175,7 +185,7 @@ _ARRAY_SHAPES = {
 }
 _PALM_SIZES = ("palm_breadth", "palm_length", "palm_thickness", "wrist_breadth", "wrist_thickness")
 SIZE_NAMES = (*_ARRAY_SHAPES, *_PALM_SIZES)
-"""Fields of `HandShape` that a rig fixes: all but scale, side, source and rig."""
+"""Fields of `HandShape` that a rig determines: all except scale, side, source and rig."""
 
 
 def _frozen(values: Any) -> Array:
@@ -189,5 +199,5 @@ def _table(rows_mm: Mapping[str, tuple[float, ...]]) -> Array:
 
 
 def _mm(metres: Any) -> Any:
-    """Millimetres rounded to a nanometre, so that writing and reading again changes nothing."""
+    """Return millimetres rounded to a nanometre, which a second round trip keeps."""
     return np.round(np.asarray(metres) * 1000, 6).tolist()

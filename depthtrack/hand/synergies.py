@@ -1,4 +1,7 @@
-"""Hand synergies: the principal components of recorded postures (Schroeder et al. 2014, Sec. V), in a JSON file."""
+"""Hand synergies, the principal components of recorded postures, and their JSON file.
+
+Source: Schroeder et al. 2014, Sec. V.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,19 +18,26 @@ from depthtrack.types import Array
 
 ANGLE_COUNT = 20
 _ORTHONORMAL = 1e-6
-"""How far a file's components may be from orthonormal."""
+"""Tolerance of the components' orthonormality in a file."""
 _SPREAD = 1e-12
-"""Postures with a smaller total variance, in rad^2, are one posture."""
+"""Total variance, rad^2, below which postures count as equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class Synergies:
-    """A mean posture and K directions, most telling first, in which postures differ from it.
+    """A mean posture and K principal components, by descending variance.
 
-    `mean` (20,) radians; `components` (20, K), orthonormal columns; `variances` (K,) rad^2 along them, descending;
-    `lower` and `upper` (K,) radians, the smallest and largest coefficient that the postures have; `total_variance`
-    rad^2 of the postures, of which these components may cover a part; `source` says which postures. Arrays are
-    read-only. Raises InputError for values that do not fit together.
+    mean: (20,) radians.
+    components: (20, K) orthonormal columns.
+    variances: (K,) along the components, rad^2, descending.
+    lower, upper: (K,) smallest and largest coefficient of the postures, radians.
+    total_variance: of the postures, rad^2; the K components may cover only a part.
+    source: description of the postures.
+
+    Arrays are read-only.
+
+    Raises:
+        InputError: if shapes or values are inconsistent.
     """
 
     mean: Array
@@ -47,16 +57,22 @@ class Synergies:
 
     @classmethod
     def fit(cls, postures: ArrayLike, source: str = "") -> Self:
-        """All 20 components of postures (N, 20), radians, of which two must differ. Raises InputError."""
+        """Return all 20 components of postures.
+
+        postures: (N, 20) radians.
+
+        Raises:
+            InputError: if the shape differs, a number is not finite, or all postures are equal.
+        """
         X = np.asarray(postures, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != ANGLE_COUNT or not np.isfinite(X).all():
             raise InputError(f"synergies need postures of {ANGLE_COUNT} finite angles each, found shape {X.shape}")
         if len(X) < 2 or np.var(X, axis=0).sum() < _SPREAD:
-            raise InputError(f"synergies need postures that differ, found {len(X)} that are all alike")
+            raise InputError(f"synergies need postures that differ, found {len(X)} equal ones")
         mean = X.mean(axis=0)
-        # The triangular factor has the same singular values and right vectors, and at most 20 rows.
+        # The triangular factor has the same singular values and right singular vectors, and at most 20 rows.
         _, singular, Vt = np.linalg.svd(np.linalg.qr(X - mean, mode="r"))
-        # A singular vector has no sign of its own: its largest entry is made positive, so that fitting again agrees.
+        # The sign of a singular vector is arbitrary: a positive largest entry makes the fit reproducible.
         C = Vt.T * np.sign(Vt[np.arange(ANGLE_COUNT), np.abs(Vt).argmax(axis=1)])
         variances = np.zeros(ANGLE_COUNT)
         variances[: len(singular)] = singular**2 / len(X)
@@ -65,19 +81,26 @@ class Synergies:
         return cls(mean, C, variances, lower, upper, float(variances.sum()), source)
 
     def __len__(self) -> int:
-        """K, the number of components."""
+        """Return K, the number of components."""
         return len(self.variances)
 
     def project(self, angles: ArrayLike) -> Array:
-        """Coefficients (..., K) of postures (..., 20): Eq. (7), first half."""
+        """Return the coefficients (..., K) of postures (..., 20), radians: Eq. (7), first half."""
         return (np.asarray(angles, dtype=np.float64) - self.mean) @ self.components
 
     def angles(self, coefficients: ArrayLike) -> Array:
-        """Postures (..., 20) of coefficients (..., K): Eq. (7), second half. Joint limits are not looked at."""
+        """Return the postures (..., 20), radians, of coefficients (..., K): Eq. (7), second half.
+
+        Joint limits are not applied.
+        """
         return np.asarray(coefficients, dtype=np.float64) @ self.components.T + self.mean
 
     def truncated(self, count: int) -> Self:
-        """The first `count` components alone. Raises InputError when there are not so many."""
+        """Return the first `count` components.
+
+        Raises:
+            InputError: if `count` is not from 1 to K.
+        """
         if not 1 <= count <= len(self):
             raise InputError(f"these synergies have 1 to {len(self)} components, found {count}: ask for fewer")
         return type(self)(
@@ -91,17 +114,23 @@ class Synergies:
         )
 
     def variance_share(self, count: int) -> float:
-        """Share of the postures' variance that the first `count` components cover."""
+        """Return the share of the postures' variance that the first `count` components cover."""
         return min(float(self.variances[:count].sum()) / self.total_variance, 1.0)
 
     def components_for(self, share: float) -> int:
-        """How many components cover at least this share of the variance. Raises InputError when all do not."""
+        """Return the number of components that cover at least a share of the variance.
+
+        Raises:
+            InputError: if all components together cover less.
+        """
         for count in range(1, len(self) + 1):
-            # A share of 1 is reached up to rounding.
+            # A share of 1 is reached only up to rounding.
             if self.variance_share(count) >= share - 1e-9:
                 return count
         reached = self.variance_share(len(self))
-        raise InputError(f"these {len(self)} components cover {reached:.1%} of the variance, found {share:.1%} asked")
+        raise InputError(
+            f"these {len(self)} components cover {reached:.1%} of the variance, found a share of {share:.1%}"
+        )
 
     def to_json(self) -> str:
         """Return the text of the synergies file, angles in degrees."""
@@ -124,9 +153,10 @@ class Synergies:
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
-        """Return the synergies of a file that holds the text of `to_json`.
+        """Return the synergies of a file written by `save_synergies`.
 
-        Raises: InputError if the file is missing or malformed, or its entries do not fit together.
+        Raises:
+            InputError: if the file is missing or malformed, or its entries are inconsistent.
         """
         return read_json(path, "the synergies", cls._from_fields, made_by="depthtrack synergies fit")
 
@@ -151,13 +181,18 @@ class Synergies:
 def save_synergies(synergies: Synergies, path: Path) -> None:
     """Write the file that `Synergies.from_json` reads.
 
-    Raises: InputError if the file cannot be written.
+    Raises:
+        InputError: if the file cannot be written.
     """
     write_atomic(path, synergies.to_json())
 
 
 def load_synergies(name: str | Path = "leap") -> Synergies:
-    """Synergies by the name of a set that comes with depthtrack, or by the path of a file. Raises InputError."""
+    """Return the synergies of a set that comes with depthtrack, or of a .json file.
+
+    Raises:
+        InputError: if there is no such set, or the file is missing or malformed.
+    """
     names = synergy_names()
     if str(name) in names:
         return Synergies.from_json(_folder() / f"{name}.json")
@@ -167,7 +202,7 @@ def load_synergies(name: str | Path = "leap") -> Synergies:
 
 
 def synergy_names() -> list[str]:
-    """Names of the sets that come with depthtrack."""
+    """Return the names of the sets that come with depthtrack."""
     return sorted(path.stem for path in _folder().glob("*.json"))
 
 
@@ -182,17 +217,17 @@ def _check(s: Synergies) -> None:
         raise InputError(f"synergies must be 1 to {ANGLE_COUNT} components of {ANGLE_COUNT} angles each")
     numbers = np.concatenate([s.mean, s.components.ravel(), s.variances, s.lower, s.upper, [s.total_variance]])
     if not np.isfinite(numbers).all() or np.abs(numbers).max() > 1000:
-        raise InputError("synergies must be finite numbers of ordinary size")
+        raise InputError("synergies must be finite numbers of magnitude at most 1000")
     if np.abs(s.components.T @ s.components - np.eye(count)).max() > _ORTHONORMAL:
-        raise InputError("components must be orthogonal to one another and of length 1: fit them again")
+        raise InputError("components must be orthonormal: fit them again")
     if np.any(s.variances < 0) or np.any(np.diff(s.variances) > _ORTHONORMAL) or np.any(s.lower > s.upper):
-        raise InputError("variances must descend and stay above 0, and no lower limit lie above the upper one")
+        raise InputError("variances must be descending and not negative, and lower limits at most the upper ones")
     if not s.total_variance > 0 or s.variances.sum() > s.total_variance * (1 + _ORTHONORMAL):
         raise InputError("the variances of the components must not exceed the total variance")
 
 
 def _angles(table: dict[str, Any]) -> Array:
-    """(20,) numbers of a table with four a finger."""
+    """Return the numbers (20,) of a table with four a finger."""
     angles = np.array([[float(value) for value in table[finger]] for finger in FINGERS])
     if angles.shape != (5, 4):
         raise InputError(f"each finger needs four angles, found {angles.shape[-1]}")
@@ -204,5 +239,5 @@ def _by_finger(values: ArrayLike) -> dict[str, list[float]]:
 
 
 def _degrees(radians: Any) -> Any:
-    """Eight significant digits: few enough to read, and writing what was read changes nothing."""
+    """Return degrees of eight significant digits, which a second round trip keeps."""
     return np.vectorize(lambda degrees: float(f"{degrees:.8g}"))(np.degrees(radians)).tolist()

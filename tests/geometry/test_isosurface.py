@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from trimesh import Trimesh
 
-from depthtrack.geometry.isosurface import polygonise, surface_nets, without_double_sheets
+from depthtrack.geometry.isosurface import polygonise, surface_nets, without_ambiguous_cells
 from depthtrack.types import Array
 
 
@@ -29,7 +29,7 @@ def test_even_noise_becomes_a_manifold() -> None:
     values = np.random.default_rng(0).normal(size=(12, 12, 12))
     for axis in range(3):
         np.moveaxis(values, axis, 0)[[0, 1, -2, -1]] = 1.0
-    vertices, quads = surface_nets(without_double_sheets(values))
+    vertices, quads = surface_nets(without_ambiguous_cells(values))
     edges = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
     forward = {(a, b) for a, b in edges.tolist()}
     assert len(forward) == len(edges)  # no edge is used twice in one direction,

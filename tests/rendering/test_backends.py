@@ -1,4 +1,4 @@
-"""The registry of backends: names, options, and what is said of those that do not exist."""
+"""The registry creates backends by name and rejects unknown names and options."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from depthtrack.rendering.selfcheck import scene
 
 
 @pytest.mark.parametrize("name", BACKENDS)
-def test_every_backend_is_made_by_its_name(name: str) -> None:
+def test_every_backend_is_created_by_name(name: str) -> None:
     shape, target, poses = scene()
     try:
         scorer = create_scorer(name, shape, Objective(silhouette_weight=5.0))
@@ -26,12 +26,12 @@ def test_every_backend_is_made_by_its_name(name: str) -> None:
     np.testing.assert_allclose(terms.energy, terms.depth + 5 * terms.silhouette + 10 * terms.kinematic)
 
 
-def test_an_unknown_name_lists_those_there_are() -> None:
+def test_an_unknown_name_lists_the_backends() -> None:
     with pytest.raises(InputError, match="no renderer 'cuda': choose one of raster, egl, osmesa, oracle"):
         create_scorer("cuda", HandShape())
 
 
-def test_an_unknown_option_lists_those_there_are() -> None:
+def test_an_unknown_option_lists_the_options() -> None:
     with pytest.raises(InputError, match="'egl' has no option 'threads': its options are sums, device"):
         create_scorer("egl", HandShape(), threads=2)
     with pytest.raises(InputError, match="'oracle' has no option 'platform': its options are none"):

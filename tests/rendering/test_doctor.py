@@ -1,4 +1,4 @@
-"""`depthtrack doctor`: backends that work, disagree, crash, hang or are missing are told apart, and told plainly."""
+"""`depthtrack doctor` reports which backends work, disagree, crash, hang or are missing."""
 
 import json
 import sys
@@ -19,7 +19,7 @@ GOOD = SelfCheck("numba", True, 1e-5, 1e-7, 0, 70000, 123456.0)
 TRIAL = Trial("a renderer", "egl", {"device": "gpu"})
 
 
-def test_the_oracle_agrees_with_itself_in_a_process_of_its_own() -> None:
+def test_the_oracle_agrees_with_itself_in_a_separate_process() -> None:
     outcome = attempt(Trial("oracle", "oracle"))
     assert outcome.works
     assert outcome.check is not None
@@ -28,8 +28,8 @@ def test_the_oracle_agrees_with_itself_in_a_process_of_its_own() -> None:
     assert outcome.check.hypotheses_per_s > 0
 
 
-def test_the_scene_leaves_nothing_to_rounding() -> None:
-    """No pixel's match hangs on less than half a micrometre, several times what float32 loses at that distance."""
+def test_no_match_in_the_scene_depends_on_rounding() -> None:
+    """The margin of every match is several times the float32 rounding at that distance."""
     shape, target, poses = selfcheck.scene()
     with OracleScorer(shape) as oracle:
         oracle.set_target(target)
@@ -40,7 +40,7 @@ def test_the_scene_leaves_nothing_to_rounding() -> None:
     assert target.camera.shape == (64, 64)
 
 
-def test_a_renderer_that_miscalculates_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_renderer_that_computes_wrongly_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     class Shifted(OracleScorer):
         def render(self, pose: object) -> np.ndarray:
             depth = super().render(pose)  # type: ignore[arg-type]
@@ -54,7 +54,7 @@ def test_a_renderer_that_miscalculates_is_found_out(monkeypatch: pytest.MonkeyPa
 
 
 def pretend(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch, time_limit: float = 30.0) -> Outcome:
-    """A trial whose process is a shell script."""
+    """Return the outcome of a trial whose process is a shell script."""
     script = folder / "python"
     script.write_text(f"#!/bin/sh\n{body}\n")
     script.chmod(0o755)
@@ -77,7 +77,7 @@ def pretend(body: str, folder: Path, monkeypatch: pytest.MonkeyPatch, time_limit
         ("""echo 'driver chatter'; echo '{"error": "run  apt-get install libegl1"}'""", "run  apt-get install libegl1"),
     ],
 )
-def test_a_renderer_that_fails_is_told_how(
+def test_the_failure_of_a_renderer_is_reported(
     body: str, problem: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     outcome = pretend(body, tmp_path, monkeypatch, time_limit=0.5 if "sleep" in body else 30)
@@ -99,7 +99,7 @@ def test_a_check_that_disagrees_does_not_count_as_working(tmp_path: Path, monkey
 
 @pytest.fixture
 def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
-    """What `doctor` finds, without the wait: the default works, a GPU is missing."""
+    """Replace the trials: the default works, a GPU is missing."""
     found = [
         Outcome(Trial("raster", "raster"), GOOD, None),
         Outcome(Trial("egl on a GPU", "egl", {"device": "gpu"}), None, "EGL finds no GPU; tried surfaceless"),
@@ -108,7 +108,7 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[Outcome]:
     return found
 
 
-def test_the_report_is_aligned_and_names_what_to_mend(
+def test_the_report_is_aligned_and_names_the_problems(
     outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["doctor"]) == 0
@@ -122,7 +122,9 @@ def test_the_report_is_aligned_and_names_what_to_mend(
     assert any(f"numpy {np.__version__}" in line for line in lines)
 
 
-def test_json_holds_the_machine_and_every_renderer(outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_contains_the_machine_and_every_renderer(
+    outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["doctor", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["machine"]["libraries"]["numpy"] == np.__version__
@@ -143,12 +145,12 @@ def test_a_default_renderer_that_fails_ends_with_code_2(
     assert "the default renderer, raster, does not work here: crashed with SIGILL" in capsys.readouterr().err
 
 
-def test_a_senseless_time_limit_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_time_limit_out_of_range_is_rejected(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--time-limit", "0"]) == 2
     assert "--time-limit must lie between" in capsys.readouterr().err
 
 
-def test_everything_there_is_gets_tried() -> None:
+def test_every_backend_has_a_trial() -> None:
     labels = [trial.label for trial in doctor.trials()]
     assert labels[0] == "raster"
     assert {"egl on a GPU", "egl in software", "osmesa", "oracle"} < set(labels)

@@ -1,4 +1,4 @@
-"""Compare the renderers with rays cast by embree, a library that shares no code with them."""
+"""The renderers agree with rays cast by embree, a library that shares no code with them."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ pytest.importorskip("embreex", reason="embree is not installed: pip install 'dep
 
 
 def embree_depth(camera: Camera, vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Depth (h, w) in metres of the nearest triangle in every pixel, 0 where a ray hits none."""
+    """Return the depth (h, w), metres, of the nearest triangle at every pixel, 0 = no hit."""
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
 
@@ -48,7 +48,7 @@ def random_shape(rng: np.random.Generator) -> HandShape:
 
 
 def random_view(rng: np.random.Generator) -> tuple[Array, Camera]:
-    """Any pose, and a camera that sees the hand, or most of it."""
+    """Return a random pose and a camera that shows most of the hand."""
     distance = rng.uniform(0.3, 1.0)
     pose = make_pose([*rng.uniform(-0.03, 0.03, 2), distance], rng.normal(size=4), rng.uniform(LOWER, UPPER))
     width, height = (int(n) for n in rng.integers(120, 320, 2))
@@ -58,7 +58,7 @@ def random_view(rng: np.random.Generator) -> tuple[Array, Camera]:
 
 @given(hand=st.integers(0, 3), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=16)
-def test_the_triangle_renderer_sees_the_skin_as_embree_does(hand: int, seed: int) -> None:
+def test_the_triangle_renderer_renders_the_skin_like_embree(hand: int, seed: int) -> None:
     pose, camera = random_view(np.random.default_rng(seed))
     shape = random_shape(np.random.default_rng(hand))  # a few hands only: their skins take time to make
     skin = Skin.of(shape)
@@ -76,7 +76,7 @@ def test_the_triangle_renderer_sees_the_skin_as_embree_does(hand: int, seed: int
 
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=6)
-def test_the_ray_caster_sees_the_primitives_as_embree_does(seed: int) -> None:
+def test_the_ray_caster_renders_the_primitives_like_embree(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape, (pose, camera) = random_shape(rng), random_view(rng)
     primitives, transforms = Primitives.of(shape), HandModel(shape).transforms(pose)
@@ -94,7 +94,7 @@ def test_the_ray_caster_sees_the_primitives_as_embree_does(seed: int) -> None:
 
 
 def along_normal(camera: Camera, surface: RenderedSurface, depth: Array) -> Array:
-    """How far (h, w) another depth map lies inside a surface, in metres along the surface's normal."""
+    """Return how far (h, w) a depth map lies inside a surface, metres along its normal."""
     v, u = np.mgrid[: camera.height, : camera.width]
     rays = camera.unproject(np.stack([u, v], axis=-1), np.ones(camera.shape))
     return np.asarray(-np.sum(surface.normal * rays, axis=-1) * (depth - surface.depth))

@@ -1,4 +1,4 @@
-"""Eq. (1) and (2) against cases counted by hand."""
+"""Eq. (1) and (2) agree with cases counted by hand."""
 
 from itertools import pairwise
 
@@ -32,7 +32,7 @@ def test_energy_of_hand_counted_sums() -> None:
     assert terms.energy[0] == pytest.approx(146 / 5 + 20 * (1 - 4 / 7))
 
 
-def test_nothing_speaks_for_a_hand_that_nobody_sees() -> None:
+def test_an_invisible_hand_has_no_agreement() -> None:
     terms = Terms.of_sums(Objective(), np.zeros((1, 27)), np.zeros(1), np.zeros(1), np.zeros(1))
     assert terms.energy[0] == pytest.approx(20)
 
@@ -48,6 +48,6 @@ def test_only_crossing_fingers_cost(abductions: list[float]) -> None:
 
 
 @pytest.mark.parametrize("change", [{"match_depth": 0}, {"clamp_depth": -1}, {"depth_unit": 0}, {"epsilon": 99}])
-def test_absurd_constants_are_refused(change: dict[str, float]) -> None:
+def test_constants_out_of_range_are_rejected(change: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(change))):
         Objective(**change)

@@ -1,4 +1,4 @@
-"""EGL and OSMesa against the float64 oracle and each other: silhouettes, depth and energies."""
+"""EGL and OSMesa agree with the float64 oracle and each other: silhouettes, depth, energies."""
 
 import multiprocessing
 from collections.abc import Callable, Iterator
@@ -41,7 +41,7 @@ def _try(platform: Any) -> str | None:
 
 @pytest.fixture(scope="session")
 def osmesa() -> Iterator[Run]:
-    """Runs a function with "osmesa" before its arguments, in a spawned process: PyOpenGL has one platform a process."""
+    """Return a function that runs another with "osmesa" as first argument, in a spawned process."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         if problem := pool.submit(_try, "osmesa").result():
             pytest.skip(problem)
@@ -50,7 +50,7 @@ def osmesa() -> Iterator[Run]:
 
 @pytest.fixture(scope="session")
 def egl() -> Run:
-    """Runs a function with "egl" before its arguments, here."""
+    """Return a function that runs another with "egl" as first argument, in this process."""
     if problem := _try("egl"):
         pytest.skip(problem)
     return lambda function, *arguments: function("egl", *arguments)
@@ -58,14 +58,14 @@ def egl() -> Run:
 
 @pytest.fixture(scope="session", params=["egl", "osmesa"])
 def run(request: pytest.FixtureRequest) -> Run:
-    """Either."""
+    """Return the function of each platform in turn."""
     runner: Run = request.getfixturevalue(request.param)
     return runner
 
 
 @given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
 @settings(max_examples=12)
-def test_agrees_with_the_oracle_in_a_window_on_the_hand(run: Run, seed: int, reduced: int | None) -> None:
+def test_agrees_with_the_oracle_in_a_region_of_the_hand(run: Run, seed: int, reduced: int | None) -> None:
     run(views.assert_window_agrees, seed, reduced)
 
 
@@ -77,11 +77,11 @@ def test_agrees_with_the_oracle_through_any_camera(run: Run, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", views.ABSURD)
-def test_agrees_with_the_oracle_where_views_are_absurd(run: Run, name: str, seed: int) -> None:
+def test_agrees_with_the_oracle_in_extreme_views(run: Run, name: str, seed: int) -> None:
     run(views.assert_absurd_view_agrees, name, seed)
 
 
-def test_agrees_with_the_oracle_in_regions_beyond_the_image(run: Run) -> None:
+def test_agrees_with_the_oracle_in_regions_outside_the_image(run: Run) -> None:
     run(views.assert_overhanging_windows_agree)
 
 
@@ -95,8 +95,8 @@ def test_egl_in_software_and_osmesa_give_the_same_bits(egl: Run, osmesa: Run, se
 
 @pytest.mark.usefixtures("egl")
 @pytest.mark.parametrize("sums", ["cpu", "gpu"])
-def test_a_score_does_not_depend_on_the_batch_around_it(sums: Sums) -> None:
-    """No tile leaks into its neighbours, though hands hang over all their borders, and no batch is too large."""
+def test_a_score_does_not_depend_on_the_rest_of_the_batch(sums: Sums) -> None:
+    """Hands extend over all borders of their tiles without effect on other tiles."""
     rng = np.random.default_rng(5)
     shape, poses = random_shape(rng), random_poses(rng, 40, (0, 0, 0.35), 0.08)
     target = target_of(shape, poses[0], KINECT.crop(Rect.of_size(250, 180, 301, 203)), rng)
@@ -112,7 +112,7 @@ def test_a_score_does_not_depend_on_the_batch_around_it(sums: Sums) -> None:
 @pytest.mark.usefixtures("egl")
 @pytest.mark.parametrize("sums", ["cpu", "gpu"])
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (3, 257), (5, 7), (1500, 20), (64, 64)])
-def test_the_sums_of_an_empty_view_are_exact_at_any_size(sums: Sums, width: int, height: int) -> None:
+def test_the_sums_of_an_empty_image_are_exact_at_any_size(sums: Sums, width: int, height: int) -> None:
     rng = np.random.default_rng(width)
     silhouette = rng.random((height, width)) < 0.3
     depth = rng.choice(np.array([0, 0.015625, 0.5], np.float32), size=(height, width))
@@ -126,7 +126,7 @@ def test_the_sums_of_an_empty_view_are_exact_at_any_size(sums: Sums, width: int,
 
 
 @pytest.mark.usefixtures("egl")
-def test_regions_too_large_for_the_renderer_are_refused() -> None:
+def test_regions_too_large_for_the_renderer_are_rejected() -> None:
     from depthtrack.rendering.opengl.renderer import shared_renderer
 
     renderer = shared_renderer("egl")
@@ -136,8 +136,8 @@ def test_regions_too_large_for_the_renderer_are_refused() -> None:
 
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
-def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
-    """Every primitive's pixels, as the ray caster sees them alone, lie in its rectangle and touch all four sides."""
+def test_rectangles_bound_their_primitives_tightly(seed: int) -> None:
+    """The ray caster's pixels of each primitive lie in its rectangle and touch all four sides."""
     rng = np.random.default_rng(seed)
     shape, camera = random_shape(rng), KINECT
     poses = random_poses(rng, 1, (0, 0, 0.5), 0.02)
@@ -162,7 +162,7 @@ def test_rectangles_hold_their_primitives_tightly(seed: int) -> None:
 
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
-def test_the_kernel_sums_tiles_as_the_plain_evaluation_does(seed: int) -> None:
+def test_the_kernel_sums_tiles_like_the_plain_evaluation(seed: int) -> None:
     rng, objective = np.random.default_rng(seed), Objective()
     h, w, columns, count = *(int(n) for n in rng.integers(1, 40, 2)), 3, 5
     depth = np.where(rng.random((h, w)) < 0.2, 0, rng.uniform(0.4, 0.5, (h, w))).astype(np.float32)

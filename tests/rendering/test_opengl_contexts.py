@@ -1,4 +1,4 @@
-"""OpenGL contexts as good citizens: shared, released, many scorers at once, threads, workers, and clear refusals."""
+"""OpenGL contexts are shared and released; threads, workers and errors are handled."""
 
 import gc
 import multiprocessing
@@ -37,7 +37,7 @@ def resident_mb() -> float:
 
 
 def in_a_new_process(code: str, **environment: str) -> str:
-    """What a fresh interpreter prints last."""
+    """Return the last line that a new interpreter prints."""
     kept = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -51,13 +51,13 @@ def in_a_new_process(code: str, **environment: str) -> str:
 
 
 def living_objects(gl: Any) -> int:
-    """Textures, framebuffers, buffers and programs that exist; Mesa counts names up from 1."""
+    """Return the number of objects of each kind; Mesa numbers them from 1."""
     names = range(1, 2000)
     tests = gl.glIsTexture, gl.glIsFramebuffer, gl.glIsBuffer, gl.glIsProgram, gl.glIsVertexArray
     return sum(bool(exists(name)) for exists in tests for name in names)
 
 
-def test_hundreds_of_scorers_leave_nothing_behind() -> None:
+def test_hundreds_of_scorers_leave_no_objects() -> None:
     target, poses = scene()
     counts, sizes = [], []
     for turn in range(301):
@@ -72,7 +72,7 @@ def test_hundreds_of_scorers_leave_nothing_behind() -> None:
     assert sizes[1] - sizes[0] < 8
 
 
-def test_a_scorer_forgotten_without_close_gives_its_texture_back() -> None:
+def test_a_scorer_that_is_not_closed_frees_its_texture() -> None:
     scorer = OpenGLScorer(HandShape(), sums="gpu")
     scorer.set_target(scene()[0])
     shared, (texture,) = shared_renderer("egl"), scorer._textures
@@ -84,7 +84,7 @@ def test_a_scorer_forgotten_without_close_gives_its_texture_back() -> None:
         assert not gl.glIsTexture(texture)
 
 
-def test_a_closed_scorer_says_so() -> None:
+def test_a_closed_scorer_raises_an_error() -> None:
     scorer = OpenGLScorer(HandShape())
     scorer.set_target(scene()[0])
     scorer.close()
@@ -93,8 +93,8 @@ def test_a_closed_scorer_says_so() -> None:
         scorer.score(scene()[1])
 
 
-def test_scorers_live_together() -> None:
-    """Different hands, sizes and ways to sum, used in turn, score as each does alone."""
+def test_scorers_used_in_turn_do_not_interact() -> None:
+    """Scorers of different hands, sizes and sums give the scores that each gives alone."""
     (target, poses), (other, _) = scene(0), scene(1)
     small = other.crop(Rect.of_size(10, 5, 30, 33))
     alone = []
@@ -112,7 +112,7 @@ def test_scorers_live_together() -> None:
     assert np.abs(alone[0] - alone[1]).min() > 0.1
 
 
-def test_threads_take_turns_and_score_alike() -> None:
+def test_threads_give_equal_scores() -> None:
     target, poses = scene()
     results: dict[int, np.ndarray] = {}
 
@@ -131,8 +131,8 @@ def test_threads_take_turns_and_score_alike() -> None:
         np.testing.assert_array_equal(energies, np.broadcast_to(results[index % 2][0], energies.shape))
 
 
-def test_nothing_stays_current_outside_a_call() -> None:
-    """Another user of EGL in this process finds its own context as it left it."""
+def test_no_context_stays_current_after_a_call() -> None:
+    """Other EGL code in this process keeps its own current context."""
     from OpenGL import EGL  # the module under test has bound PyOpenGL to EGL
 
     assert not EGL.eglGetCurrentContext()
@@ -149,7 +149,7 @@ def test_nothing_stays_current_outside_a_call() -> None:
     assert not EGL.eglGetCurrentContext()
 
 
-def test_closed_contexts_are_refused_and_new_ones_work() -> None:
+def test_closed_contexts_are_rejected_and_new_ones_work() -> None:
     target, poses = scene()
     scorer = OpenGLScorer(HandShape())
     scorer.set_target(target)
@@ -163,7 +163,7 @@ def test_closed_contexts_are_refused_and_new_ones_work() -> None:
         np.testing.assert_array_equal(fresh.score(poses), before)
 
 
-def test_spawned_workers_score_alike() -> None:
+def test_spawned_workers_give_equal_scores() -> None:
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         workers = list(pool.map(energies_and_depth, ["egl", "egl"], [4, 4]))
     for energies, depth in workers:
@@ -171,7 +171,7 @@ def test_spawned_workers_score_alike() -> None:
         np.testing.assert_array_equal(depth, energies_and_depth("egl", 4)[1])
 
 
-def test_a_forked_child_is_told_rather_than_left_to_hang() -> None:
+def test_a_forked_child_raises_an_error_and_does_not_hang() -> None:
     code = """
 import os
 from depthtrack.hand.shape import HandShape
@@ -200,12 +200,12 @@ print(os.read(read, 4096).decode())
     assert all("fork" in words and "spawn" in words for words in said)
 
 
-def test_a_second_platform_in_one_process_is_refused() -> None:
+def test_a_second_platform_in_one_process_is_rejected() -> None:
     with pytest.raises(OpenGLError, match="already uses OpenGL through egl"):
         OpenGLScorer(HandShape(), platform="osmesa")
 
 
-def test_a_contradicting_variable_is_refused_and_ours_is_not_left_behind() -> None:
+def test_a_contradicting_variable_is_rejected_and_ours_is_restored() -> None:
     code = """
 from depthtrack.errors import DepthtrackError
 from depthtrack.rendering.opengl.opening import open_context
@@ -230,7 +230,7 @@ def test_a_missing_library_names_its_package(
         open_context(platform)
 
 
-def test_devices_are_chosen_by_kind_or_number() -> None:
+def test_devices_are_chosen_by_kind_or_index() -> None:
     with OpenGLScorer(HandShape(), device="software") as scorer:
         assert scorer.software
     if OpenGLScorer(HandShape()).software:
@@ -244,21 +244,21 @@ def test_devices_are_chosen_by_kind_or_number() -> None:
         OpenGLScorer(HandShape(), platform="osmesa", device="gpu")
 
 
-def test_options_that_make_no_sense_are_refused() -> None:
+def test_invalid_options_are_rejected() -> None:
     with pytest.raises(InputError, match="'egl' or 'osmesa', found 'glx'"):
         OpenGLScorer(HandShape(), platform="glx")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="'gpu' or 'cpu', found 'tpu'"):
         OpenGLScorer(HandShape(), sums="tpu")  # type: ignore[arg-type]
 
 
-def test_a_shader_the_driver_refuses_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shader_that_the_driver_rejects_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "cover.vert").write_text("#version 330 core\nvoid main() { nonsense; }\n")
     monkeypatch.setattr(programs, "resource_folder", lambda name: tmp_path)
     with shared_renderer("egl").context as gl, pytest.raises(OpenGLError, match=r"shaders/cover\.vert.*nonsense"):
         programs.Program(gl, "cover.vert", "compare.frag")
 
 
-def test_nothing_imports_opengl_before_it_is_asked_for() -> None:
+def test_opengl_is_imported_at_its_first_use_only() -> None:
     code = """
 import sys
 import depthtrack.rendering.backends, depthtrack.rendering.opengl.scorer, depthtrack.rendering.doctor
@@ -267,7 +267,7 @@ print(sorted(name for name in sys.modules if name.split(".")[0] == "OpenGL"))
     assert in_a_new_process(code) == "[]"
 
 
-def test_a_driver_s_error_is_told_by_name() -> None:
+def test_the_code_of_a_driver_error_is_reported() -> None:
     shared = shared_renderer("egl")
     with pytest.raises(OpenGLError, match="failed with OpenGL error 1280"), shared.context as gl:
         gl.glEnable(0xBAD)

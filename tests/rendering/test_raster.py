@@ -1,4 +1,4 @@
-"""The rasteriser against the float64 oracle: silhouettes, depth and energies, in ordinary views and absurd ones."""
+"""The rasteriser agrees with the float64 oracle: silhouettes, depth and energies."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tests.support.rendering import KINECT, assert_agrees, random_poses, random_
 
 @given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
 @settings(max_examples=20)
-def test_agrees_with_the_oracle_in_a_window_on_the_hand(seed: int, reduced: int | None) -> None:
+def test_agrees_with_the_oracle_in_a_region_of_the_hand(seed: int, reduced: int | None) -> None:
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
@@ -48,7 +48,7 @@ def test_agrees_with_the_oracle_through_any_camera(seed: int) -> None:
     ],
 )
 @pytest.mark.parametrize("seed", range(4))
-def test_agrees_with_the_oracle_where_views_are_absurd(
+def test_agrees_with_the_oracle_in_extreme_views(
     name: str, centre: tuple[float, float, float], spread: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -62,8 +62,8 @@ def test_agrees_with_the_oracle_where_views_are_absurd(
     assert_agrees(shape, target, poses)
 
 
-def test_regions_beyond_the_image_observe_nothing_there() -> None:
-    """A region that hangs over the image's edge scores like the same region of a larger, empty-edged image."""
+def test_a_region_observes_nothing_outside_the_image() -> None:
+    """A region across the image's edge scores like that of a larger image with empty edges."""
     rng = np.random.default_rng(7)
     shape, poses = HandShape(), random_poses(rng, 6, (0.25, 0.2, 0.5), 0.02)
     full = target_of(shape, poses[0], KINECT, rng)
@@ -88,8 +88,8 @@ def test_the_best_pose_is_the_observed_one() -> None:
     assert terms.silhouette[4] == 0
 
 
-def test_scores_do_not_depend_on_what_was_scored_before() -> None:
-    """The buffer is left clean, whatever was drawn and however the region changes."""
+def test_scores_do_not_depend_on_previous_scores() -> None:
+    """The buffer is cleared after every call, also if the region changes."""
     rng = np.random.default_rng(5)
     shape, poses = HandShape(), random_poses(rng, 40, (0, 0, 0.4), 0.3)
     small = target_of(shape, poses[0], window_on(shape, poses[0], 70), rng)
@@ -103,7 +103,7 @@ def test_scores_do_not_depend_on_what_was_scored_before() -> None:
 
 
 @pytest.mark.parametrize("poses", [np.zeros(27), np.zeros((2, 26)), np.full((1, 27), np.nan)])
-def test_poses_of_the_wrong_form_are_refused(poses: np.ndarray) -> None:
+def test_poses_of_a_wrong_shape_are_rejected(poses: np.ndarray) -> None:
     scorer = RasterScorer(HandShape())
     scorer.set_target(
         target_of(
@@ -117,19 +117,19 @@ def test_poses_of_the_wrong_form_are_refused(poses: np.ndarray) -> None:
         scorer.score(poses)
 
 
-def test_scoring_before_observing_is_an_error() -> None:
+def test_scoring_without_a_target_is_an_error() -> None:
     with pytest.raises(RuntimeError, match="set_target"):
         RasterScorer(HandShape()).score(np.zeros((1, 27)))
 
 
-def test_absurd_thread_counts_are_refused() -> None:
+def test_thread_counts_out_of_range_are_rejected() -> None:
     with pytest.raises(InputError, match="threads"):
         RasterScorer(HandShape(), threads=0)
 
 
 @given(seed=st.integers(0, 2**32 - 1), side=st.integers(1, 300))
-def test_reduced_targets_keep_the_view(seed: int, side: int) -> None:
-    """Every sample of a reduced target is what the full one holds where its pixel looks."""
+def test_reduced_targets_keep_the_field_of_view(seed: int, side: int) -> None:
+    """Every sample of a reduced target is the full one's value along the same ray."""
     rng = np.random.default_rng(seed)
     width, height = (int(n) for n in rng.integers(2, 120, 2))
     camera = Camera(width, height, 150.0, 140.0, 30.0, 40.0)
@@ -145,7 +145,7 @@ def test_reduced_targets_keep_the_view(seed: int, side: int) -> None:
     assert reduced.depth[v, u] in around
 
 
-def test_a_hand_that_nobody_sees_scores_the_same_everywhere() -> None:
+def test_an_invisible_hand_scores_the_same_everywhere() -> None:
     camera = KINECT.resized(0.1)
     nothing = Target.blank(camera)
     pose = random_poses(np.random.default_rng(0), 1, (0, 0, -1), 0)

@@ -1,4 +1,4 @@
-"""The rasteriser on several threads: the bits of one thread, and no thread survives its scorer."""
+"""Several threads give the bits of one, and no thread survives its scorer."""
 
 import gc
 import threading
@@ -19,7 +19,7 @@ def poses() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def targets(poses: np.ndarray) -> list[Target]:
-    """Observations of the first pose, 40 and 96 pixels wide."""
+    """Return targets of the first pose, 40 and 96 pixels wide."""
     rng, shape = np.random.default_rng(3), HandShape()
     return [target_of(shape, poses[0], window_on(shape, poses[0], side), rng) for side in (40, 96)]
 
@@ -29,7 +29,7 @@ def raster_threads() -> set[threading.Thread]:
 
 
 def assert_ends(threads: set[threading.Thread]) -> None:
-    """Check that the threads end; the limit is for a machine that is very busy."""
+    """Check that the threads end; the long limit allows for a busy machine."""
     for thread in threads:
         thread.join(120)
         assert not thread.is_alive()

@@ -1,4 +1,4 @@
-"""The float64 renderers, against independent geometry: closed forms, trimesh, and each other."""
+"""The float64 renderers agree with closed forms, trimesh and each other."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_sphere_depth_equals_the_closed_form(seed: int) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=25)
 def test_cone_hits_lie_on_the_cone(seed: int) -> None:
-    """Every hit lies on the frustum's wall, and rays that miss stay outside it over its whole length."""
+    """Every hit lies on the frustum's wall, and rays without a hit stay outside it."""
     rng = np.random.default_rng(seed)
     length, r0, r1 = rng.uniform(0.05, 0.3), rng.uniform(0.01, 0.06), rng.uniform(0.01, 0.06)
     T = np.eye(4)
@@ -75,8 +75,8 @@ def test_cone_hits_lie_on_the_cone(seed: int) -> None:
 
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.7, 1.4))
 @settings(max_examples=10)
-def test_hand_depth_is_the_nearest_of_its_primitives_as_trimesh_sees_them(seed: int, scale: float) -> None:
-    """Finely tessellated primitives in our z-buffer come within the tessellation's error of the exact surface."""
+def test_hand_depth_is_the_nearest_of_its_tessellated_primitives(seed: int, scale: float) -> None:
+    """Our z-buffer of finely tessellated primitives is within the tessellation's error."""
     shape = HandShape(scale=scale)
     primitives, pose = Primitives.of(shape), random_pose_in_view(seed)
     pose[:3] = [0, 0, 0.3]
@@ -113,7 +113,7 @@ def test_normals_are_unit_and_face_the_camera() -> None:
 
 
 @pytest.mark.parametrize("z", [-0.5, 0.0, 0.01])
-def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
+def test_hands_behind_around_and_at_the_camera_are_defined(z: float) -> None:
     shape, pose = HandShape(), random_pose_in_view(5)
     pose[:3] = [0, 0, z]
     primitives = Primitives.of(shape)
@@ -125,12 +125,12 @@ def test_hands_behind_around_and_at_the_lens_are_defined(z: float) -> None:
     assert (depth > 0).any() == (z > -0.3)
 
 
-def test_a_primitive_around_the_lens_shows_nothing() -> None:
+def test_a_primitive_around_the_optical_centre_is_invisible() -> None:
     assert not depth_of(SPHERE, ellipsoid((0, 0, 0), (0.3, 0.3, 0.3))).any()
     assert depth_of(SPHERE, ellipsoid((0, 0, 0.4), (0.3, 0.3, 0.3))).any()
 
 
-def test_drawing_onto_a_surface_keeps_what_is_nearer() -> None:
+def test_drawing_onto_a_surface_keeps_the_nearer_hits() -> None:
     near, far = ellipsoid((0, 0, 0.4), (0.02, 0.02, 0.02)), ellipsoid((0, 0, 0.8), (0.2, 0.2, 0.2))
     first = raycast(CAMERA, np.array([SPHERE]), near[None], np.array([1]))
     both = raycast(CAMERA, np.array([SPHERE]), far[None], np.array([2]), onto=first)

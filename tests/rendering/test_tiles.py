@@ -1,4 +1,4 @@
-"""The tiled layout of the rasteriser's images keeps every pixel, and the rasteriser skips no tile."""
+"""The tiled layout of images keeps every pixel, and the rasteriser skips no tile."""
 
 import numpy as np
 import pytest

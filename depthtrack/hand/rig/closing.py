@@ -9,7 +9,7 @@ from depthtrack.types import Faces, Index
 
 
 def close_holes(rig: Rig) -> Rig:
-    """Fill each boundary loop with a fan around its centroid, moved by the mean of the loop's weights."""
+    """Fill each boundary loop with a fan around its centroid, with the loop's mean weights."""
     loops = boundary_loops(rig.faces)
     if not loops:
         return rig
@@ -34,9 +34,9 @@ def close_holes(rig: Rig) -> Rig:
 
 
 def boundary_loops(faces: Faces) -> list[Index]:
-    """Return the closed loops of edges that only one face has, vertex by vertex in the faces' direction.
+    """Return the closed loops of boundary edges, vertex by vertex in the faces' direction.
 
-    Boundaries that meet in one vertex are left out: they are no simple loop.
+    Boundaries that meet in one vertex are left out, since they are not simple loops.
     """
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = int(faces.max(initial=0)) + 1

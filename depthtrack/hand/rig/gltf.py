@@ -127,7 +127,7 @@ def _rig(document: GltfDocument, skin: int) -> Rig | None:
 
 
 def _inverse_bind(document: GltfDocument, skin: int, count: int) -> Array:
-    """Return `T_joint_mesh` (J, 4, 4) of the bind pose; the identity if the skin does not give it."""
+    """Return `T_joint_mesh` (J, 4, 4) of the bind pose; identities if the skin has none."""
     index = document.gltf.skins[skin].inverseBindMatrices
     if index is None:
         return np.tile(np.eye(4), (count, 1, 1))

@@ -31,7 +31,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @dataclass
 class GltfDocument:
-    """One glTF file: its parsed JSON `gltf`, the bytes `data` of the file, and the buffers read so far."""
+    """A glTF file: its parsed JSON `gltf`, its bytes `data`, and the buffers read so far."""
 
     path: Path
     gltf: Any
@@ -72,7 +72,7 @@ class GltfDocument:
         return total.hexdigest()
 
     def hierarchy(self) -> tuple[Array, list[int]]:
-        """Return `T_world_node` (N, 4, 4), in the file's unit, and the parent of each node, -1 for a root.
+        """Return `T_world_node` (N, 4, 4), in the file's unit, and the parents, -1 for a root.
 
         Raises:
             InputError: if the nodes are not a forest.
@@ -116,7 +116,7 @@ class GltfDocument:
         return np.ndarray((count, width), item, buffer, offset + inside, (stride, item.itemsize))
 
     def buffer(self, index: int) -> bytes:
-        """Return the bytes of a buffer: in the GLB file, in a data URI, or in a file of the same folder.
+        """Return the bytes of a buffer, from the GLB file, a data URI or a file of the same folder.
 
         Raises:
             InputError: if the buffer's file is outside the folder or too large.

@@ -23,7 +23,7 @@ _VERTEX_DATA, _INDEX_DATA = 34962, 34963
 
 
 def export_glb(skin: Skin, path: Path) -> None:
-    """Write the skin at rest as GLB: metres, palm frame, y towards the fingers. The file is complete or absent.
+    """Write the skin at rest as GLB: metres, palm frame, y towards the fingers.
 
     Joints are named as `kinematics.JOINT_NAMES`; `thumb_tip` to `little_tip` hang on the last ones. The joint `wrist`
     is at the wrist.

@@ -128,7 +128,7 @@ def _rig_of_hand(rigs: Iterable[Rig], side: Side | None, mapping: Mapping[str, s
 
 
 def _wrist(rig: Rig, phalanges: Index, mapping: Mapping[str, str] | None) -> int:
-    """Return the joint at the wrist: as mapped, else the last ancestor of all fingers, else by name in a flat rig."""
+    """Return the wrist joint: the mapped one, the last ancestor of all fingers, or one by name."""
     if mapping is not None and "wrist" in mapping:
         return rig.names.index(mapping["wrist"])
     above = [_ancestors(rig, int(joint)) for joint in phalanges[:, 0]]
@@ -150,7 +150,7 @@ def _ancestors(rig: Rig, joint: int) -> list[int]:
 
 
 def _hand_alone(rig: Rig, wrist: int) -> Rig:
-    """Return the rig without faces that joints above the wrist move for the most part, its holes closed."""
+    """Return the rig without faces moved mainly by joints above the wrist, its holes closed."""
     hand = np.array([joint == wrist or wrist in _ancestors(rig, joint) for joint in range(len(rig.names))])
     if hand.sum() >= BODY_COUNT:  # fewer in a flat rig, where the hierarchy does not separate the hand
         kept = np.sum(rig.weights * hand[rig.bound], axis=1) >= 0.5
@@ -165,7 +165,7 @@ def _hand_alone(rig: Rig, wrist: int) -> Rig:
 
 
 def _side(rig: Rig, phalanges: Index, wrist: int, asked: Side | None) -> Side:
-    """Return the side by the bend of fingers and thumb, both towards the palm, or as asked, or by the joints' names."""
+    """Return the side: the given one, or by the bend of fingers and thumb, or by joint names."""
     first, second, third = (rig.joints[phalanges[:, k]] for k in range(3))
     palmar_if_right = _unit(np.cross(first[1] - first[4], first[2] - rig.joints[wrist]))
     bend = _unit(third - second) - _unit(second - first)
@@ -205,7 +205,7 @@ def _measured(rig: Rig, phalanges: Index, wrist: int, side: Side, unit: float | 
 
 
 def _body_weights(rig: Rig, phalanges: Index) -> Array:
-    """Return weights (V, 16): each joint's weight goes to the phalanx that it is or hangs on, else to the palm."""
+    """Return weights (V, 16): a joint's weight goes to its phalanx or ancestor, else the palm."""
     body = {int(joint): 1 + i for i, joint in enumerate(phalanges.ravel())}
     bodies = np.array(
         [next((body[j] for j in (joint, *_ancestors(rig, joint)) if j in body), 0) for joint in range(len(rig.names))]
@@ -216,7 +216,7 @@ def _body_weights(rig: Rig, phalanges: Index) -> Array:
 
 
 def _tip(rig: Rig, last: int, joints: Array, weights: Array, finger: int) -> Array:
-    """Return the skin's furthest point (3,) along the last bone, which points to a tip joint or along the skin."""
+    """Return the skin's farthest point (3,) along the last bone."""
     own = rig.vertices[weights >= 0.5] - joints[2]
     along = _unit(joints[2] - joints[1])
     if len(own) < 4 or np.max(own @ along) <= 0:
@@ -242,7 +242,7 @@ def _checked_unit(length: float, unit: float | None) -> float:
 
 
 def _palm_frame(wrist: Array, points: Array, side: Side) -> tuple[Array, Array]:
-    """Return the rotation (3, 3) from the rig's frame into the palm's, and the palm's centre (3,) in the rig's."""
+    """Return the rotation (3, 3) from the rig's to the palm frame, and the palm's centre (3,)."""
     y = points[2, 0] - wrist
     across = points[1, 0] - points[4, 0] if side == "right" else points[4, 0] - points[1, 0]
     z = _unit(np.cross(across, y))

@@ -1,9 +1,12 @@
-"""Find the 15 finger joints of a hand among the joints of a rig, by name and by place in the tree.
+"""Finger joints of a rig, found by their names and their place in the tree.
 
-Naming schemes that the tests cover: `thumb.01.R` and `f_index.01.R` (Blender's Rigify), `finger2-1.R` (MakeHuman),
-`index_01_r` (Unreal), `mixamorig:RightHandIndex1` (Mixamo), `rightIndexProximal` (VRM, Unity), `R_IndexProximal`
-(Unity XR Hands), `index-finger-phalanx-proximal` (OpenXR, WebXR), `INDEX_FINGER_MCP` (MediaPipe), `b_r_index1`
-(Oculus), `lindex0` (MANO). The name gives the finger and the side. The last three joints of a finger that are no tips
+The tests cover these naming schemes.
+- Blender's Rigify, MakeHuman: `thumb.01.R` and `f_index.01.R`, `finger2-1.R`.
+- Unreal, Mixamo, VRM and Unity: `index_01_r`, `mixamorig:RightHandIndex1`, `rightIndexProximal`.
+- Unity XR Hands, OpenXR and WebXR: `R_IndexProximal`, `index-finger-phalanx-proximal`.
+- MediaPipe, Oculus, MANO: `INDEX_FINGER_MCP`, `b_r_index1`, `lindex0`.
+
+The name gives the finger and the side. The last three joints of a finger except its tip
 are its phalanges: a metacarpal, if the rig has one, comes before them.
 """
 
@@ -66,7 +69,7 @@ def finger_joints(names: Sequence[str], parents: Index, loads: Array, side: Side
 
 
 def mapped_joints(names: Sequence[str], mapping: Mapping[str, str]) -> Index:
-    """Return the joints (5, 3) of the phalanges from a mapping of `kinematics.JOINT_NAMES` to the rig's names.
+    """Return the joints (5, 3) of the phalanges from a mapping of `JOINT_NAMES` to rig names.
 
     Raises:
         InputError: if a key is missing or unknown, or if the rig has no such joint.

@@ -1,4 +1,4 @@
-"""Measure a `HandShape` on a mesh with known finger joints, and place the bone frames at those joints.
+"""Measurement of a `HandShape` and of bone frames on a mesh with known finger joints.
 
 All arrays are a right hand's, in its palm frame, in metres.
 
@@ -19,7 +19,7 @@ _BENT = 0.25
 
 
 def measured_shape(points: Array, vertices: Array, weights: Array, source: str) -> HandShape:
-    """Return the sizes of the hand: lengths and bases from its joints, radii and palm from the skin around them.
+    """Return the sizes of the hand: lengths and bases from joints, radii and palm from the skin.
 
     The thumb's direction in the mesh becomes its resting one. Sizes that the mesh does not give are the average
     hand's, in proportion.
@@ -54,7 +54,7 @@ def measured_shape(points: Array, vertices: Array, weights: Array, source: str) 
 
 
 def bone_frames(shape: HandShape, points: Array) -> Array:
-    """Return T_palm_body (16, 4, 4) of the mesh at rest: origin at each joint, y along its bone, z to the pad.
+    """Return T_palm_body (16, 4, 4) at rest: origin at joints, y along bones, z to the pads.
 
     The rotation about the bone is that of `HandModel` at the joint angles closest to the mesh.
     """
@@ -82,7 +82,7 @@ def bone_frames(shape: HandShape, points: Array) -> Array:
 
 
 def _radii(points: Array, bones: Array, vertices: Array, weights: Array, finger: int, default: HandShape) -> Array:
-    """Return half the thickness (4,) at base, two joints and tip: the median distance of the skin from the bone."""
+    """Return radii (4,) at base, two joints and tip: median distances of the skin from the bone."""
     lengths = np.linalg.norm(bones, axis=-1)
     along = bones / lengths[:, None]
     own = [weights[:, body_of(finger, k)] for k in range(3)]
@@ -107,7 +107,7 @@ def _radii(points: Array, bones: Array, vertices: Array, weights: Array, finger:
 
 
 def _thickness(points: Array, axis: Array, low: float, high: float, fallback: float) -> float:
-    """Return the median distance of points (N, 3) from an axis through the origin, between two heights on it."""
+    """Return the median distance of points (N, 3) from an axis, between two heights on it."""
     height = points @ axis
     around = points[(height > low) & (height < high)]
     if len(around) < 4:
@@ -116,7 +116,7 @@ def _thickness(points: Array, axis: Array, low: float, high: float, fallback: fl
 
 
 def _thumb_pad(thumb: Array, default: HandShape) -> Array:
-    """Return the direction (3,) of the thumb's pad: that of its bend, or the average hand's if it is straight."""
+    """Return the direction (3,) of the thumb's pad: of its bend, or the average if straight."""
     bend = (thumb[1] + thumb[2]) - (thumb[1] + thumb[2]) @ thumb[0] * thumb[0]
     if np.linalg.norm(bend) < _BENT:
         return default.thumb_pad

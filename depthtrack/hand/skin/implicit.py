@@ -1,11 +1,11 @@
-"""The flesh of a hand as an implicit solid: tapered capsules with smooth unions, webs, and muscles of the palm.
+"""The hand as an implicit solid: tapered capsules with smooth unions, webs and palm muscles.
 
 All arrays are a right hand's of scale 1 in its rest pose, palm frame, metres. In that pose fingers are spread and half
 bent: no two fingers touch, and each joint is near the middle of its range, where linear blend skinning is accurate.
 Distances are negative inside, and exact enough near the surface for blending.
 
 The numbers in the functions below are proportions, not measurements: each is a share of a size of `HandShape` (palm
-length `unit`, palm thickness `thick`, a radius, a bone's length), so that the flesh scales with the hand. The sizes
+length `unit`, palm thickness `thick`, a radius, a bone's length). So the solid scales with the hand. The sizes
 have published sources, stated in `hand/shape.py`; the proportions have none and were set by hand. They serve three
 ends, which tests/hand/skin/test_mesh.py checks. The surface passes through the measured sizes: radii at the joints,
 palm and wrist thickness, fingertips. It is one closed solid with five free fingers, for hands of other sizes also. It
@@ -57,7 +57,7 @@ class Cone:
     radius_end: float
 
     def distance(self, points: Array) -> Array:
-        """Return the signed distance (N,) of points (N, 3), perpendicular to the axis as for primitives."""
+        """Return the signed distance (N,) of points (N, 3), perpendicular to the axis."""
         axis = self.end - self.start
         t = np.clip((points - self.start) @ (axis / (axis @ axis + 1e-18)), 0, 1)
         across = points - self.start - t[:, None] * axis
@@ -111,7 +111,7 @@ class ImplicitHand:
 
     @classmethod
     def of(cls, shape: HandShape) -> Self:
-        """Return the flesh of a right hand of scale 1 with the sizes of `shape`."""
+        """Return the solid of a right hand of scale 1 with the sizes of `shape`."""
         shape = shape.with_(side="right", scale=1.0)
         bones = reference_transforms(Chain.of(shape), rest_pose(shape))
         fingers = tuple(tuple(_finger(shape, bones, finger)) for finger in range(5))
@@ -176,7 +176,7 @@ def _finger(shape: HandShape, bones: Array, finger: int) -> list[Cone]:
             length = max(length - r1, 1e-4)
         cones.append(_cone(T, (0, 0, 0), (0, length, 0), r0, r1))
         if (finger, k) != (0, 0):
-            # The pad: flesh on the palmar side between the joints.
+            # The pad: a bulge on the palmar side between the joints.
             pad = 0.9 * min(r0, r1)
             cones.append(
                 _cone(T, (0, 0.4 * length, 0.22 * r0), (0, (0.65 if k < 2 else 0.9) * length, 0.2 * r1), pad, pad)
@@ -187,7 +187,7 @@ def _finger(shape: HandShape, bones: Array, finger: int) -> list[Cone]:
 def _palm(shape: HandShape) -> list[tuple[Cone, ...]]:
     wrist, unit, thick = shape.wrist, shape.palm_length, shape.palm_thickness
     knuckles, radii = shape.bases[1:], shape.radii[1:, 0]
-    # The outer knuckles' flesh reaches the breadth of the palm.
+    # The outer knuckles reach the breadth of the palm.
     left, right = knuckles[3, 0] - radii[3], knuckles[0, 0] + radii[0]
     stretch = shape.palm_breadth / (right - left)
     heads = knuckles + (knuckles - (left + right) / 2) * np.array([stretch - 1, 0, 0])

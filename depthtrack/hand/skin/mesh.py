@@ -1,4 +1,7 @@
-"""The skinned triangle mesh of the hand (Schroeder et al. 2014, Sec. III): built from sizes, or a user's rig."""
+"""The skinned triangle mesh of the hand, built from its sizes or read from a user's rig.
+
+Source: Schroeder et al. 2014, Sec. III.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -48,7 +51,7 @@ class Skin:
 
     @classmethod
     def of(cls, shape: HandShape) -> "Skin":
-        """Return the skin of a hand: its rigged mesh if the shape refers to one, else built from its sizes.
+        """Return the skin of a hand: its rigged mesh if it has one, else built from its sizes.
 
         A built skin is closed. It takes under a second and is cached by shape.
 
@@ -76,7 +79,7 @@ class Skin:
         return self.vertices(HandModel(self.shape).transforms(pose))
 
     def normals(self, vertices: Array) -> Array:
-        """Return outward unit normals (..., V, 3) of posed vertices (..., V, 3): means over adjacent faces, by area."""
+        """Return outward unit normals (..., V, 3) of vertices (..., V, 3), area-weighted face means."""
         a, b, c = (vertices[..., self.faces[:, k], :] for k in range(3))
         of_faces = np.cross(b - a, c - a)
         flat = np.moveaxis(of_faces, -2, 0).reshape(len(self.faces), -1)
@@ -84,7 +87,7 @@ class Skin:
         return np.asarray(total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30))
 
     def to_trimesh(self, vertices: Array) -> Trimesh:
-        """Return the mesh of posed vertices (V, 3) for trimesh: queries, and export to PLY, OBJ, STL, GLB."""
+        """Return the trimesh of posed vertices (V, 3), for queries and export."""
         return Trimesh(vertices, self.faces, process=False)
 
     @cached_property
@@ -130,12 +133,12 @@ def _rigged(shape: HandShape, rigged: RiggedHand) -> Skin:
 
 
 def _built(shape: HandShape) -> Skin:
-    flesh = ImplicitHand.of(shape)
-    low, high = flesh.bounds()
-    vertices, faces = polygonise(flesh.distance, low, high, _cell(shape, high - low))
+    solid = ImplicitHand.of(shape)
+    low, high = solid.bounds()
+    vertices, faces = polygonise(solid.distance, low, high, _cell(shape, high - low))
     _check_closed(vertices, faces)
-    weights = skin_weights(flesh, vertices, faces)
-    # The flesh is a right hand's of scale 1: a left one is its mirror image, inside out.
+    weights = skin_weights(solid, vertices, faces)
+    # The solid is a right hand of scale 1. A left hand is its mirror image, with reversed faces.
     rest = vertices * np.array([shape.mirror, 1, 1]) * shape.scale
     if shape.side == "left":
         faces = np.ascontiguousarray(faces[:, ::-1])
@@ -144,7 +147,7 @@ def _built(shape: HandShape) -> Skin:
 
 
 def _cell(shape: HandShape, box: Array) -> float:
-    """Return the grid spacing for about `_VERTICES` vertices, finer for thin fingers but within bounded memory."""
+    """Return the grid spacing, metres: about `_VERTICES` vertices, finer for thin fingers."""
     area = 2 * shape.palm_length * shape.palm_breadth + 2 * np.pi * float(np.sum(shape.lengths * shape.radii[:, 1:]))
     wanted = min(np.sqrt(1.4 * area / _VERTICES), 0.65 * shape.radii.min())
     return max(float(wanted), float(np.cbrt(np.prod(box) / 4e5)))
@@ -155,6 +158,6 @@ def _check_closed(vertices: Array, faces: Faces) -> None:
     pieces = connected_components(neighbour_average(faces, len(vertices)), directed=False)[0] if len(faces) else 0
     if pieces != 1 or len(vertices) - len(faces) // 2 != 2:
         raise InputError(
-            "the hand sizes must give one solid hand with five free fingers, found flesh that falls apart or fingers "
+            "the hand sizes must give one solid hand with five free fingers, found separate parts or fingers "
             "that grow together: bring radii and base positions closer to the default hand's proportions"
         )

@@ -1,7 +1,7 @@
-"""Compute the skinning weights of the bodies on the built skin: smooth, convex, and within one finger.
+"""Skinning weights of the bodies on the built skin: smooth, convex, and within one finger.
 
 Along a finger the weight passes from one bone to the next around each joint, over about one radius to each side.
-Across the hand it depends on the distance to each finger's flesh, so that a web follows both adjacent fingers.
+Across the hand it depends on the distance to each finger, so that a web follows both adjacent fingers.
 """
 
 import numpy as np
@@ -16,14 +16,14 @@ _BLEND = (1.4, 1.0, 1.0)
 """Half the width of the transition at each joint of a finger, in radii; widest over a knuckle."""
 
 
-def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
-    """Return convex weights (V, 16) of vertices (V, 3) on the flesh at rest."""
-    to_finger = np.stack([flesh.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
-    to_palm = flesh.palm_distance(vertices)
+def skin_weights(solid: ImplicitHand, vertices: Array, faces: Faces) -> Array:
+    """Return convex weights (V, 16) of vertices (V, 3) on the skin at rest, palm frame, metres."""
+    to_finger = np.stack([solid.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
+    to_palm = solid.palm_distance(vertices)
     weights = np.zeros((len(vertices), BODY_COUNT))
 
     # The thumb shares its muscles with the palm: half each at equal distance.
-    unit = flesh.shape.palm_length
+    unit = solid.shape.palm_length
     elsewhere = np.minimum(to_palm, to_finger[:, 1:].min(axis=-1))
     thumb = _step((elsewhere - to_finger[:, 0]) / (0.2 * unit))
     # Between the other fingers the web belongs to both.
@@ -33,7 +33,7 @@ def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
     share = np.concatenate([thumb[:, None], (1 - thumb[:, None]) * nearness], axis=-1)
 
     for finger in range(5):
-        chain = share[:, finger, None] * _along(flesh, finger, vertices, to_finger[:, finger])
+        chain = share[:, finger, None] * _along(solid, finger, vertices, to_finger[:, finger])
         weights[:, 0] += chain[:, 0]
         weights[:, body_of(finger, 0) : body_of(finger, 2) + 1] += chain[:, 1:]
     average = neighbour_average(faces, len(vertices))
@@ -45,14 +45,14 @@ def skin_weights(flesh: ImplicitHand, vertices: Array, faces: Faces) -> Array:
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
-def _along(flesh: ImplicitHand, finger: int, points: Array, distance: Array) -> Array:
-    """Return convex shares (N, 4) of the palm and the three phalanges at points (N, 3), for one finger alone."""
+def _along(solid: ImplicitHand, finger: int, points: Array, distance: Array) -> Array:
+    """Return convex weights (N, 4) of the palm and the phalanges of one finger at points (N, 3)."""
     passed = np.ones(len(points))
     shares = np.empty((len(points), 4))
     before = np.array([0.0, 1.0, 0.0])
     for k in range(3):
-        T, radius = flesh.bones[body_of(finger, k)], flesh.shape.radii[finger, k]
-        # The joint's plane halves the angle of its bones; flesh off the finger is further behind.
+        T, radius = solid.bones[body_of(finger, k)], solid.shape.radii[finger, k]
+        # The joint's plane halves the angle of its bones; points off the finger are further behind.
         normal = before + T[:3, 1]
         beyond = (points - T[:3, 3]) @ (normal / np.linalg.norm(normal))
         if k == 0:
