@@ -1,4 +1,4 @@
-"""Joints of every frame in files that others read: tables, arrays, and the text format of public benchmarks.
+"""Export of a run's poses and joints to tables, arrays and the files of public benchmarks.
 
-One file a format; `docs/joints.md` has the names, their order, the frame and the units.
+One module a format. `docs/joints.md` lists the names, their order, the frame and the units.
 """

@@ -1,8 +1,9 @@
-"""The skeletons of public benchmarks: which joints their files list, in which order, seen by which camera.
+"""The skeletons of public benchmarks: joints, their order in files, and cameras.
 
-Orders and cameras as in the evaluation that collects published predictions: X. Chen, "awesome-hand-pose-estimation",
-evaluation/src. What the joints are was measured on its labels: ICVL's lie in the middle of the phalanges, NYU's second
-joint of a finger lies at the middle knuckle, and its two wrist points beyond the wrist, 79 mm from the palm's centre.
+Source of orders and cameras: X. Chen, "awesome-hand-pose-estimation", evaluation/src, which collects published
+predictions. The joints' positions were measured on its labels. ICVL's joints lie in the middle of the phalanges.
+NYU's second joint of a finger lies at the middle knuckle. Its two wrist points lie beyond the wrist, 79 mm from the
+palm's centre.
 """
 
 from dataclasses import dataclass, field
@@ -22,8 +23,12 @@ Mixture = dict[str, float]
 
 @dataclass(frozen=True)
 class Benchmark:
-    """`joints` (J,) in the order of the files, `camera` of the depth images, and the mixture of the 21 keypoints that
-    each joint is. `source` is the paper to cite.
+    """A benchmark's skeleton.
+
+    camera: of the depth images.
+    mixtures: the mixture of the 21 keypoints that gives each joint.
+    source: the paper to cite.
+    joints: (J,) names in the order of the files.
     """
 
     name: str
@@ -36,7 +41,7 @@ class Benchmark:
         object.__setattr__(self, "joints", tuple(self.mixtures))
 
     def from_keypoints(self, keypoints: ArrayLike) -> Array:
-        """The benchmark's joints (..., J, 3) of keypoints (..., 21, 3) in MediaPipe's order."""
+        """Return the benchmark's joints (..., J, 3) of keypoints (..., 21, 3), in their unit."""
         weights = np.zeros((len(self.joints), len(KEYPOINT_NAMES)))
         for j, mixture in enumerate(self.mixtures.values()):
             for name, weight in mixture.items():
@@ -56,7 +61,7 @@ _PALM = _middle("wrist", "middle_mcp")
 
 
 def _nyu() -> dict[str, Mixture]:
-    """Tips and middle knuckles from little to index finger, three of the thumb, both sides of the wrist, the palm."""
+    """Return NYU's joints: fingers from little to index, thumb, both sides of the wrist, palm."""
     fingers = [_same(f"{finger}_tip", f"{finger}_pip") for finger in reversed(FINGERS[1:])]
     beyond = {"wrist": 1.45, "middle_mcp": -0.45}
     return {
@@ -69,7 +74,7 @@ def _nyu() -> dict[str, Mixture]:
 
 
 def _icvl() -> dict[str, Mixture]:
-    """The palm, then the middles of the three bones of each finger, thumb to little finger."""
+    """Return ICVL's joints: the palm, then the middles of each finger's bones, thumb first."""
     bones: dict[str, Mixture] = {}
     for finger in FINGERS:
         points = [name for name in KEYPOINT_NAMES if name.startswith(f"{finger}_")]
@@ -79,7 +84,7 @@ def _icvl() -> dict[str, Mixture]:
 
 
 def _msra() -> dict[str, Mixture]:
-    """The 21 keypoints with the thumb last."""
+    """Return MSRA's joints: the 21 keypoints with the thumb last."""
     order = [name for finger in (*FINGERS[1:], "thumb") for name in KEYPOINT_NAMES if name.startswith(f"{finger}_")]
     return _same("wrist", *order)
 
@@ -87,7 +92,7 @@ def _msra() -> dict[str, Mixture]:
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
-        # The vertical focal length is negative in NYU's own files, whose y points up; ours points down.
+        # NYU's own files have a negative vertical focal length, since their y points up; ours points down.
         Benchmark(
             "nyu",
             Camera(640, 480, 588.03, 587.07, 320.0, 240.0),
@@ -111,7 +116,11 @@ BENCHMARKS = {
 
 
 def find_benchmark(name: str) -> Benchmark:
-    """A benchmark by its name. Raises InputError."""
+    """Return a benchmark by its name.
+
+    Raises:
+        InputError: if there is no such benchmark.
+    """
     if name not in BENCHMARKS:
         raise InputError(f"no benchmark '{name}': choose one of {', '.join(BENCHMARKS)}")
     return BENCHMARKS[name]

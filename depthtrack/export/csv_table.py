@@ -1,4 +1,4 @@
-"""A CSV table: a row per frame with pose and keypoints, empty cells where there is no pose."""
+"""Export to CSV: a row a frame with pose and keypoints, empty cells if there is no pose."""
 
 import csv
 from pathlib import Path
@@ -15,9 +15,10 @@ HEADER = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES, *
 
 
 def write(track: JointTrack, path: Path) -> None:
-    """Write a track; numbers read back bit for bit.
+    """Write a track; numbers read back bitwise equal.
 
-    Raises: InputError if the file cannot be written.
+    Raises:
+        InputError: if the file cannot be written.
     """
     with replace_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)

@@ -12,15 +12,15 @@ from depthtrack.types import Array, Index
 
 @dataclass(frozen=True)
 class JointTrack:
-    """Poses and keypoints (T rows), NaN where no hand was observed.
+    """Poses and keypoints of T frames, NaN if no hand was observed.
 
-    `index` (T,): frame of the recording.
-    `timestamps` (T,): seconds.
-    `status` (T,): what became of each frame.
-    `energy`, `confidence` (T,): of the pose.
-    `poses` (T, 27): metres, quaternion and radians, camera frame.
-    `keypoints` (T, 21, 3): metres, camera frame, in MediaPipe's order.
-    `hand`: the hand of the poses.
+    index: (T,) frame of the recording.
+    timestamps: (T,) seconds.
+    status: (T,) result of each frame.
+    energy, confidence: (T,) of the poses.
+    poses: (T, 27) metres, quaternion, radians, camera frame.
+    keypoints: (T, 21, 3) metres, camera frame, in MediaPipe's order.
+    hand: the hand of the poses.
     """
 
     index: Index
@@ -34,6 +34,6 @@ class JointTrack:
 
     @classmethod
     def of(cls, run: Run, hand: HandShape) -> Self:
-        """Return the track of a run of a hand."""
+        """Return the poses of a run with the keypoints of its hand."""
         keypoints = HandModel(hand).keypoints(run.poses)
         return cls(run.index, run.timestamps, run.status, run.energy, run.confidence, run.poses, keypoints, hand)

@@ -1,4 +1,4 @@
-"""Arrays for numpy: `numpy.load(file)` without pickles; NaN where there is no pose."""
+"""Export to NumPy's .npz without pickles; NaN if there is no pose."""
 
 import json
 from pathlib import Path
@@ -20,9 +20,10 @@ CONVENTIONS = {
 
 
 def write(track: JointTrack, path: Path) -> None:
-    """Write the arrays of a track under their names, with `pose_names`, `keypoint_names` and `conventions` (JSON).
+    """Write a track's arrays, `pose_names`, `keypoint_names` and `conventions` (JSON).
 
-    Raises: InputError if the file cannot be written.
+    Raises:
+        InputError: if the file cannot be written.
     """
     with replace_atomically(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(

@@ -1,4 +1,4 @@
-"""Write the joints of a run in a format of other programs.
+"""Export of a run's joints to a file of any format.
 
 A new format is a module with a function `write(track, path)` and an entry in EXPORTERS. This module imports no format,
 so that the command line lists them at once.
@@ -23,8 +23,8 @@ Write = Callable[["JointTrack", Path], None]
 class Exporter:
     """A file format.
 
-    `suffixes` are the endings of its files, in lower case. `load` imports the function that writes them, and raises
-    MissingExtraError without the library that it needs.
+    suffixes: endings of its files, in lower case.
+    load: imports the function that writes them; raises MissingExtraError if its library is not installed.
     """
 
     suffixes: tuple[str, ...]
@@ -69,14 +69,15 @@ def suffixes() -> list[str]:
 def find_exporter(path: Path, name: str | None = None) -> Exporter:
     """Return the exporter of a format, by default the only one with the suffix of `path`.
 
-    Raises: InputError if there is no such format, its files end otherwise, or several formats share the suffix.
+    Raises:
+        InputError: if there is no such format, its files end otherwise, or several formats share the suffix.
     """
     if name is not None and name not in EXPORTERS:
         raise InputError(f"no format '{name}': choose one of {', '.join(EXPORTERS)}")
     suffix = path.suffix.lower()
     fitting = [each for each, exporter in EXPORTERS.items() if suffix in exporter.suffixes]
     if not fitting:
-        raise InputError(f"joints are written to {', '.join(suffixes())}, found '{path.name}'")
+        raise InputError(f"an export must end in {', '.join(suffixes())}, found '{path.name}'")
     if name is None and len(fitting) > 1:
         raise InputError(f"several formats end in {suffix}: choose one by --format {', '.join(fitting)}")
     chosen = fitting[0] if name is None else name
@@ -89,6 +90,7 @@ def find_exporter(path: Path, name: str | None = None) -> Exporter:
 def export_joints(path: Path, track: "JointTrack", name: str | None = None) -> None:
     """Write a track to a file of a format, by default the only one with the suffix of `path`.
 
-    Raises: InputError if the format does not fit the path or the file cannot be written.
+    Raises:
+        InputError: if the format does not fit the path or the file cannot be written.
     """
     find_exporter(path, name).load()(track, path)

@@ -1,7 +1,7 @@
-"""The text format of public predictions and labels: a line a frame, u v d of each joint; pixels and millimetres.
+"""The text format of public benchmarks: a line a frame, u v d (px, px, mm) of each joint.
 
-As published for NYU, ICVL and MSRA (see `benchmarks`): numbers between blanks, or commas; a file name may come first.
-A joint that is not known is `nan nan nan`, or has no positive depth.
+Predictions and labels of NYU, ICVL and MSRA have this format (see `benchmark_joints`). Blanks or commas separate the
+numbers; a file name may come first. An unknown joint is `nan nan nan`, or has no positive depth.
 """
 
 import math
@@ -19,15 +19,18 @@ from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array
 
 MAX_BYTES = 1 << 28
-"""Largest file read: a hundred times the benchmarks' own."""
+"""Largest file read, a hundred times the benchmarks' own."""
 _LARGEST = 1e6
-"""Pixels or millimetres beyond which a number is no coordinate."""
+"""Bound on coordinates, pixels or millimetres."""
 
 
 def read_uvd(path: Path, benchmark: Benchmark) -> Array:
-    """Joints (T, J, 3) in metres, camera frame (y down), NaN where unknown; in the benchmark's order.
+    """Return the joints (T, J, 3), metres, camera frame (y down), in the benchmark's order.
 
-    Raises InputError naming the line that does not have three numbers for each joint.
+    Unknown joints are NaN.
+
+    Raises:
+        InputError: if a line does not have three numbers for each joint; it names the line.
     """
     values, frames = array("d"), 0
     for number, line in enumerate(read_lines(path, MAX_BYTES), start=1):
@@ -39,16 +42,18 @@ def read_uvd(path: Path, benchmark: Benchmark) -> Array:
         if frames > MAX_FRAMES:
             raise InputError(f"{path} holds more than {MAX_FRAMES:,} frames: split it")
     if frames == 0:
-        raise InputError(f"{path} holds no frame: expected a line of u v d for each")
+        raise InputError(f"{path} must have a line of u v d for each frame, found none")
     uvd = np.array(values).reshape(frames, len(benchmark.joints), 3)
     return _from_uvd(uvd, benchmark.camera)
 
 
 def write(benchmark: Benchmark, track: JointTrack, path: Path) -> None:
-    """Write a line for each frame of the recording up to the last one tracked; nan for frames without a pose.
+    """Write a line for each frame of the recording, nan if it has no pose.
 
-    The format counts lines, so a frame that the run skipped has a line too.
-    Raises: InputError if the file cannot be written.
+    The format counts lines, so a frame that the run skipped has a line too. The last line is the last tracked frame.
+
+    Raises:
+        InputError: if the file cannot be written.
     """
     frames = int(track.index.max()) + 1 if len(track.index) else 0
     joints = np.full((frames, len(benchmark.joints), 3), np.nan)
@@ -57,10 +62,12 @@ def write(benchmark: Benchmark, track: JointTrack, path: Path) -> None:
 
 
 def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
-    """Write joints (T, J, 3), metres, camera frame (y down), as seen by the camera of the benchmark.
+    """Write joints (T, J, 3), metres, camera frame (y down), for the camera of the benchmark.
 
     Unknown joints and joints behind the camera become nan.
-    Raises: InputError if the file cannot be written.
+
+    Raises:
+        InputError: if the file cannot be written.
     """
     with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         for frame in _to_uvd(joints, benchmark.camera):
@@ -89,13 +96,13 @@ def _numbers(fields: list[str], count: int, where: str, benchmark: Benchmark) ->
     numbers = [float(field) for field in fields]
     if any(abs(x) > _LARGEST for x in numbers):
         raise InputError(
-            f"{where}: pixels and millimetres up to {_LARGEST:g} were expected, found {max(numbers, key=abs):.6g}"
+            f"{where}: expected pixels and millimetres up to {_LARGEST:g}, found {max(numbers, key=abs):.6g}"
         )
     return numbers
 
 
 def _is_number(text: str) -> bool:
-    """Whether `text` is a number of ordinary size, or nan; infinity is none."""
+    """Return whether `text` is a finite number or nan."""
     try:
         return not math.isinf(float(text))
     except ValueError:

@@ -1,1 +1,1 @@
-"""Databases of hand postures: one file a format, all read into a `PostureSet`."""
+"""Readers of hand posture databases: one module a format, all return a `PostureSet`."""

@@ -1,9 +1,12 @@
-"""Joint positions in NumPy's `.npz`, as tracking devices' recordings are exchanged.
+"""Joint positions in NumPy's `.npz`, the format of tracking devices' recordings.
 
-`joints` (N, 5, 4, 3): thumb to little finger, base to tip; or (N, 20, 3), or (N, 21, 3) with the wrist first; metres,
-centimetres or millimetres. Several tracks of hands may follow one another: `start` and `length` (tracks,) say where
-each lies, `right` (tracks,) which side it is, `name` (tracks,) what it is called. Without them all joints are one
-hand's, and its side is found out.
+joints: (N, 5, 4, 3) thumb to little finger, base to tip; or (N, 20, 3), or (N, 21, 3) with the wrist first; metres,
+    centimetres or millimetres.
+start, length: (tracks,) optional, the rows of each track of one hand.
+right: (tracks,) optional, whether it is a right hand.
+name: (tracks,) optional, the track's name.
+
+Without `start` and `length` all joints belong to one hand, and its side is determined from them.
 """
 
 import math
@@ -32,23 +35,27 @@ _DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, EOFError, OSError),
     *(RuntimeError, ValueError, TypeError, SyntaxError, TokenError, MemoryError),
 )
-"""What zipfile and numpy's header parser raise over damaged, encrypted or unknown content."""
+"""Exceptions of zipfile and numpy's header parser for damaged, encrypted or unknown content."""
 
 
 def matches(path: Path) -> bool:
-    """Whether the file is named like one of these."""
+    """Return whether the file name ends in .npz."""
     return path.suffix.lower() == ".npz" and path.is_file()
 
 
 def read(path: Path) -> PostureSet:
-    """Postures of all tracks, each hand's sizes measured by itself. Raises InputError."""
+    """Return the postures of all tracks, with sizes measured on each hand separately.
+
+    Raises:
+        InputError: if the file is damaged or holds no joints of a hand.
+    """
     check_size(path, MAX_BYTES)
     arrays = _read_arrays(path, ("joints", "start", "length", "right", "name"))
     if "joints" not in arrays:
         raise InputError(f"{path}: expected an array 'joints' (N, 5, 4, 3), found none")
     keypoints = _keypoints(path, arrays["joints"])
     tracks = _tracks(path, arrays, len(keypoints))
-    sets = [postures_of_joints(path, keypoints[track.where], track.side) for track in tracks]
+    sets = [postures_of_joints(path, keypoints[track.rows], track.side) for track in tracks]
     counts = [len(one.angles) for one in sets]
     return PostureSet(
         angles=np.concatenate([one.angles for one in sets]),
@@ -59,15 +66,15 @@ def read(path: Path) -> PostureSet:
 
 @dataclass(frozen=True)
 class _Track:
-    """Where the joints of one hand lie, and what is known of it."""
+    """The rows of one hand's joints, its side if known, and its name."""
 
-    where: slice
+    rows: slice
     side: Side | None
     name: str
 
 
 def _keypoints(path: Path, joints: NDArray[Any]) -> Array:
-    """(N, 21, 3), NaN for a wrist that the file has not."""
+    """Return keypoints (N, 21, 3) in the file's unit, NaN for a wrist that the file lacks."""
     count = len(KEYPOINT_NAMES)
     shapes = ((5, 4, 3), (count - 1, 3), (count, 3))
     if joints.shape[1:] not in shapes or not len(joints) or joints.dtype.kind not in "fiu":
@@ -88,24 +95,27 @@ def _tracks(path: Path, arrays: dict[str, NDArray[Any]], count: int) -> list[_Tr
     start, length = arrays.get("start", np.array([0])), arrays.get("length", np.array([count]))
     right, name = arrays.get("right"), arrays.get("name")
     if start.ndim != 1 or start.shape != length.shape or not 1 <= len(start) <= MAX_TRACKS:
-        raise InputError(f"{path}: 'start' and 'length' must say where 1 to {MAX_TRACKS:,} tracks lie, found others")
+        raise InputError(
+            f"{path}: 'start' and 'length' must have the same shape (tracks,) of 1 to {MAX_TRACKS:,} tracks,"
+            f" found {start.shape} and {length.shape}"
+        )
     if start.dtype.kind not in "iu" or length.dtype.kind not in "iu":
         raise InputError(f"{path}: 'start' and 'length' must be whole numbers")
     check_count(path, sum(length.tolist()))
     if any(array is not None and array.shape != start.shape for array in (right, name)):
-        raise InputError(f"{path}: 'right' and 'name' must say one thing for each of the {len(start)} tracks")
+        raise InputError(f"{path}: 'right' and 'name' must have one element for each of the {len(start)} tracks")
     tracks = []
     for i, (first, frames) in enumerate(zip(start.tolist(), length.tolist(), strict=True)):
         if not 0 <= first < first + frames <= count:
-            raise InputError(f"{path}: each track must hold one or more of the {count} hands, found {first}+{frames}")
+            raise InputError(f"{path}: each track must lie within the {count} rows, found {first}+{frames}")
         side: Side | None = None if right is None else "right" if right[i] else "left"
-        called = "" if name is None else str(name[i])
-        tracks.append(_Track(slice(first, first + frames), side, called if called.isprintable() else ""))
+        label = "" if name is None else str(name[i])
+        tracks.append(_Track(slice(first, first + frames), side, label if label.isprintable() else ""))
     return tracks
 
 
 def _read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Those of the arrays that the file has. Headers are checked before memory is reserved; nothing is unpickled."""
+    """Return those of the named arrays that the file has, without pickles and within bounds."""
     try:
         with zipfile.ZipFile(path) as archive:
             present = set(archive.namelist())
@@ -113,7 +123,7 @@ def _read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except _DAMAGE as error:
-        raise InputError(f"{path} must be a sound .npz file: {error}") from error
+        raise InputError(f"{path} must be an undamaged .npz file: {error}") from error
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
@@ -130,8 +140,8 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
             raise InputError(f"{name} must hold numbers or names, found {dtype}")
         claimed = math.prod(shape) * dtype.itemsize
         if claimed > min(size, _MOST) or any(extent < 0 for extent in shape):
-            raise InputError(f"{name} claims {claimed:,} bytes in a file of {size:,}, of which {_MOST:,} are read")
+            raise InputError(f"{name} must have at most {min(size, _MOST):,} bytes, found {claimed:,} in its header")
         values = np.frombuffer(file.read(claimed), dtype=dtype)
     if dtype.kind == "U":
-        values.tolist()  # bytes that are no text raise here
+        values.tolist()  # raises for bytes that are not text
     return values.reshape(shape, order="F" if column_major else "C")

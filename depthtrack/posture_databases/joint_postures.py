@@ -1,4 +1,4 @@
-"""Postures from joint positions: sizes are measured on them, then the hand is fitted to every set of joints."""
+"""Postures from joint positions: measurement of the hand's sizes, then a fit of every frame."""
 
 from pathlib import Path
 
@@ -15,14 +15,20 @@ from depthtrack.types import Array
 
 _UNITS = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001}
 _FINGER = (0.03, 0.16)
-"""Metres between which a finger's three bones add up, from a child's little finger to a large thumb."""
+"""Length of a finger's three bones, metres: a child's little finger to a large thumb."""
 
 
 def postures_of_joints(path: Path, keypoints: Array, side: Side | None = None) -> PostureSet:
-    """Postures of one hand's joints (N, 21, 3) in any of metres, centimetres and millimetres, NaN where not known.
+    """Return the postures of one hand's joints.
 
-    The side is found out where it is not told. Hands with fewer than three known joints are left out. Raises
-    InputError where `path`, which the message names, does not hold a hand of human size.
+    path: named in error messages.
+    keypoints: (N, 21, 3) metres, centimetres or millimetres, NaN if unknown.
+    side: determined from the joints if None.
+
+    Frames with fewer than three known joints are left out.
+
+    Raises:
+        InputError: if the joints are not those of a hand of human size.
     """
     try:
         metres = keypoints * _unit(keypoints)
@@ -35,11 +41,11 @@ def postures_of_joints(path: Path, keypoints: Array, side: Side | None = None) -
 
 
 def _unit(keypoints: Array) -> float:
-    """The factor that gives fingers a human length."""
+    """Return the unit, metres, that gives fingers a human length."""
     fingers = keypoints[:, 1:].reshape(-1, 5, 4, 3)
     whole = is_known(fingers).all(axis=-1)
     if not whole.any():
-        raise InputError(f"no pose shows a whole finger; the joints are {', '.join(KEYPOINT_NAMES)}")
+        raise InputError(f"a frame must have all joints of a finger, found none; joints: {', '.join(KEYPOINT_NAMES)}")
     length = float(np.median(np.linalg.norm(np.diff(fingers, axis=2), axis=-1).sum(axis=-1)[whole]))
     for factor in _UNITS.values():
         if _FINGER[0] <= length * factor <= _FINGER[1]:

@@ -1,13 +1,14 @@
-"""The synergy papers' own database: text named `.mat`, a posture a line of 26 numbers.
+"""The database of the synergy papers: text named `.mat`, a posture a line of 26 numbers.
 
-Three for position, three for rotation, then for thumb, index, middle, ring and little finger abduction and three
-flexions from the palm outward, in radians. Found in OpenGP/htrack as `fingerfist.mat` (Schroeder's Vicon recordings).
+Three numbers for position and three for rotation precede the angles, radians. Each of thumb, index, middle, ring and
+little finger has an abduction and three flexions from the palm outward.
+Source: `fingerfist.mat` of OpenGP/htrack (Schroeder's Vicon recordings).
 
-Its signs and zeros are those of the mesh the recordings were made for: flexion is negative, abduction positive away
-from the thumb, and zero is that mesh's rest posture, whose fingers are spread (htrack's `default.calib`, measured in
-our angles). So an angle of ours is the rest posture's less the file's. There, abduction turns about an axis that
-flexion has moved, here about one fixed in the palm: on fingerfist.mat that turns a finger by 1 to 2 degrees on
-average, and up to 12 in the fist (95th percentile, index).
+Signs and zeros are those of the recordings' mesh. Flexion is negative and abduction is positive away from the thumb.
+Zero is the mesh's rest posture with spread fingers, htrack's `default.calib`. So our angle is that of the rest posture
+minus the file's. Abduction there turns about an axis that flexion moves, here about one fixed in the palm. On
+fingerfist.mat the difference turns a finger by 1 to 2 degrees on average, and by up to 12 in the fist (95th percentile,
+index).
 """
 
 from array import array
@@ -34,16 +35,20 @@ REST = np.radians(
         dtype=np.float64,
     ).ravel()
 )
-"""(20,) our angles of the posture that the file calls zero."""
+"""(20,) our angles, radians, of the file's zero posture."""
 
 
 def matches(path: Path) -> bool:
-    """Whether the file is named like one of these."""
+    """Return whether the file name ends in .mat."""
     return path.suffix.lower() == ".mat" and path.is_file()
 
 
 def read(path: Path) -> PostureSet:
-    """All postures of the file. Raises InputError for anything but lines of 26 numbers."""
+    """Return all postures of the file.
+
+    Raises:
+        InputError: if a line does not have 26 finite numbers.
+    """
     with path.open("rb") as file:
         start = file.read(6)
     if start.startswith(_BINARY):

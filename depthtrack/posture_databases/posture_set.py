@@ -1,4 +1,4 @@
-"""What every reader of postures returns, and what all of them refuse."""
+"""The result of all posture readers, and the checks that they share."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -12,17 +12,19 @@ from depthtrack.errors import InputError
 from depthtrack.types import Array
 
 MAX_POSTURES = 500_000
-"""Most postures read from one file: over an hour at 100 Hz, and a bound on memory."""
+"""Largest number of postures in a file: over an hour at 100 Hz, and a bound on memory."""
 MAX_BYTES = 1 << 28
-"""Largest text file read."""
+"""Largest file read."""
 
 
 @dataclass(frozen=True)
 class PostureSet:
-    """Recorded postures: `angles` (N, 20) radians, in the order of the pose vector.
+    """Recorded postures.
 
-    Where joint positions were recorded, `misfit` is their mean distance in metres (root mean square over a hand's
-    joints) from the hand fitted to them. `tracks` (N,) names the track each posture is from, where they have names.
+    angles: (N, 20) radians, in the order of the pose vector.
+    misfit: mean distance, metres, of recorded joints from the fitted hand (root mean square over a hand's joints);
+        None if angles were recorded.
+    tracks: (N,) name of the track of each posture; None if tracks have no names.
     """
 
     angles: Array
@@ -30,20 +32,29 @@ class PostureSet:
     tracks: NDArray[np.str_] | None = None
 
     def only(self, names: Collection[str]) -> Self:
-        """The postures of the tracks so named. Raises InputError for a name that no track has."""
+        """Return the postures of the tracks with these names.
+
+        Raises:
+            InputError: if no track has one of the names.
+        """
         tracks = np.zeros(len(self.angles), dtype=np.str_) if self.tracks is None else self.tracks
         known = sorted({str(name) for name in tracks} - {""})
         for name in names:
             if name not in known:
-                raise InputError(f"no track is named '{name}': there {_there_are(known)}")
+                choices = f"choose among {', '.join(known)}" if known else "the tracks have no names"
+                raise InputError(f"no track is named '{name}': {choices}")
         chosen = np.isin(tracks, list(names))
         return replace(self, angles=self.angles[chosen], tracks=tracks[chosen])
 
 
 def check_angles(path: Path, angles: Array) -> Array:
-    """The angles (N, 20), if they can be radians. Raises InputError."""
+    """Return the angles (N, 20) after a check that they can be radians.
+
+    Raises:
+        InputError: if there is no posture, or an angle lies outside -pi to pi.
+    """
     if not len(angles):
-        raise InputError(f"{path} holds no posture")
+        raise InputError(f"{path} must hold one or more postures, found none")
     largest = float(np.abs(angles).max())
     if not largest <= np.pi:
         raise InputError(
@@ -54,10 +65,10 @@ def check_angles(path: Path, angles: Array) -> Array:
 
 
 def check_count(path: Path, count: int) -> None:
-    """Raise InputError for more postures than are read from one file."""
+    """Check the number of postures.
+
+    Raises:
+        InputError: if the file holds more than `MAX_POSTURES`.
+    """
     if count > MAX_POSTURES:
-        raise InputError(f"{path} holds more than {MAX_POSTURES:,} postures: keep every tenth, they are much alike")
-
-
-def _there_are(names: list[str]) -> str:
-    return f"are {', '.join(names)}" if names else "are no names of tracks"
+        raise InputError(f"{path} holds more than {MAX_POSTURES:,} postures: keep every tenth")

@@ -1,4 +1,7 @@
-"""Reads a database of postures, whatever its format. A new format is one more module and one more line in FORMATS."""
+"""Reading of a posture database of any format.
+
+A new format is a module with `matches` and `read`, and an entry in FORMATS.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +14,7 @@ from depthtrack.posture_databases.posture_set import PostureSet
 
 @dataclass(frozen=True)
 class PostureFormat:
-    """How one kind of database is told from the others, and read."""
+    """A format: its description, the test of a path, and the reader."""
 
     description: str
     matches: Callable[[Path], bool]
@@ -26,7 +29,11 @@ FORMATS = (
 
 
 def read_postures(path: Path | str) -> PostureSet:
-    """The postures at `path`. Raises InputError where there are none, or they cannot be read."""
+    """Return the postures of a file or folder.
+
+    Raises:
+        InputError: if there are none, or they cannot be read.
+    """
     path = Path(path)
     if not path.exists():
         raise InputError(f"there are no postures at {path}: no such file or folder")
@@ -34,4 +41,4 @@ def read_postures(path: Path | str) -> PostureSet:
         if candidate.matches(path):
             return candidate.read(path)
     known = ", ".join(candidate.description for candidate in FORMATS)
-    raise InputError(f"{path} holds no postures that depthtrack knows: expected {known}")
+    raise InputError(f"{path} must hold postures in a known format: expected {known}")

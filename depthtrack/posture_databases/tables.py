@@ -1,9 +1,11 @@
-"""Postures in CSV, told by the names of the columns: finger angles, or joint positions; other columns are ignored.
+"""Postures in CSV files with columns of finger angles or joint positions.
 
-- The 20 angles of the pose vector, `thumb_cmc_abduction` to `little_dip_flexion`, in radians; or in degrees, with
-  `_deg` behind every name. So `hand_poses.csv` of a recording and `poses.csv` of a run folder are read as well.
-- Joints, `wrist_x` to `little_tip_z`, as in `joints.csv` of a recording: metres, centimetres or millimetres, of one
-  hand. Columns that are absent and fields that are empty or `nan` are joints not known.
+- The 20 angles of the pose vector, `thumb_cmc_abduction` to `little_dip_flexion`, are radians; with the suffix `_deg`
+  they are degrees. `hand_poses.csv` of a recording and `poses.csv` of a run folder are such files.
+- Joints of one hand, `wrist_x` to `little_tip_z`, are metres, centimetres or millimetres, as in `joints.csv` of a
+  recording. Absent columns and fields that are empty or `nan` are unknown joints.
+
+Other columns are ignored.
 """
 
 import csv
@@ -22,21 +24,25 @@ from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, chec
 from depthtrack.types import Array
 
 FILES_IN_FOLDERS = ("hand_poses.csv", "poses.csv", "joints.csv")
-"""What is read of a recording or run folder: the first of these that it has."""
+"""The files of a recording or run folder; the first that exists is read."""
 DEGREE_NAMES = tuple(f"{name}_deg" for name in ANGLE_NAMES)
 _JOINT_COLUMNS = tuple(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz")
 _LARGEST = 1e6
 
 
 def matches(path: Path) -> bool:
-    """Whether `path` is a CSV file, or a folder that holds one of the known ones."""
+    """Return whether `path` is a CSV file, or a folder with one of `FILES_IN_FOLDERS`."""
     return (path.suffix.lower() == ".csv" and path.is_file()) or any(
         (path / name).is_file() for name in FILES_IN_FOLDERS
     )
 
 
 def read(path: Path) -> PostureSet:
-    """Postures of the rows that have them. Raises InputError for unknown columns and malformed rows."""
+    """Return the postures of the rows that have them.
+
+    Raises:
+        InputError: if the columns are unknown or a row is malformed.
+    """
     if path.is_dir():
         path = next(path / name for name in FILES_IN_FOLDERS if (path / name).is_file())
     lines = read_lines(path, MAX_BYTES)
@@ -61,7 +67,7 @@ def read(path: Path) -> PostureSet:
 
 
 def _columns(path: Path, lines: Iterator[str], chosen: list[int]) -> Array:
-    """(N, columns) numbers; NaN for an empty field."""
+    """Return numbers (N, columns), NaN for an empty field."""
     values, count = array("d"), 0
     try:
         for fields in csv.reader(lines):
@@ -73,5 +79,5 @@ def _columns(path: Path, lines: Iterator[str], chosen: list[int]) -> Array:
         raise InputError(f"{path}, row {count}: expected numbers in the columns that the header names") from None
     table = np.array(values).reshape(count, len(chosen))
     if np.any(np.abs(table) > _LARGEST):
-        raise InputError(f"{path}: expected numbers of ordinary size, found some beyond {_LARGEST:g}")
+        raise InputError(f"{path}: expected numbers up to {_LARGEST:g}, found larger ones")
     return table

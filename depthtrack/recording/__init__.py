@@ -1,4 +1,4 @@
-"""Reading and writing RGB-D sequences: one file a format, one protocol for all of them."""
+"""Reading and writing of RGB-D recordings: one protocol, one module a format."""
 
 from depthtrack.recording.registry import image_size, open_sequence
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage, Sequence

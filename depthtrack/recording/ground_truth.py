@@ -1,4 +1,4 @@
-"""The tables beside the images, `hand_poses.csv` and `joints.csv`, and the recorded hand, `hand.json`."""
+"""Reading of a recording's annotations, `hand_poses.csv`, `joints.csv` and `hand.json`."""
 
 import math
 from array import array
@@ -16,9 +16,9 @@ from depthtrack.types import Array
 
 POSES_FILE, JOINTS_FILE, HAND_FILE = "hand_poses.csv", "joints.csv", "hand.json"
 QUATERNION_TOLERANCE = 1e-3
-"""How far from 1 the length of a pose's quaternion may be: what rounding to a few digits does."""
+"""Largest difference from 1 of a quaternion's length: rounding to a few digits causes less."""
 MAX_TABLE_BYTES = 1 << 28
-"""Largest table read: hours of ground truth."""
+"""Largest table read, which holds hours of ground truth."""
 POSES_HEADER = ("timestamp", *POSE_NAMES)
 JOINTS_HEADER = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"))
 
@@ -26,7 +26,8 @@ JOINTS_HEADER = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for 
 def read_ground_truth(folder: Path, hand: HandShape | None) -> GroundTruth | None:
     """Return the annotations in `folder` of frames that show `hand`, or None without any.
 
-    Raises: InputError if a table is malformed.
+    Raises:
+        InputError: if a table is malformed.
     """
     poses = _read_table(folder / POSES_FILE, POSES_HEADER)
     joints = _read_table(folder / JOINTS_FILE, JOINTS_HEADER)
@@ -58,14 +59,15 @@ def _same_times(a: Array, b: Array) -> bool:
 def read_hand(folder: Path) -> HandShape | None:
     """Return the hand of `hand.json` in `folder`, or None without that file.
 
-    Raises: InputError if the file is malformed.
+    Raises:
+        InputError: if the file is malformed.
     """
     path = folder / HAND_FILE
     return HandShape.from_json(path) if path.exists() else None
 
 
 def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
-    """Rows (T, len(header)) of a CSV with that header, finite and in order of time; None where the file is absent."""
+    """Return the rows (T, len(header)) of a CSV by increasing time; None without a file."""
     if not path.exists():
         return None
     lines = read_lines(path, MAX_TABLE_BYTES)
@@ -86,12 +88,12 @@ def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
         values.extend(row)
         last = row[0]
     if not values:
-        raise InputError(f"{path} holds no row below its header: delete the file if nothing is annotated")
+        raise InputError(f"{path} must hold rows below its header, found none: delete the file if nothing is annotated")
     return np.array(values).reshape(-1, len(header))
 
 
 def _numbers(fields: list[str]) -> list[float]:
-    """The fields as finite numbers, or nothing when one of them is none."""
+    """Return the fields as numbers; an empty list if one is not a finite number."""
     try:
         row = [float(text) for text in fields]
     except ValueError:

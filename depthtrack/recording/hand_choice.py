@@ -1,4 +1,4 @@
-"""Choose the hand that a recording is tracked with."""
+"""Choice of the hand that a recording is tracked with."""
 
 from pathlib import Path
 
@@ -8,19 +8,18 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording.sequence import Sequence
 
 TRUTH = "truth"
-"""The name that asks for the recording's own sizes."""
+"""The name that selects the recording's own sizes."""
 
 
 def chosen_hand(sequence: Sequence, hand: str | None = None, side: Side | None = None) -> HandShape:
-    """Return the hand of a file, the recording's own if its name is "truth", else the average adult's.
+    """Return the hand of a file, the recording's own, or the average adult's.
 
-    Ground truth is used only by that name.
-
-    `hand`: path of a hand file (hand.json) or a rigged mesh (.glb, .gltf), or "truth"; None for the average adult's.
-    `side`: the side of the average hand, right if None; otherwise the side that the hand must have.
+    hand: path of a hand file (hand.json) or a rigged mesh (.glb, .gltf); "truth" for the recording's own; None for the
+        average adult's.
+    side: the side of the average hand, right if None; otherwise the side that the hand must have.
 
     Raises:
-        InputError: if the file is no hand or is the other side's, or if the recording has no sizes.
+        InputError: if the file holds no hand or the other side's, or if the recording has no sizes.
     """
     if hand is None:
         return HandShape(side=side or "right")

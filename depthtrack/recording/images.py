@@ -1,4 +1,4 @@
-"""The images of a sequence folder, one at a time: PNG and JPEG, checked before anything is decoded.
+"""Reading and writing of a sequence folder's PNG and JPEG images, checked before decoding.
 
 Pillow reads the header, so the claimed size is compared with the camera's before a decoder reserves memory. Pillow
 also verifies the checksums of a PNG. JPEG has no checksum: a missing end is an error, a changed byte may not be.
@@ -20,7 +20,7 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_bounded
 from depthtrack.types import Image, Mask
 
-# Level 1 is the knee of the curve: 2 % of the raw size on clean depth and a third on noisy, at 4-8 ms for 640x480.
+# Level 1 balances size and time: 2 % of the raw size for clean depth, a third for noisy, in 4-8 ms at 640x480.
 _PNG_SETTINGS = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_DEFAULT)
 _JPEG_SETTINGS = (cv2.IMWRITE_JPEG_QUALITY, 95)
 _PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
@@ -33,7 +33,7 @@ _HEADER_BYTES = 1 << 16
 
 @dataclass(frozen=True)
 class _Header:
-    """Format and mode as Pillow names them, sides in pixels, and the byte at which the compressed pixels begin."""
+    """Pillow's format and mode, sides in pixels, and the offset of the pixels, bytes."""
 
     image_format: str
     mode: str
@@ -45,7 +45,8 @@ class _Header:
 def read_depth(path: Path, shape: tuple[int, int]) -> NDArray[np.uint16]:
     """Return the stored depth units (h, w) of a 16-bit greyscale PNG.
 
-    Raises: DamagedFrameError if the file is missing or damaged, or has another size or type.
+    Raises:
+        DamagedFrameError: if the file is missing or damaged, or has another size or type.
     """
     data, header = _read(path, shape)
     if header.image_format != "PNG" or header.mode not in _DEPTH_MODES:
@@ -62,7 +63,8 @@ def read_depth(path: Path, shape: tuple[int, int]) -> NDArray[np.uint16]:
 def read_colour(path: Path, shape: tuple[int, int]) -> Image:
     """Return the RGB pixels (h, w, 3) of a PNG or JPEG.
 
-    Raises: DamagedFrameError if the file is missing or damaged, or has another size.
+    Raises:
+        DamagedFrameError: if the file is missing or damaged, or has another size.
     """
     data, _ = _read(path, shape)
     image = _decode(path, data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
@@ -74,7 +76,8 @@ def read_colour(path: Path, shape: tuple[int, int]) -> Image:
 def read_mask(path: Path, shape: tuple[int, int]) -> Mask:
     """Return a mask (h, w), true where the PNG or JPEG is at least half white.
 
-    Raises: DamagedFrameError if the file is missing or damaged, or has another size.
+    Raises:
+        DamagedFrameError: if the file is missing or damaged, or has another size.
     """
     data, _ = _read(path, shape)
     return np.asarray(_decode(path, data, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION) >= 128)
@@ -83,7 +86,8 @@ def read_mask(path: Path, shape: tuple[int, int]) -> Mask:
 def read_size(path: Path) -> tuple[int, int]:
     """Return (width, height) of a PNG or JPEG, from its first 64 KiB.
 
-    Raises: DamagedFrameError if the file is missing or its header is damaged.
+    Raises:
+        DamagedFrameError: if the file is missing or its header is damaged.
     """
     try:
         with path.open("rb") as file:
@@ -94,12 +98,12 @@ def read_size(path: Path) -> tuple[int, int]:
 
 
 def write_png(path: Path, image: Image | NDArray[np.uint16]) -> None:
-    """Write (h, w) or RGB (h, w, 3); the same input gives the same bytes."""
+    """Write a greyscale (h, w) or RGB (h, w, 3) image; equal input gives equal bytes."""
     _write(path, ".png", image, _PNG_SETTINGS)
 
 
 def write_jpeg(path: Path, colour: Image) -> None:
-    """Write RGB (h, w, 3) at quality 95; the same input gives the same bytes."""
+    """Write an RGB image (h, w, 3) at quality 95; equal input gives equal bytes."""
     _write(path, ".jpg", colour, _JPEG_SETTINGS)
 
 
@@ -112,14 +116,14 @@ def _read(path: Path, shape: tuple[int, int]) -> tuple[bytes, _Header]:
     """Return the bytes and the header of an undamaged file of the expected size."""
     height, width = shape
     try:
-        # Eight bytes a pixel is more than any image here takes uncompressed; the rest is room for metadata.
+        # Eight bytes a pixel exceed every image here uncompressed; the rest is for metadata.
         data = read_bounded(path, 8 * height * width + (1 << 20))
     except InputError as error:
         raise DamagedFrameError(str(error)) from error
     header, image = _open(path, data)
     if (header.height, header.width) != shape:
         raise DamagedFrameError(
-            f"{path} must be {width}x{height} pixels as the camera says, found {header.width}x{header.height}"
+            f"{path} must have the camera's {width}x{height} pixels, found {header.width}x{header.height}"
         )
     try:
         image.verify()
@@ -132,7 +136,7 @@ def _read(path: Path, shape: tuple[int, int]) -> tuple[bytes, _Header]:
 
 
 def _open(path: Path, data: bytes) -> tuple[_Header, Pictures.Image]:
-    """Return the header and Pillow's image, its pixels not decoded."""
+    """Return the header and Pillow's image without decoding its pixels."""
     file = BytesIO(data)
     try:
         image = Pictures.open(file, formats=("PNG", "JPEG"))

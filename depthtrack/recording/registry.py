@@ -1,4 +1,7 @@
-"""Open a recording of any format. A new format is a module with a subclass of BaseSequence and an entry in FORMATS."""
+"""Opening of a recording of any format.
+
+A new format is a module with a subclass of BaseSequence and an entry in FORMATS.
+"""
 
 from pathlib import Path
 
@@ -14,9 +17,12 @@ FORMATS: tuple[type[BaseSequence], ...] = (TumSequence,)
 def open_sequence(path: Path | str, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> Sequence:
     """Open the recording at `path`.
 
-    `camera` replaces the camera of the recording, and is needed if it has none. `on_damage` is what iteration does at
-    a frame that cannot be read: "refuse" raises DamagedFrameError, "skip" adds it to `sequence.damaged`.
-    Raises: InputError if `path` holds no recording, or one that is unusable beyond single frames.
+    camera: replaces the camera of the recording; required if it has none.
+    on_damage: the action at a frame that cannot be read: "refuse" raises DamagedFrameError, "skip" adds the
+        frame to `sequence.damaged`.
+
+    Raises:
+        InputError: if `path` holds no recording, or one that is unusable beyond single frames.
     """
     return _format_of(Path(path)).open(Path(path), camera, on_damage)
 
@@ -24,7 +30,8 @@ def open_sequence(path: Path | str, camera: Camera | None = None, on_damage: OnD
 def image_size(path: Path | str) -> tuple[int, int]:
     """Return (width, height) of the depth images of a recording, without a camera.
 
-    Raises: InputError if `path` holds no recording, or no depth image can be read.
+    Raises:
+        InputError: if `path` holds no recording, or no depth image can be read.
     """
     return _format_of(Path(path)).image_size(Path(path))
 
@@ -36,4 +43,4 @@ def _format_of(path: Path) -> type[BaseSequence]:
         if candidate.matches(path):
             return candidate
     known = " or ".join(candidate.format_name for candidate in FORMATS)
-    raise InputError(f"{path} is no recording of a known format: expected {known}")
+    raise InputError(f"{path} must be {known}, found another format")

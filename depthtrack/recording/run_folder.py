@@ -1,8 +1,8 @@
-"""The run folder: what a tracker said of every frame, appended as it goes and readable after a kill at any moment.
+"""The run folder: a tracker's result of every frame, readable after a kill at any time.
 
-`run.json` holds the configuration that made the run, `poses.csv` a row a frame: index, timestamp, status, energy,
-confidence and the pose (empty where there is none), `timings.csv` the milliseconds of each stage. Poses are bitwise
-the same whether a run was interrupted or not; timings, of course, are not.
+`run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
+confidence and the pose, which is empty if there is none. `timings.csv` has the milliseconds of each stage.
+Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
@@ -24,17 +24,22 @@ from depthtrack.types import Array, Index
 
 _COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
 _LARGEST_TABLE = 1 << 29
-"""Bytes: room for eight hours at 30 Hz, and a bound on what an absurd file can take."""
+"""Bytes: eight hours at 30 Hz, and a bound on memory."""
 _LARGEST = 100.0
-"""Metres and radians that no pose reaches."""
+"""Bound on the numbers of a pose, metres and radians."""
 _LATEST = 1e12
-"""Seconds that no clock reaches."""
+"""Bound on timestamps, seconds."""
 _UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class RunRow:
-    """One frame of a run. `pose` (27,), or None where no hand was observed; `energy` is NaN then."""
+    """One frame of a run.
+
+    timestamp: seconds.
+    energy: of the pose; NaN without a pose.
+    pose: (27,) metres, quaternion, radians, camera frame; None if no hand was observed.
+    """
 
     index: int
     timestamp: float
@@ -50,13 +55,19 @@ class RunWriter:
     def __init__(
         self, folder: Path, configuration: dict[str, Any], stages: Sequence[str], resume: bool = False
     ) -> None:
-        """Begin, or with `resume` go on with, a run. Raises InputError where the folder does not allow it."""
+        """Begin a run, or resume it.
+
+        stages: names of the timings' columns.
+
+        Raises:
+            InputError: if the folder holds a run and `resume` is false, or a run of another configuration.
+        """
         self.folder = folder
         self._stages = tuple(stages)
         self.rows: list[RunRow] = []
         started = (folder / "run.json").exists()
         if started and not resume:
-            raise InputError(f"{folder} already holds a run: go on with --resume, or choose another folder")
+            raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
         folder.mkdir(parents=True, exist_ok=True)
         if started:
             check_same(read_configuration(folder), configuration, folder)
@@ -72,8 +83,8 @@ class RunWriter:
         self._timings = (folder / "timings.csv").open("a", newline="", encoding="utf-8")
 
     def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
-        """Add the next frame."""
-        # Timings first: a kill between the two leaves a surplus there, which resuming drops.
+        """Append the next frame and the milliseconds of its stages."""
+        # Timings first: a kill between the two writes leaves a surplus row there, which resuming drops.
         csv.writer(self._timings).writerow([row.index, *(f"{stage_ms.get(stage, 0):.3f}" for stage in self._stages)])
         self._timings.flush()
         csv.writer(self._poses).writerow(_cells(row))
@@ -81,6 +92,7 @@ class RunWriter:
         self.rows.append(row)
 
     def close(self) -> None:
+        """Close the files."""
         self._poses.close()
         self._timings.close()
 
@@ -95,9 +107,13 @@ class RunWriter:
 
 @dataclass(frozen=True)
 class Run:
-    """A run as it was written, whole or cut short.
+    """A complete or partial run of T frames.
 
-    `poses` (T, 27) hold NaN where no hand was observed; `stage_ms` has an array (T,) for each stage.
+    index: (T,) frame of the recording.
+    timestamps: (T,) seconds.
+    energy, confidence: (T,) of the poses.
+    poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
+    stage_ms: (T,) milliseconds of each stage.
     """
 
     folder: Path
@@ -112,9 +128,13 @@ class Run:
 
     @classmethod
     def load(cls, folder: Path) -> Self:
-        """Read a run folder. Raises InputError when it holds no run, or a damaged one."""
+        """Read a run folder.
+
+        Raises:
+            InputError: if it holds no run, or a damaged one.
+        """
         configuration, rows = read_configuration(folder), read_rows(folder)
-        nowhere = np.full(POSE_SIZE, np.nan)
+        no_pose = np.full(POSE_SIZE, np.nan)
         return cls(
             folder,
             configuration,
@@ -123,13 +143,17 @@ class Run:
             tuple(row.status for row in rows),
             np.array([row.energy for row in rows], dtype=np.float64),
             np.array([row.confidence for row in rows], dtype=np.float64),
-            np.array([nowhere if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
+            np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
         )
 
 
 def read_configuration(folder: Path) -> dict[str, Any]:
-    """What `run.json` says. Raises InputError."""
+    """Return the contents of `run.json`.
+
+    Raises:
+        InputError: if the file is missing or malformed.
+    """
     try:
         configuration = json.loads(read_text(folder / "run.json"))
     except InputError as error:
@@ -142,9 +166,10 @@ def read_configuration(folder: Path) -> dict[str, Any]:
 
 
 def read_rows(folder: Path) -> list[RunRow]:
-    """The complete rows of `poses.csv`; a last one that was cut short is left out.
+    """Return the complete rows of `poses.csv`; a truncated last row is left out.
 
-    Raises InputError, also for rows that no tracker writes: they would make no sense of anything they are held against.
+    Raises:
+        InputError: if a row is malformed, or holds values that no tracker writes.
     """
     path = folder / "poses.csv"
     rows = []
@@ -159,13 +184,13 @@ def read_rows(folder: Path) -> list[RunRow]:
             raise InputError(
                 f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error!s:.120}"
             ) from error
-        if (reason := _why_no_row(rows[-1])) is not None:
+        if (reason := _row_fault(rows[-1])) is not None:
             raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
     return rows
 
 
-def _why_no_row(row: RunRow) -> str | None:
-    """What keeps a row from being one that a tracker writes."""
+def _row_fault(row: RunRow) -> str | None:
+    """Return the reason why no tracker writes such a row; None if the row is valid."""
     if not abs(row.timestamp) < _LATEST:  # false for NaN
         return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
     if row.pose is None:
@@ -177,7 +202,7 @@ def _why_no_row(row: RunRow) -> str | None:
 
 
 def _read_timings(path: Path, count: int) -> dict[str, Array]:
-    """Milliseconds (T,) of each stage, of at most `count` frames. Raises InputError."""
+    """Return the milliseconds (T,) of each stage, of at most `count` frames."""
     header, *lines = _read_table(path, None)
     if header[:1] != ["index"]:
         raise InputError(f"{path} must begin with a line of columns, 'index' and the tracker's stages")
@@ -194,18 +219,18 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
 
 
 def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
-    """Complete lines of a table, without the header if `columns` says what it must be."""
+    """Return the complete lines of a table, without its header if `columns` is given."""
     lines = [line for line in read_lines(path, _LARGEST_TABLE) if line.endswith("\n")]
     try:
-        # No cell of ours needs quotes: one that strays in must not swallow the lines after it.
+        # No cell needs quotes, so a stray quote must not join the lines after it.
         header, *rows = list(csv.reader(lines, quoting=csv.QUOTE_NONE)) or [[]]
     except csv.Error as error:
-        raise InputError(f"{path} is no table: {error}") from error
+        raise InputError(f"{path} must be a CSV table: {error}") from error
     if columns is None:
         return [header, *rows]
     if tuple(header) != tuple(columns):
         raise InputError(f"{path} must begin with the columns {', '.join(columns[:5])}...")
-    # A row that was cut inside its line break still has all its cells.
+    # A row truncated inside its line break still has all its cells.
     if rows and len(rows[-1]) != len(columns):
         rows.pop()
     for number, cells in enumerate(rows, start=2):
@@ -230,7 +255,11 @@ def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
 
 
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
-    """Raise InputError unless a run continues as it began; threads, versions and machine may differ."""
+    """Check that a run is resumed with its configuration, except threads, versions and machine.
+
+    Raises:
+        InputError: if another entry differs; it names the first one.
+    """
     # The tracker first, since its options follow from it.
     for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):

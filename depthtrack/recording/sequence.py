@@ -1,4 +1,4 @@
-"""The protocol of recordings of every format: frames one at a time, a camera, ground truth if there is any."""
+"""The protocol of recordings: frames one at a time, a camera, ground truth if it exists."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -16,8 +16,9 @@ from depthtrack.types import Array, Depth, Image, Mask
 class Frame:
     """One RGB-D frame.
 
-    `timestamp` in seconds; `depth` (h, w) float32 metres along the optical axis, 0 where there is no reading;
-    `colour` (h, w, 3) uint8 RGB registered to the depth, or None.
+    timestamp: seconds.
+    depth: (h, w) float32, metres along the optical axis, 0 = no reading.
+    colour: (h, w, 3) uint8 RGB registered to the depth, or None.
     """
 
     index: int
@@ -31,9 +32,11 @@ class Frame:
 class GroundTruth:
     """The annotations of a recording; `poses` or `joints` may be absent.
 
-    `timestamps` (T,) of the annotated frames in seconds, increasing; `poses` (T, 27) of `hand`; `joints` (T, 21, 3)
-    keypoints in metres, camera frame, MediaPipe order. Frames and annotations need not match one to one: `at` finds
-    the annotation of a frame by its timestamp.
+    timestamps: (T,) of the annotated frames, seconds, increasing.
+    poses: (T, 27) of `hand`, metres, quaternion, radians, camera frame.
+    joints: (T, 21, 3) keypoints, metres, camera frame, MediaPipe order.
+
+    Frames and annotations need not correspond one to one: `at` finds the annotation of a frame by its timestamp.
     """
 
     timestamps: Array
@@ -42,14 +45,14 @@ class GroundTruth:
     hand: HandShape | None = None
 
     def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
-        """Return the row of the annotation at `timestamp`, or None if none is within `tolerance` seconds."""
+        """Return the row of the annotation within `tolerance` (s) of `timestamp`, or None."""
         after = int(np.searchsorted(self.timestamps, timestamp))
         rows = [row for row in (after - 1, after) if 0 <= row < len(self.timestamps)]
         nearest = min(rows, key=lambda row: abs(self.timestamps[row] - timestamp), default=None)
         return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
 
     def keypoints_at(self, timestamp: float) -> Array | None:
-        """Return the annotated keypoints (21, 3) at `timestamp`, else those of the pose; metres, camera frame."""
+        """Return the annotated keypoints (21, 3), or those of the pose; metres, camera frame."""
         row = self.at(timestamp)
         if row is None:
             return None
@@ -61,12 +64,12 @@ class GroundTruth:
 
 
 OnDamage = Literal["refuse", "skip"]
-"""What iteration does at a frame that cannot be read: raise DamagedFrameError, or skip and count it."""
+"""The action of iteration at a frame that cannot be read: raise DamagedFrameError, or skip and record it."""
 
 
 @dataclass(frozen=True)
 class DamagedFrame:
-    """A frame that was skipped: its index and time (seconds) in the recording, and one sentence why."""
+    """A skipped frame: its index, its time (seconds) and the reason in one sentence."""
 
     index: int
     timestamp: float
@@ -122,14 +125,15 @@ class Sequence(Protocol):
     def frames(self, indices: Iterable[int]) -> Iterator[Frame]:
         """Yield some of the frames; damaged ones are treated as by iteration.
 
-        Raises: InputError if no frame can be read.
+        Raises:
+            InputError: if no frame can be read.
         """
         ...
 
     def hand_mask(self, index: int) -> Mask | None:
-        """Return the true silhouette (h, w) of the hand without its forearm, if the recording has it."""
+        """Return the true silhouette (h, w) of the hand without forearm; None if there is none."""
         ...
 
     def exact_depth(self, index: int) -> Depth | None:
-        """Return the noise-free depth (h, w) of the whole scene in metres, 0 = none, if the recording has it."""
+        """Return the noise-free depth (h, w) of the scene, metres, 0 = none; None if there is none."""
         ...

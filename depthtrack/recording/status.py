@@ -4,20 +4,20 @@ from enum import StrEnum
 
 
 class Status(StrEnum):
-    """What became of a frame."""
+    """The result of tracking a frame."""
 
     TRACKED = "tracked"
     """The pose follows from that of the frame before."""
     STARTED = "started"
     """The pose was found by a search, or refined from a given one."""
     LOST = "lost"
-    """The best pose found does not explain the observation. The tracker searches again on the next frame."""
+    """The best pose found does not fit the observation. The tracker searches again in the next frame."""
     ABSENT = "absent"
     """No hand was observed."""
 
     @property
     def is_trusted(self) -> bool:
-        """True if the frame has a pose that explains the observation."""
+        """Whether the frame has a pose that fits the observation."""
         return self in (Status.TRACKED, Status.STARTED)
 
     @classmethod

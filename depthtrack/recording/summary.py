@@ -1,4 +1,4 @@
-"""What a recording holds, gathered in one pass over its frames."""
+"""A summary of a recording, gathered in one pass over its frames."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -19,7 +19,7 @@ DEPTH_PERCENTILES = (0, 1, 50, 99, 100)
 
 @dataclass(frozen=True)
 class Gap:
-    """A step in time that is too long: where it begins and how long it is, in seconds."""
+    """A step in time that is too long: its start and its length, seconds."""
 
     after: float
     length: float
@@ -27,11 +27,15 @@ class Gap:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """Facts about a recording. SI units; `field_of_view` (horizontal, vertical) in radians.
+    """Properties of a recording.
 
-    `frames` are listed, `frames_read` of them were read for what follows: `depth_percentiles` maps percentiles
-    of the readings to metres (None without any reading), `missing` is the share of pixels without one. `colours`,
-    `masks` and `exact_depths` count frames among those read, `poses` and `joints` among those listed.
+    frames, frames_read: listed frames, and those read for this summary.
+    duration: seconds. rate: frames a second; None for a single frame.
+    field_of_view: (horizontal, vertical), radians.
+    depth_percentiles: metres by percentile of the readings; None without a reading.
+    missing: share of pixels without a reading.
+    colours, masks, exact_depths: frames with them, among those read.
+    poses, joints: annotated frames, among those listed.
     """
 
     name: str
@@ -62,8 +66,12 @@ def summarise(
 ) -> RecordingSummary:
     """Read the frames `indices` of `sequence` once; memory does not grow with their number.
 
-    `on_damage` is how the sequence was opened, and here holds for masks and exact depth too. `progress` may wrap the
-    frames to show how far it is. Raises DamagedFrameError, or InputError when no frame can be read.
+    on_damage: the value that the sequence was opened with, applied to masks and exact depth too.
+    progress: wraps the iteration of frames to show progress.
+
+    Raises:
+        DamagedFrameError: if `on_damage` is "refuse" and an image cannot be read.
+        InputError: if no frame can be read.
     """
     counts = _Counts(sequence, on_damage)
     for frame in progress(sequence.frames(indices)):
@@ -95,7 +103,7 @@ def summarise(
 
 
 def field_of_view(camera: Camera) -> tuple[float, float]:
-    """(horizontal, vertical) angle between the outer edges of the image, in radians."""
+    """Return the (horizontal, vertical) angle between the outer edges of the image, radians."""
     return (
         math.atan((camera.cx + 0.5) / camera.fx) + math.atan((camera.width - 0.5 - camera.cx) / camera.fx),
         math.atan((camera.cy + 0.5) / camera.fy) + math.atan((camera.height - 0.5 - camera.cy) / camera.fy),
@@ -103,7 +111,7 @@ def field_of_view(camera: Camera) -> tuple[float, float]:
 
 
 class _Counts:
-    """Running counts over the frames; the depth readings go into one histogram over the stored units."""
+    """Running counts over the frames, with one histogram of the stored depth units."""
 
     def __init__(self, sequence: Sequence, on_damage: OnDamage) -> None:
         self._sequence = sequence

@@ -1,4 +1,4 @@
-"""Writes sequence folders frame by frame: complete or absent, and the same bytes for the same input."""
+"""Writing of sequence folders, complete or absent; equal input gives equal bytes."""
 
 import json
 import os
@@ -37,15 +37,18 @@ _Table = tuple[str, tuple[str, ...]]
 
 
 class SequenceWriter:
-    """Context manager that writes a sequence folder; see `folder` for the layout.
+    """Context manager that writes a sequence folder; see `sequences.tum` for its files.
 
         with SequenceWriter(path, camera, hand=shape, description={"motion": "everyday"}) as writer:
             for ...:
                 writer.append(timestamp, depth, colour=colour, mask=mask, pose=pose, joints=joints)
 
-    Everything goes into a hidden folder beside `path`, which takes its name when the block ends well and vanishes
-    when it does not. A recording that is there already is refused, or with `overwrite` replaced at that last moment.
-    Images are encoded by `threads` workers; at most a few frames wait in memory. Raises InputError.
+    All files go to a hidden folder beside `path`. It is renamed at the end of the block, or deleted after an exception.
+    An existing recording is rejected, or with `overwrite` replaced by that renaming.
+    Images are encoded by `threads` workers; at most a few frames wait in memory.
+
+    Raises:
+        InputError: if `path` cannot be written, or holds a recording that must not be replaced.
     """
 
     def __init__(
@@ -67,7 +70,7 @@ class SequenceWriter:
         self._overwrite = overwrite
         self._threads = threads
         self._work = self._path.parent / f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}"
-        json.dumps(self._description, allow_nan=False)  # fail now and not after the last frame
+        json.dumps(self._description, allow_nan=False)  # fail before the first frame
         self._tables: dict[str, TextIO] = {}
         self._annotation: set[_Table] | None = None
         self._last_stem: str | None = None
@@ -95,10 +98,18 @@ class SequenceWriter:
     ) -> None:
         """Add a frame; arrays are copied.
 
-        `timestamp` in seconds, kept to the microsecond, must increase. `depth` and `exact_depth` (h, w) metres, 0 or
-        not finite = none; rounded to the camera's depth scale (exact: 0.05 mm), beyond 65535 units none. `colour`
-        (h, w, 3) RGB, `mask` (h, w) of the hand, `pose` (27,), `joints` (21, 3) metres in the camera frame. Ground
-        truth may be missing from frames, but where there is some it has the same parts.
+        timestamp: seconds, kept to the microsecond, increasing.
+        depth, exact_depth: (h, w) metres, 0 or not finite = none. They are rounded to the camera's depth scale and to
+            0.05 mm; a value beyond 65535 units becomes none.
+        colour: (h, w, 3) RGB.
+        mask: (h, w) of the hand.
+        pose: (27,) metres, quaternion, radians, camera frame.
+        joints: (21, 3) metres, camera frame.
+
+        Frames may lack ground truth, but all annotated frames have the same parts.
+
+        Raises:
+            InputError: if a shape, type or value is out of range, or the image cannot be written.
         """
         stem = self._stem(timestamp)
         images = self._checked_images(
@@ -110,7 +121,7 @@ class SequenceWriter:
             }
         )
         truth = self._checked_truth(pose, joints)
-        # Nothing is refused from here on: a frame is written whole or not at all.
+        # All checks precede this line, so a frame is written whole or not at all.
         self._last_stem = stem
         for kind, image in images.items():
             self._submit(kind, stem, image.copy())
@@ -136,13 +147,13 @@ class SequenceWriter:
         if not self._path.exists() and not self._path.is_symlink():
             return
         if not self._overwrite:
-            raise InputError(f"{self._path} exists already: choose another name, or say that it may be overwritten")
-        # Only what looks like a recording is ever deleted, whatever was typed.
+            raise InputError(f"{self._path} exists already: choose another name, or use --overwrite")
+        # Only a folder with the files of a recording is ever deleted.
         if self._path.is_symlink() or not (self._path / "depth.txt").is_file():
             raise InputError(f"{self._path} is not a sequence folder, so it is not overwritten: choose another name")
 
     def _stem(self, timestamp: float) -> str:
-        """The timestamp as it stands in every file, which also names the frame's images."""
+        """Return the timestamp's text in all files, which also names the frame's images."""
         if not np.isfinite(timestamp):
             raise InputError(f"a frame's timestamp must be finite, found {timestamp}")
         stem = f"{timestamp:.6f}"
@@ -174,12 +185,12 @@ class SequenceWriter:
         if pose is not None and abs(np.linalg.norm(np.asarray(pose)[ORIENTATION]) - 1) > QUATERNION_TOLERANCE:
             raise InputError("a pose's quaternion must have length 1: normalise it first")
         if rows and self._annotation is not None and rows.keys() != self._annotation:
-            raise InputError("every annotated frame of a recording must have the same of pose and joints")
+            raise InputError("all annotated frames of a recording must have pose, joints or both alike")
         self._annotation = set(rows) or self._annotation
         return rows
 
     def _submit(self, kind: str, stem: str, image: NDArray[Any]) -> None:
-        """Hand one image to the workers and list it; waits while they are behind, and raises what they raised."""
+        """Submit an image to the workers and list it; wait for them if the queue is long."""
         suffix = self._colour_format if kind == "rgb" else "png"
         path = self._work / kind / f"{stem}.{suffix}"
         path.parent.mkdir(exist_ok=True)
@@ -206,9 +217,9 @@ class SequenceWriter:
         self._tables[name].write(line + "\n")
 
     def _finish(self) -> None:
-        """Everything to disk, then the name: until the last step nothing is there, or the old recording is."""
+        """Write all files, then rename the folder, which makes the recording visible."""
         if self._last_stem is None:
-            raise InputError(f"no frame was written to {self._path}, and an empty recording is of no use")
+            raise InputError(f"a recording needs at least one frame, found none for {self._path}")
         while self._waiting:
             self._waiting.popleft().result()
         for table in self._tables.values():
@@ -235,6 +246,6 @@ class SequenceWriter:
 
 
 def _stored(depth: NDArray[Any], scale: float) -> NDArray[np.uint16]:
-    """Depth in whole units of `scale` metres, 0 where it is no number or does not fit into 16 bits."""
+    """Return depth (h, w) in units of `scale` metres; 0 if it is not finite or exceeds 16 bits."""
     units = np.rint(depth / np.float64(scale))
     return np.where((units >= 0) & (units <= np.iinfo(np.uint16).max), units, 0).astype(np.uint16)

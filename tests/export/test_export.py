@@ -1,4 +1,4 @@
-"""Joints in files for others: bit for bit, in the documented order, complete or absent."""
+"""Exported joints are bitwise equal, in the documented order; files are complete or absent."""
 
 import csv
 import json
@@ -46,7 +46,7 @@ def expected_keypoints(run: Path) -> np.ndarray:
 # Tables and arrays
 
 
-def test_a_table_holds_poses_and_keypoints_bit_for_bit(run: Path, tmp_path: Path) -> None:
+def test_a_table_holds_poses_and_keypoints_bitwise(run: Path, tmp_path: Path) -> None:
     assert main(["export", str(run), "-o", str(tmp_path / "out.csv")]) == 0
     with (tmp_path / "out.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
@@ -65,7 +65,7 @@ def test_a_table_holds_poses_and_keypoints_bit_for_bit(run: Path, tmp_path: Path
 
 
 def test_exported_keypoints_are_the_recording_s_own(recording: Path, run: Path, tmp_path: Path) -> None:
-    """The true poses' keypoints: metric, in the camera frame, in the order of joints.csv."""
+    """The keypoints of true poses have the unit, frame and order of joints.csv."""
     assert main(["export", str(run), "-o", str(tmp_path / "out.npz")]) == 0
     truth = open_sequence(recording).ground_truth
     assert truth is not None
@@ -85,8 +85,8 @@ def test_exported_keypoints_are_the_recording_s_own(recording: Path, run: Path, 
 
 
 @pytest.mark.parametrize("name", sorted(BENCHMARKS))
-def test_benchmark_text_comes_back_with_a_line_for_every_frame(run: Path, tmp_path: Path, name: str) -> None:
-    # As if frame 2 had been damaged: the run knows nothing of it, but the text counts lines.
+def test_benchmark_text_reads_back_with_a_line_for_every_frame(run: Path, tmp_path: Path, name: str) -> None:
+    # Frame 2 is absent from the run, like a damaged one, but the text counts lines.
     table = run / "poses.csv"
     lines = table.read_text().splitlines(keepends=True)
     table.write_text("".join(line for line in lines if not line.startswith("2,")))
@@ -103,7 +103,7 @@ def test_benchmark_text_comes_back_with_a_line_for_every_frame(run: Path, tmp_pa
     points=arrays(np.float64, (3, 14, 3), elements=st.floats(-0.4, 0.4, allow_subnormal=False)),
     unknown=st.integers(0, 13),
 )
-def test_any_joints_before_the_camera_come_back(
+def test_joints_in_front_of_the_camera_read_back(
     tmp_path_factory: pytest.TempPathFactory, points: np.ndarray, unknown: int
 ) -> None:
     path, nyu = tmp_path_factory.mktemp("text") / "a.txt", BENCHMARKS["nyu"]
@@ -125,7 +125,7 @@ def test_the_text_s_numbers_are_pixels_and_millimetres_down_the_image(tmp_path: 
 
 
 @pytest.mark.parametrize("layout", ["{0} {1}", "image_0001.png {0} {1} ", "{0},{1}", "\n{0}\t{1}\n\n"])
-def test_others_write_it_with_commas_blanks_and_names(tmp_path: Path, layout: str) -> None:
+def test_commas_blanks_and_file_names_are_accepted(tmp_path: Path, layout: str) -> None:
     first, rest = "160 120 500", " ".join(["nan nan nan", "10 20 0"] + ["161 121 400"] * 13)
     text = layout.format(first, rest)
     (tmp_path / "a.txt").write_text(text.replace(" ", ",") if "," in layout else text)
@@ -139,7 +139,7 @@ def test_others_write_it_with_commas_blanks_and_names(tmp_path: Path, layout: st
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "holds no frame"),
+        ("", "must have a line of u v d"),
         ("1 2 3\n", "line 1: expected 48 numbers"),
         ("1 " * 48 + "\n" + "1 " * 47 + "x\n", "line 2: expected 48 numbers"),
         ("1 " * 47 + "inf\n", "line 1: expected 48 numbers"),
@@ -149,7 +149,7 @@ def test_others_write_it_with_commas_blanks_and_names(tmp_path: Path, layout: st
         (None, "missing"),
     ],
 )
-def test_text_that_is_none_is_refused_with_its_line(tmp_path: Path, text: str | bytes | None, expected: str) -> None:
+def test_malformed_text_is_rejected_with_its_line(tmp_path: Path, text: str | bytes | None, expected: str) -> None:
     path = tmp_path / "a.txt"
     if text is not None:
         path.write_bytes(text.encode() if isinstance(text, str) else text)
@@ -157,7 +157,7 @@ def test_text_that_is_none_is_refused_with_its_line(tmp_path: Path, text: str | 
         read_uvd(path, BENCHMARKS["icvl"])
 
 
-def test_a_file_of_absurd_size_is_refused_unread(tmp_path: Path) -> None:
+def test_a_too_large_file_is_rejected_unread(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     with path.open("wb") as file:
         file.truncate(1 << 40)  # sparse: takes no room
@@ -165,7 +165,7 @@ def test_a_file_of_absurd_size_is_refused_unread(tmp_path: Path) -> None:
         read_uvd(path, BENCHMARKS["msra"])
 
 
-def test_benchmark_joints_lie_where_they_are_said_to() -> None:
+def test_benchmark_joints_have_their_documented_positions() -> None:
     model = HandModel(HandShape())
     pose = np.array([0.1, -0.1, 0.6, *([math.sqrt(0.5)] * 2), 0, 0, *np.full(20, 0.2)])
     keypoints = dict(zip(KEYPOINT_NAMES, model.keypoints(pose), strict=True))
@@ -184,7 +184,7 @@ def test_benchmark_joints_lie_where_they_are_said_to() -> None:
     assert nearer_thumb < np.linalg.norm(found["nyu"]["wrist_ulnar"] - keypoints["thumb_cmc"])
 
 
-# Mistakes
+# Errors
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ def test_benchmark_joints_lie_where_they_are_said_to() -> None:
         (["{out}", "-o", "{out}/a.csv"], "holds no run"),
     ],
 )
-def test_what_cannot_be_exported_is_refused_in_a_sentence(
+def test_impossible_exports_are_rejected_in_a_sentence(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], expected: str
 ) -> None:
     out = tmp_path / "out"
@@ -208,7 +208,7 @@ def test_what_cannot_be_exported_is_refused_in_a_sentence(
     assert list(out.iterdir()) == []
 
 
-def test_frames_numbered_absurdly_are_refused(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_frame_numbers_out_of_range_are_rejected(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = run / "poses.csv"
     table.write_text(table.read_text().replace("\n4,", "\n4000000000000,"))
     assert main(["export", str(run), "-o", str(tmp_path / "a.txt"), "--format", "nyu"]) == 2

@@ -1,4 +1,4 @@
-"""Readers of posture databases: every format gives back the angles that were written, and bad files are refused."""
+"""Readers of posture databases return the written angles and reject bad files."""
 
 import io
 import zipfile
@@ -26,7 +26,7 @@ def random_angles(seed: int, count: int) -> np.ndarray:
 
 
 def random_keypoints(seed: int, angles: np.ndarray, side: Side = "right", scale: float = 1.0) -> np.ndarray:
-    """(N, 21, 3) metres of hands anywhere."""
+    """Return keypoints (N, 21, 3), metres, of hands at random positions."""
     rng = np.random.default_rng(seed)
     poses = make_pose(rng.uniform(-0.3, 0.3, (len(angles), 3)), rng.normal(size=(len(angles), 4)), angles)
     return HandModel(HandShape(side=side, scale=scale)).keypoints(poses)
@@ -39,7 +39,7 @@ def write_csv(path: Path, header: tuple[str, ...], rows: Any) -> Path:
 
 
 def test_the_papers_format_is_read_in_our_signs(tmp_path: Path) -> None:
-    """Zero is the rest posture of their mesh; flexion is negative there; the six global columns are left out."""
+    """Zero is the rest posture of their mesh; flexion is negative; global columns are left out."""
     rows = np.zeros((2, 26))
     rows[:, :6] = 99
     rows[1, 6 + 5] = -np.radians(40)  # index, first flexion
@@ -56,7 +56,7 @@ def test_the_papers_format_is_read_in_our_signs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "no posture"),
+        ("", "one or more postures, found none"),
         ("1 2 3\n", "26 finite numbers"),
         (" ".join(["0"] * 27), "26 finite numbers"),
         (" ".join(["0"] * 25 + ["nan"]), "26 finite numbers"),
@@ -65,7 +65,7 @@ def test_the_papers_format_is_read_in_our_signs(tmp_path: Path) -> None:
         ("MATLAB 5.0 MAT-file, Platform: GLNXA64", "save"),
     ],
 )
-def test_malformed_databases_are_refused(tmp_path: Path, text: str, reason: str) -> None:
+def test_malformed_databases_are_rejected(tmp_path: Path, text: str, reason: str) -> None:
     path = tmp_path / "database.mat"
     path.write_text(text)
     with pytest.raises(InputError, match=reason):
@@ -76,7 +76,7 @@ def test_tables_of_angles_are_read_by_name(tmp_path: Path) -> None:
     angles = random_angles(1, 5)
     in_radians = write_csv(tmp_path / "radians.csv", ANGLE_NAMES, angles)
     np.testing.assert_allclose(read_postures(in_radians).angles, angles)
-    # In any order, among other columns, with rows of a run where no hand was seen.
+    # Columns have any order, with others between them; a row of a run may have no pose.
     order = np.random.default_rng(1).permutation(20)
     header = ("time", *(f"{ANGLE_NAMES[k]}_deg" for k in order), "note")
     rows = [[i, *np.degrees(row[order]), "seen"] for i, row in enumerate(angles)]
@@ -97,7 +97,7 @@ def test_recordings_and_runs_are_read_from_their_folders(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("unit", [1.0, 100.0, 1000.0])
-def test_tables_of_joints_are_fitted_whatever_unit_and_side(tmp_path: Path, side: Side, unit: float) -> None:
+def test_tables_of_joints_of_any_unit_and_side_are_fitted(tmp_path: Path, side: Side, unit: float) -> None:
     angles = random_angles(3, 12)
     keypoints = random_keypoints(3, angles, side, scale=0.9) * unit
     header = ("timestamp", *(f"{name}_{axis}" for name in KEYPOINT_NAMES for axis in "xyz"))
@@ -113,16 +113,16 @@ def test_tables_of_joints_are_fitted_whatever_unit_and_side(tmp_path: Path, side
     ("header", "rows", "reason"),
     [
         (("a", "b"), [[1, 2]], "expected columns"),
-        (ANGLE_NAMES, [], "no posture"),
+        (ANGLE_NAMES, [], "one or more postures, found none"),
         (ANGLE_NAMES, [[0.1] * 19], "row 1"),
         (ANGLE_NAMES, [[0.1] * 19 + ["x"]], "row 1"),
         (ANGLE_NAMES, [[0.1] * 19 + [""]], "all 20 angles"),
         (ANGLE_NAMES, [[30] * 20], "must be radians"),
-        (ANGLE_NAMES, [["1e300"] * 20], "ordinary size"),
-        (("wrist_x", "wrist_y", "wrist_z"), [[0, 0, 0]], "whole finger"),
+        (ANGLE_NAMES, [["1e300"] * 20], "expected numbers up to"),
+        (("wrist_x", "wrist_y", "wrist_z"), [[0, 0, 0]], "all joints of a finger"),
     ],
 )
-def test_malformed_tables_are_refused(tmp_path: Path, header: tuple[str, ...], rows: Any, reason: str) -> None:
+def test_malformed_tables_are_rejected(tmp_path: Path, header: tuple[str, ...], rows: Any, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         read_postures(write_csv(tmp_path / "table.csv", header, rows))
 
@@ -156,7 +156,7 @@ def test_tracks_of_several_hands_are_read_and_chosen_by_name(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("shape", [(10, 21, 3), (10, 20, 3)])
-def test_a_single_hand_needs_nothing_but_its_joints(tmp_path: Path, shape: tuple[int, ...]) -> None:
+def test_a_single_hand_needs_only_its_joints(tmp_path: Path, shape: tuple[int, ...]) -> None:
     angles = random_angles(7, 10)
     keypoints = random_keypoints(7, angles, "left")[:, 21 - shape[1] :]
     np.savez(tmp_path / "hand.npz", joints=keypoints.astype(np.float32))
@@ -171,17 +171,17 @@ def test_a_single_hand_needs_nothing_but_its_joints(tmp_path: Path, shape: tuple
         ({"joints": np.zeros((0, 21, 3))}, "N, 21, 3"),
         ({"joints": np.zeros((4, 21, 3), dtype="U4")}, "N, 21, 3"),
         ({"joints": np.full((4, 21, 3), 1e9)}, "kilometre"),
-        ({"joints": np.full((4, 21, 3), np.nan)}, "whole finger"),
+        ({"joints": np.full((4, 21, 3), np.nan)}, "all joints of a finger"),
         ({"joints": np.array([None] * 3)}, "numbers or names"),
         ({"joints": np.zeros((4, 21, 3)), "start": [0], "length": [9]}, "each track"),
         ({"joints": np.zeros((4, 21, 3)), "start": [-1], "length": [2]}, "each track"),
-        ({"joints": np.zeros((4, 21, 3)), "start": [0, 1], "length": [4]}, "tracks lie"),
+        ({"joints": np.zeros((4, 21, 3)), "start": [0, 1], "length": [4]}, "same shape"),
         ({"joints": np.zeros((4, 21, 3)), "start": [0.5], "length": [2.0]}, "whole numbers"),
         ({"joints": np.zeros((4, 21, 3)), "start": [0] * 9, "length": [MAX_POSTURES] * 9}, "more than"),
-        ({"joints": np.zeros((4, 21, 3)), "right": [True, False]}, "one thing for each"),
+        ({"joints": np.zeros((4, 21, 3)), "right": [True, False]}, "one element for each"),
     ],
 )
-def test_malformed_arrays_are_refused(tmp_path: Path, arrays: dict[str, Any], reason: str) -> None:
+def test_malformed_arrays_are_rejected(tmp_path: Path, arrays: dict[str, Any], reason: str) -> None:
     path = tmp_path / "hands.npz"
     np.savez(path, **arrays)
     with pytest.raises(InputError, match=reason):
@@ -189,7 +189,7 @@ def test_malformed_arrays_are_refused(tmp_path: Path, arrays: dict[str, Any], re
 
 
 def write_member(path: Path, header: str, data: bytes = b"") -> None:
-    """An .npz whose 'joints' has this header."""
+    """Write an .npz whose 'joints' have this header."""
     text = header.encode().ljust(118) + b"\n"
     member = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + data
     with zipfile.ZipFile(path, "w") as archive:
@@ -199,23 +199,23 @@ def write_member(path: Path, header: str, data: bytes = b"") -> None:
 @pytest.mark.parametrize(
     ("header", "reason"),
     [
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000, 21, 3)}", "claims"),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -21, 3)}", "claims|sound"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000, 21, 3)}", "must have at most"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -21, 3)}", "must have at most|undamaged"),
         ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 21, 3)}", "numbers or names"),
         ("{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (1, 21, 3)}", "numbers or names"),
-        ("{'descr': '<U0', 'fortran_order': False, 'shape': (1, 21, 3)}", "sound|found"),
-        ("{'shape': __import__('os')}", "sound"),
-        ("(" * 110, "sound"),
+        ("{'descr': '<U0', 'fortran_order': False, 'shape': (1, 21, 3)}", "undamaged|found"),
+        ("{'shape': __import__('os')}", "undamaged"),
+        ("(" * 110, "undamaged"),
     ],
 )
-def test_headers_that_lie_reserve_no_memory(tmp_path: Path, header: str, reason: str) -> None:
+def test_false_headers_reserve_no_memory(tmp_path: Path, header: str, reason: str) -> None:
     path = tmp_path / "hands.npz"
     write_member(path, header)
     with pytest.raises(InputError, match=reason):
         read_postures(path)
 
 
-def test_damaged_archives_are_refused(tmp_path: Path) -> None:
+def test_damaged_archives_are_rejected(tmp_path: Path) -> None:
     path, whole = tmp_path / "hands.npz", io.BytesIO()
     np.savez(whole, joints=np.ones((50, 21, 3)))
     data = whole.getvalue()
@@ -225,7 +225,7 @@ def test_damaged_archives_are_refused(tmp_path: Path) -> None:
             read_postures(path)
 
 
-def test_what_is_no_database_is_told(tmp_path: Path) -> None:
+def test_a_path_without_a_database_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_postures(tmp_path / "nowhere.mat")
     (tmp_path / "notes.txt").write_text("hello")
@@ -235,7 +235,7 @@ def test_what_is_no_database_is_told(tmp_path: Path) -> None:
 
 
 def test_the_papers_own_database(real_data: Path) -> None:
-    """Fists and single fingers: flexion covers the joints' range, and fewer components than the paper's suffice."""
+    """Flexion covers the joints' range, and fewer components than the paper's suffice."""
     path = real_data / "postures" / "schroeder-fingerfist" / "fingerfist.mat"
     if not path.exists():
         pytest.skip(f"no such database: {path}")
@@ -245,7 +245,7 @@ def test_the_papers_own_database(real_data: Path) -> None:
     assert np.all(np.percentile(flexions, 1, axis=0) > -25)
     assert np.all(np.percentile(flexions, 99, axis=0) > 55)
     assert np.all(np.percentile(flexions, 99, axis=0) < 130)
-    # At rest all fingers are about straight and side by side: the zeros are the right ones.
+    # At rest all fingers are nearly straight and parallel, so the zeros are right.
     rest = np.degrees(np.median(angles[np.argsort(np.abs(flexions).sum(axis=(1, 2)))[:600]], axis=0)).reshape(5, 4)[1:]
     assert np.abs(rest[:, 1:]).max() < 15
     assert np.all(np.diff(rest[:, 0]) < 0)

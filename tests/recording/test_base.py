@@ -1,4 +1,4 @@
-"""A new format is one small class: what it does not override comes from BaseSequence."""
+"""A new format is one small class with the defaults of BaseSequence."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
 
 
 class ArraySequence(BaseSequence):
-    """Depth images (N, h, w) in a .npy file, 30 a second; a negative value damages its frame."""
+    """A format of depth images (N, h, w) in a .npy file; a negative value damages its frame."""
 
     format_name = "a .npy file"
 
@@ -49,7 +49,7 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "film.npy"
 
 
-def test_a_new_format_opens_with_defaults_for_what_it_lacks(path: Path) -> None:
+def test_a_new_format_has_the_defaults_of_the_base(path: Path) -> None:
     sequence: Sequence = open_sequence(path, on_damage="skip")
     assert (sequence.name, len(sequence), sequence.camera) == ("film.npy", 3, CAMERA)
     assert registry.image_size(path) == (4, 3)
@@ -62,7 +62,7 @@ def test_a_new_format_opens_with_defaults_for_what_it_lacks(path: Path) -> None:
     assert sequence[-1].timestamp == pytest.approx(2 / 30)
 
 
-def test_damaged_frames_of_a_new_format_are_skipped_or_refused(path: Path) -> None:
+def test_damaged_frames_of_a_new_format_are_skipped_or_rejected(path: Path) -> None:
     sequence = open_sequence(path, on_damage="skip")
     assert [(frame.index, frame.depth.mean()) for frame in sequence] == [(0, 0.5), (2, np.float32(0.7))]
     assert [(frame.index, frame.reason) for frame in sequence.damaged] == [(1, "depth is negative")]
@@ -70,6 +70,6 @@ def test_damaged_frames_of_a_new_format_are_skipped_or_refused(path: Path) -> No
         list(open_sequence(path))
 
 
-def test_an_unknown_format_names_the_known_ones(path: Path) -> None:
-    with pytest.raises(InputError, match=r"expected a folder with depth\.txt .* or a \.npy file"):
+def test_the_error_of_an_unknown_format_names_the_known_ones(path: Path) -> None:
+    with pytest.raises(InputError, match=r"must be a folder with depth\.txt .* or a \.npy file"):
         open_sequence(path.parent)

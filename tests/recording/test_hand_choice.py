@@ -1,4 +1,4 @@
-"""The hand that a recording is tracked with."""
+"""The choice of the hand that a recording is tracked with."""
 
 import shutil
 from pathlib import Path

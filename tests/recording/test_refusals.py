@@ -1,4 +1,4 @@
-"""Every way a folder can be unusable as a whole gives one sentence when it is opened, and nothing else."""
+"""Opening an unusable folder gives one sentence, for every kind of fault."""
 
 import json
 from collections.abc import Callable
@@ -66,7 +66,7 @@ REFUSALS: dict[str, tuple[Change, str]] = {
     "no file name": (edit("depth.txt", " depth/0.033000.png", ""), "line 3: expected 'timestamp filename'"),
     "not text": (lambda folder: (folder / "depth.txt").write_bytes(b"\xff\xfe\x00"), "must be a text file"),
     "colour list broken": (edit("rgb.txt", "0.033000 ", "soon "), r"rgb\.txt, line 3"),
-    # Names that escape
+    # Names outside the folder
     "absolute name": (edit("depth.txt", "depth/0.033000.png", "/etc/hostname"), "must lie within the folder"),
     "parent folder": (edit("depth.txt", "depth/0.033000.png", "depth/../../x.png"), "must lie within the folder"),
     "drive letter": (edit("depth.txt", "depth/0.033000.png", "C:x.png"), "must lie within the folder"),
@@ -98,7 +98,7 @@ REFUSALS: dict[str, tuple[Change, str]] = {
     "pose not finite": (edit("hand_poses.csv", "0.033000,", "nan,"), "line 3: expected 28 finite numbers"),
     "pose rows out of order": (edit("hand_poses.csv", "0.033000,", "0.9,"), "line 4: timestamps must increase"),
     "pose with a zero quaternion": (edit("hand_poses.csv", ",1.0,0.0,0.0,0.0,", ",0,0,0,0,"), "must have length 1"),
-    "joints without a row": (text("joints.csv", ",".join(truth.JOINTS_HEADER)), "holds no row"),
+    "joints without a row": (text("joints.csv", ",".join(truth.JOINTS_HEADER)), "must hold rows below its header"),
     "joints empty": (text("joints.csv", ""), "the header must be 'timestamp,wrist_x,"),
     "joints of other frames": (drop_a_row, "must annotate the same timestamps"),
     "hand is no JSON": (text("hand.json", "{"), "cannot read the hand file"),
@@ -112,7 +112,7 @@ REFUSALS: dict[str, tuple[Change, str]] = {
 
 
 def problem_of(folder: Path) -> str:
-    """What opening and reading a recording is refused with; nothing where it is not."""
+    """Return the error of opening and reading a recording; an empty text if there is none."""
     try:
         list(open_sequence(folder, on_damage="skip"))
     except InputError as error:
@@ -156,7 +156,7 @@ def test_any_change_of_a_text_file_gives_a_recording_or_one_sentence(
     assert "\n" not in problem_of(folder)
 
 
-def test_absurdly_long_files_are_refused_before_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_long_files_are_rejected_before_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = write_sample(tmp_path / "sample")
     monkeypatch.setattr(truth, "MAX_TABLE_BYTES", 50)
     with pytest.raises(InputError, match=r"hand_poses\.csv must be at most 50 bytes long, found [\d,]+"):
@@ -166,7 +166,7 @@ def test_absurdly_long_files_are_refused_before_they_are_read(tmp_path: Path, mo
         open_sequence(folder)
 
 
-def test_a_list_of_too_many_frames_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_list_of_too_many_frames_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = write_sample(tmp_path / "sample")
     monkeypatch.setattr(lists, "MAX_FRAMES", 4)
     with pytest.raises(InputError, match="lists more than 4 images"):

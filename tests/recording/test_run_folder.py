@@ -1,4 +1,4 @@
-"""The run folder: what is written comes back bit for bit, whenever the writer is killed."""
+"""A run folder reads back bitwise equal, whenever the writer is killed."""
 
 import json
 from dataclasses import replace
@@ -34,7 +34,7 @@ def write(folder: Path, count: int, resume: bool = False) -> None:
             run.append(row(index), {"segment": 1.5, "swarm": 10.0 + index})
 
 
-def test_what_is_written_comes_back_bit_for_bit(tmp_path: Path) -> None:
+def test_a_run_reads_back_bitwise_equal(tmp_path: Path) -> None:
     write(tmp_path / "run", 9)
     run = Run.load(tmp_path / "run")
     assert run.configuration == CONFIGURATION
@@ -53,7 +53,7 @@ def test_what_is_written_comes_back_bit_for_bit(tmp_path: Path) -> None:
 
 
 @given(kept=st.floats(0, 1), timings_kept=st.floats(0, 1))
-def test_a_run_cut_anywhere_is_readable_and_goes_on_to_the_same_end(
+def test_a_run_truncated_anywhere_is_readable_and_resumes_to_the_same_end(
     tmp_path_factory: pytest.TempPathFactory, kept: float, timings_kept: float
 ) -> None:
     whole, cut = tmp_path_factory.mktemp("whole") / "run", tmp_path_factory.mktemp("cut") / "run"
@@ -80,7 +80,7 @@ def test_an_existing_run_is_not_overwritten(tmp_path: Path) -> None:
     assert len(read_rows(tmp_path / "run")) == 2
 
 
-def test_a_run_goes_on_only_with_its_own_options(tmp_path: Path) -> None:
+def test_a_run_resumes_only_with_its_own_options(tmp_path: Path) -> None:
     write(tmp_path / "run", 2)
     with pytest.raises(InputError, match="seed = 3, not 4"):
         RunWriter(tmp_path / "run", {**CONFIGURATION, "seed": 4}, STAGES, resume=True)
@@ -89,7 +89,7 @@ def test_a_run_goes_on_only_with_its_own_options(tmp_path: Path) -> None:
     RunWriter(tmp_path / "run", {**CONFIGURATION, "threads": 1}, STAGES, resume=True).close()
 
 
-def test_resuming_nothing_begins_a_run(tmp_path: Path) -> None:
+def test_resuming_an_empty_folder_begins_a_run(tmp_path: Path) -> None:
     write(tmp_path / "run", 3, resume=True)
     assert len(Run.load(tmp_path / "run").index) == 3
 
@@ -103,13 +103,13 @@ def test_resuming_nothing_begins_a_run(tmp_path: Path) -> None:
         ("run.json", "[" * 100_000, "holds no run"),
         ("run.json", " " * (1 << 21), "at most 1,048,576 bytes"),
         ("poses.csv", None, "is missing"),
-        ("poses.csv", "x" * 200_000 + "\n", "is no table"),
+        ("poses.csv", "x" * 200_000 + "\n", "must be a CSV table"),
         ("timings.csv", "", "must begin with"),
         ("timings.csv", "index,swarm\n0,1\n1,x\n", "line 3: expected milliseconds"),
         ("timings.csv", "index,swarm\n0,1,2\n1,2\n", "line 2: expected 2 columns"),
     ],
 )
-def test_damaged_runs_are_refused_in_one_sentence(tmp_path: Path, name: str, text: str | None, message: str) -> None:
+def test_damaged_runs_are_rejected_in_one_sentence(tmp_path: Path, name: str, text: str | None, message: str) -> None:
     write(tmp_path / "run", 2)
     if text is None:
         (tmp_path / "run" / name).unlink()
@@ -128,7 +128,7 @@ def test_damaged_runs_are_refused_in_one_sentence(tmp_path: Path, name: str, tex
         ("\n0,", f"\n{10**30},", "line 2: .* frames are numbered from 0 to"),
     ],
 )
-def test_a_row_that_is_no_frame_is_named(tmp_path: Path, found: str, damaged: str, message: str) -> None:
+def test_a_malformed_row_is_named(tmp_path: Path, found: str, damaged: str, message: str) -> None:
     write(tmp_path / "run", 2)
     path = tmp_path / "run" / "poses.csv"
     text = path.read_text()
@@ -151,9 +151,7 @@ def test_a_row_that_is_no_frame_is_named(tmp_path: Path, found: str, damaged: st
         ("qw", "3", "frame 1: the quaternion must have length 1, found [0-9.]{1,7}$"),
     ],
 )
-def test_rows_that_no_tracker_writes_are_refused_by_whoever_reads(
-    tmp_path: Path, column: str, value: str, message: str
-) -> None:
+def test_rows_that_no_tracker_writes_are_rejected(tmp_path: Path, column: str, value: str, message: str) -> None:
     write(tmp_path / "run", 2)
     path = tmp_path / "run" / "poses.csv"
     header, first, second = path.read_text().splitlines()

@@ -1,4 +1,4 @@
-"""`depthtrack info`, and the options with which every command opens a recording."""
+"""`depthtrack info`, and the options of all commands that open a recording."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ def sample(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def info(capsys: pytest.CaptureFixture[str]) -> Any:
-    """Runs `depthtrack info ... --json` and gives what it says."""
+    """Return a function that runs `depthtrack info ... --json` and returns its data."""
 
     def run(*arguments: object) -> Any:
         assert main(["info", *map(str, arguments), "--json"]) == 0
@@ -36,7 +36,7 @@ def info(capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one sentence with which `depthtrack info` refuses, with exit code 2."""
+    """Return the one sentence of an error of `depthtrack info`, with exit code 2."""
     assert main(["info", *map(str, arguments)]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -64,7 +64,7 @@ def test_the_figures_are_those_of_the_recording(info: Any, sample: Path) -> None
     assert facts["damaged"] == []
 
 
-def test_what_is_absent_is_said_to_be_absent(info: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_absent_parts_are_reported_as_absent(info: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with SequenceWriter(tmp_path / "bare", CAMERA) as out:
         out.append(5.0, np.zeros(CAMERA.shape))
     facts = info(tmp_path / "bare")
@@ -78,7 +78,7 @@ def test_what_is_absent_is_said_to_be_absent(info: Any, tmp_path: Path, capsys: 
         assert line in text
 
 
-def test_the_text_tells_it_in_millimetres_and_degrees(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_text_has_millimetres_and_degrees(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(sample)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["recording", "sample"]
@@ -105,7 +105,9 @@ def test_the_field_of_view_is_the_angle_between_the_outer_rays() -> None:
     assert field_of_view(CAMERA)[0] == pytest.approx(np.arccos(left @ right))
 
 
-def test_damaged_frames_stop_it_or_are_listed(info: Any, sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damaged_frames_end_the_command_or_are_listed(
+    info: Any, sample: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (sample / "depth/0.067000.png").unlink()
     (sample / "hand_mask/0.100000.png").write_bytes(b"")
     assert "frame 2: " in refusal(capsys, sample)
@@ -127,11 +129,11 @@ def test_a_sample_reads_frames_from_end_to_end(info: Any, sample: Path) -> None:
     assert facts["depth_percentiles"]["100"] == pytest.approx(depth_at(4).max(), abs=0.001)
 
 
-def test_a_sample_of_nothing_is_refused(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_empty_sample_is_rejected(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "--sample must be at least 1" in refusal(capsys, sample, "--sample", 0)
 
 
-def test_texts_of_a_recording_cannot_steer_the_terminal(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_of_a_recording_are_not_printed(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (sample / "sequence.json").write_text(json.dumps({"note\x1b[2J": "\x1b]0;owned\x07" + "long" * 100}))
     assert main(["info", str(sample)]) == 0
     text = capsys.readouterr().out
@@ -140,7 +142,7 @@ def test_texts_of_a_recording_cannot_steer_the_terminal(sample: Path, capsys: py
     assert max(map(len, text.splitlines())) < 240
 
 
-def test_long_lists_are_cut_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_long_lists_are_shortened_visibly(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with SequenceWriter(tmp_path / "gaps", CAMERA) as out:
         for index in range(60):
             out.append(index * 0.1 + (index // 3) * 0.4, depth_at(0))
@@ -189,16 +191,16 @@ def test_a_camera_file_or_preset_can_be_corrected_in_numbers(tmp_path: Path) -> 
         (["--fx", "30", "--depth-scale", "5000"], "depth_scale must be metres"),
         (["--camera", "nowhere.json"], "cannot read the camera file: nowhere.json is missing"),
         (["--camera", "a.json", "--camera-preset", "tum"], "give one of them"),
-        (["--camera-preset", "kinect1"], "must be 640x480 pixels as the camera says, found 32x24"),
+        (["--camera-preset", "kinect1"], "must have the camera's 640x480 pixels, found 32x24"),
     ],
 )
-def test_unusable_camera_options_are_refused(
+def test_unusable_camera_options_are_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert message in refusal(capsys, write_plain_tum(tmp_path / "tum"), *arguments)
 
 
-# The program as it is started.
+# The program in a process.
 
 
 def test_a_bad_folder_ends_the_program_with_code_2_and_no_traceback(sample: Path) -> None:
@@ -211,13 +213,13 @@ def test_a_bad_folder_ends_the_program_with_code_2_and_no_traceback(sample: Path
     assert "Traceback" not in ended.stderr
 
 
-def test_the_options_load_nothing_heavy() -> None:
+def test_the_options_import_no_numerical_library() -> None:
     code = "import sys, depthtrack.cli.info as m; print({'numpy', 'cv2', 'scipy', 'numba'} & set(sys.modules))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == "set()"
 
 
-def test_real_recordings_are_told(info: Any, real_data: Path) -> None:
+def test_real_recordings_are_summarised(info: Any, real_data: Path) -> None:
     facts = info(real_data / "rgbd" / "open-close")
     assert (facts["frames"], facts["colours"], facts["masks"], facts["joints"]) == (35, 35, 35, 35)
     assert facts["rate"] == pytest.approx(25, abs=0.5)

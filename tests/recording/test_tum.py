@@ -1,4 +1,4 @@
-"""Reading recordings: what belongs together, what streams, what the real ones hold."""
+"""Reading of TUM folders: association, streaming, damage, and real recordings."""
 
 import tracemalloc
 import zlib
@@ -23,7 +23,7 @@ milliseconds = st.lists(st.integers(0, 400), unique=True, max_size=40).map(sorte
 
 
 def all_pairs_association(depth: list[int], colour: list[int], max_difference: int) -> dict[int, int]:
-    """Compare every pair; the earlier of two equally near colour images wins."""
+    """Return the association by comparison of all pairs; the earlier of two equally near wins."""
     nearest = {i: min(range(len(colour)), key=lambda j: abs(colour[j] - t)) for i, t in enumerate(depth) if colour}
     return {i: j for i, j in nearest.items() if abs(colour[j] - depth[i]) < max_difference}
 
@@ -64,7 +64,7 @@ def test_a_depth_image_without_a_colour_image_in_time_has_none(tmp_path: Path) -
     assert coloured == [True, False, True, True, True]
 
 
-def test_indexing_is_that_of_a_list(tmp_path: Path) -> None:
+def test_indexing_works_like_a_lists(tmp_path: Path) -> None:
     sequence = open_sequence(write_sample(tmp_path / "sample"))
     assert sequence[-1].index == len(sequence) - 1 == 4
     assert [frame.index for frame in sequence.frames([3, 1])] == [3, 1]
@@ -97,10 +97,10 @@ def test_the_nearest_annotation_within_the_tolerance_is_found(times: list[int], 
         assert distances[row] == min(distances) <= tolerance
 
 
-def test_a_path_without_a_recording_is_told_apart(tmp_path: Path) -> None:
+def test_a_path_without_a_recording_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file or folder"):
         open_sequence(tmp_path / "nowhere")
-    with pytest.raises(InputError, match=r"expected a folder with depth\.txt"):
+    with pytest.raises(InputError, match=r"must be a folder with depth\.txt"):
         open_sequence(tmp_path)
 
 
@@ -122,7 +122,7 @@ def flip_a_bit(path: Path) -> None:
 
 
 def claim_a_huge_size(path: Path) -> None:
-    """Write 65536 x 65536 into the header of a PNG, with the right checksum."""
+    """Write 65536 x 65536 into the header of a PNG, with a valid checksum."""
     data = path.read_bytes()
     header = b"IHDR" + b"\x00\x01\x00\x00" * 2 + data[24:29]
     path.write_bytes(data[:12] + header + zlib.crc32(header).to_bytes(4, "big") + data[33:])
@@ -144,7 +144,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "8 bits": (rewrite(np.zeros(CAMERA.shape, np.uint8)), "16-bit PNG with one channel, found a PNG of mode L"),
     "three channels": (rewrite(np.zeros((*CAMERA.shape, 3), np.uint16)), "found a PNG of mode RGB"),
     "a JPEG": (rewrite(np.zeros(CAMERA.shape, np.uint8), ".jpg"), "must be a 16-bit PNG .*, found a JPEG"),
-    "wrong size": (rewrite(np.zeros((5, 7), np.uint16)), "must be 32x24 pixels as the camera says, found 7x5"),
+    "wrong size": (rewrite(np.zeros((5, 7), np.uint16)), "must have the camera's 32x24 pixels, found 7x5"),
     "absurd size": (claim_a_huge_size, "exceeds limit"),
     "too long": (lambda path: path.write_bytes(path.read_bytes() + b"\0" * (1 << 21)), "must be at most .* bytes long"),
 }
@@ -156,7 +156,7 @@ def sample(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_frame_is_refused_or_skipped_and_counted(sample: Path, damage: str) -> None:
+def test_a_damaged_frame_is_rejected_or_skipped_and_counted(sample: Path, damage: str) -> None:
     inflict, message = DAMAGES[damage]
     inflict(sorted((sample / "depth").iterdir())[2])
 
@@ -191,12 +191,12 @@ def test_a_damaged_mask_damages_only_itself(sample: Path) -> None:
 def test_a_recording_without_any_readable_frame_is_an_error(sample: Path) -> None:
     for path in (sample / "depth").iterdir():
         path.unlink()
-    with pytest.raises(InputError, match="not one frame can be read"):
+    with pytest.raises(InputError, match="no frame can be read"):
         list(open_sequence(sample, on_damage="skip"))
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg"])
-def test_an_absurd_header_never_reaches_the_decoder(
+def test_a_header_of_another_size_never_reaches_the_decoder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
 ) -> None:
     with SequenceWriter(tmp_path / "out", CAMERA, colour_format=suffix) as out:  # type: ignore[arg-type]
@@ -215,7 +215,7 @@ def test_an_absurd_header_never_reaches_the_decoder(
 
 
 @given(st.data())
-def test_no_cut_goes_unnoticed(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+def test_every_truncation_is_detected(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     folder = write_sample(tmp_path_factory.mktemp("cut") / "sample")
     path = data.draw(st.sampled_from([folder / "depth/0.000000.png", folder / "rgb/0.000000.jpg"]))
     whole = path.read_bytes()
@@ -225,7 +225,7 @@ def test_no_cut_goes_unnoticed(tmp_path_factory: pytest.TempPathFactory, data: s
 
 
 @given(st.data())
-def test_no_changed_byte_of_a_depth_image_goes_unnoticed(
+def test_every_changed_byte_of_a_depth_image_is_detected(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:
     folder = write_sample(tmp_path_factory.mktemp("flip") / "sample")
@@ -240,7 +240,7 @@ def test_no_changed_byte_of_a_depth_image_goes_unnoticed(
 # Real recordings.
 
 
-def test_the_annotated_real_recording_fits_together(real_data: Path) -> None:
+def test_the_annotated_real_recording_is_consistent(real_data: Path) -> None:
     sequence = open_sequence(real_data / "rgbd" / "open-close")
     truth = sequence.ground_truth
     assert truth is not None
@@ -267,7 +267,7 @@ def test_the_annotated_real_recording_fits_together(real_data: Path) -> None:
     ("name", "frames", "coloured"),
     [("kinect2-counting", 200, False), ("sr305-poses", 19, False), ("with-ball", 150, True)],
 )
-def test_the_other_real_recordings_open_the_same_way(real_data: Path, name: str, frames: int, coloured: bool) -> None:
+def test_the_other_real_recordings_open(real_data: Path, name: str, frames: int, coloured: bool) -> None:
     sequence = open_sequence(real_data / "rgbd" / name)
     assert len(sequence) == frames
     for frame in sequence.frames(range(0, frames, 19)):

@@ -1,4 +1,4 @@
-"""What is written reads back the same; a folder is complete or absent."""
+"""A written recording reads back equal; a folder is complete or absent."""
 
 import filecmp
 from pathlib import Path
@@ -84,7 +84,7 @@ def test_depth_is_rounded_to_the_nearest_unit_and_dropped_out_of_range(
     read = open_sequence(path)[0].depth
     kept = (depth > 0) & (depth <= 65535.4999 * scale)
     np.testing.assert_array_equal(read[~kept], 0)
-    # Half a unit, and what float32 cannot tell apart.
+    # Half a unit, and the resolution of float32.
     assert np.abs(read[kept] - depth[kept]).max() <= scale / 2 + 65535 * scale * 2e-7
 
 
@@ -98,7 +98,7 @@ def test_the_same_input_gives_the_same_bytes_for_any_number_of_threads(tmp_path:
     assert everything_in(write("one", 1)) == everything_in(write("four", 4))
 
 
-def test_writing_what_was_read_changes_nothing(tmp_path: Path) -> None:
+def test_a_recording_copied_by_the_writer_is_equal(tmp_path: Path) -> None:
     first = write_sample(tmp_path / "first")
     sequence = open_sequence(first)
     truth = sequence.ground_truth
@@ -124,7 +124,7 @@ def test_writing_what_was_read_changes_nothing(tmp_path: Path) -> None:
         assert everything_in(first / folder) == everything_in(tmp_path / "second" / folder)
 
 
-def test_arrays_may_be_used_again_at_once(tmp_path: Path) -> None:
+def test_arrays_may_be_reused_after_append(tmp_path: Path) -> None:
     depth = np.empty(CAMERA.shape)
     with SequenceWriter(tmp_path / "out", CAMERA) as out:
         for index in range(20):
@@ -150,13 +150,13 @@ def test_an_error_of_a_worker_is_raised_and_leaves_nothing(tmp_path: Path, monke
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_empty_recording_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no frame was written"), SequenceWriter(tmp_path / "out", CAMERA):
+def test_an_empty_recording_is_rejected(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="needs at least one frame"), SequenceWriter(tmp_path / "out", CAMERA):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_there_is_kept_unless_it_may_be_overwritten(tmp_path: Path) -> None:
+def test_an_existing_recording_is_kept_without_overwrite(tmp_path: Path) -> None:
     path = write_sample(tmp_path / "out")
     before = everything_in(path)
     with pytest.raises(InputError, match="exists already"), SequenceWriter(path, CAMERA):
@@ -198,17 +198,17 @@ def test_an_empty_folder_is_filled(tmp_path: Path) -> None:
         ({"timestamp": float("nan")}, "must be finite"),
         ({"depth": np.zeros((3, 3))}, "depth must have the camera's shape"),
         ({"colour": np.zeros(CAMERA.shape, np.uint8)}, "rgb must have the camera's shape"),
-        ({"joints": joints_at(0)}, "the same of pose and joints"),
+        ({"joints": joints_at(0)}, "must have pose, joints or both alike"),
         ({"pose": np.full(27, np.nan)}, "finite numbers"),
         ({"pose": np.zeros(26)}, "finite numbers"),
         ({"pose": np.full(27, 0.1)}, "quaternion must have length 1"),
         ({"colour": np.zeros((*CAMERA.shape, 3))}, "must be 8-bit RGB"),
     ],
 )
-def test_unusable_frames_are_refused(tmp_path: Path, arguments: dict[str, Any], message: str) -> None:
+def test_unusable_frames_are_rejected(tmp_path: Path, arguments: dict[str, Any], message: str) -> None:
     with SequenceWriter(tmp_path / "out", CAMERA) as out:
         out.append(1.0, depth_at(0), pose=pose_at(0))
         with pytest.raises(InputError, match=message):
             out.append(**{"timestamp": 2.0, "depth": depth_at(1), **arguments})
-    # No part of the refused frame was written.
+    # No part of the rejected frame was written.
     assert len(open_sequence(tmp_path / "out")) == len(list((tmp_path / "out" / "depth").iterdir())) == 1

@@ -1,4 +1,4 @@
-"""What readers of every format share: indexing, iteration and the record of damaged frames."""
+"""Base of the readers: indexing, iteration and the record of damaged frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,7 +20,7 @@ class BaseSequence(ABC):
     """
 
     format_name: ClassVar[str]
-    """What a recording of this format is, for errors: "a folder with depth.txt (TUM RGB-D layout)"."""
+    """The format's description for errors: "a folder with depth.txt (TUM RGB-D layout)"."""
 
     camera: Camera
     timestamps: Array
@@ -31,7 +31,8 @@ class BaseSequence(ABC):
     def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
         """Open a recording; `camera` replaces the recording's own.
 
-        Raises: InputError if the recording is unusable for a reason that shows without decoding images.
+        Raises:
+            InputError: if the recording is unusable for a reason that shows without decoding images.
         """
         self.path = path
         self.description: Mapping[str, Any] = {}
@@ -48,7 +49,8 @@ class BaseSequence(ABC):
     def image_size(cls, path: Path) -> tuple[int, int]:
         """Return (width, height) of the depth images, without a camera.
 
-        Raises: InputError if no depth image can be read.
+        Raises:
+            InputError: if no depth image can be read.
         """
 
     @classmethod
@@ -60,13 +62,15 @@ class BaseSequence(ABC):
     def read_depth(self, index: int) -> Depth:
         """Return the depth image (h, w) of a frame, metres, 0 = no measurement.
 
-        Raises: DamagedFrameError if it cannot be read.
+        Raises:
+            DamagedFrameError: if it cannot be read.
         """
 
     def read_colour(self, index: int) -> Image | None:
-        """Return the RGB image (h, w, 3) registered to the depth image, or None if the frame has no colour.
+        """Return the RGB image (h, w, 3) registered to the depth, or None if there is none.
 
-        Raises: DamagedFrameError if it cannot be read.
+        Raises:
+            DamagedFrameError: if it cannot be read.
         """
         return None
 
@@ -121,4 +125,4 @@ class BaseSequence(ABC):
             readable += 1
             yield frame
         if last_error is not None and not readable:
-            raise InputError(f"{self.path}: not one frame can be read; the last: {last_error}") from last_error
+            raise InputError(f"{self.path}: no frame can be read; the last error: {last_error}") from last_error

@@ -1,10 +1,16 @@
 """The sequence folder: a TUM RGB-D folder with optional camera and ground truth.
 
-depth.txt, depth/     timestamps and 16-bit PNGs             rgb.txt, rgb/   the same in colour, optional
-camera.json           intrinsics and depth scale             sequence.json   how it was made
-hand_poses.csv        27 pose values per timestamp           joints.csv      21 keypoints per timestamp
-hand.json             sizes of the hand
-hand_mask/, exact_depth/                                     PNGs named as in depth/
+| file                 | content                                     |
+|----------------------|---------------------------------------------|
+| depth.txt, depth/    | timestamps and 16-bit PNGs                  |
+| rgb.txt, rgb/        | timestamps and PNGs or JPEGs; optional      |
+| camera.json          | intrinsics and depth scale; optional        |
+| sequence.json        | sensor, motion, seed, ...; optional         |
+| hand.json            | sizes of the hand; optional                 |
+| hand_poses.csv       | 27 pose values a timestamp; optional        |
+| joints.csv           | 21 keypoints a timestamp; optional          |
+| hand_mask/           | PNGs with the names of depth/; optional     |
+| exact_depth/         | 16-bit PNGs, likewise; optional             |
 
 A synthetic hand_mask/ shows the hand up to the plane of its wrist, also where the sensor has no reading.
 """
@@ -59,7 +65,8 @@ class TumSequence(BaseSequence):
     def image_size(cls, path: Path) -> tuple[int, int]:
         """Return (width, height) of the first readable depth image.
 
-        Raises: InputError if none can be read.
+        Raises:
+            InputError: if none can be read.
         """
         for file in read_list(path, "depth.txt"):
             try:
@@ -82,7 +89,8 @@ class TumSequence(BaseSequence):
     def hand_mask(self, index: int) -> Mask | None:
         """See `Sequence`.
 
-        Raises: DamagedFrameError if the mask exists and cannot be read.
+        Raises:
+            DamagedFrameError: if the mask exists and cannot be read.
         """
         path = self._beside(index, "hand_mask")
         return None if path is None else read_mask(path, self.camera.shape)
@@ -90,13 +98,14 @@ class TumSequence(BaseSequence):
     def exact_depth(self, index: int) -> Depth | None:
         """See `Sequence`.
 
-        Raises: DamagedFrameError if the image exists and cannot be read.
+        Raises:
+            DamagedFrameError: if the image exists and cannot be read.
         """
         path = self._beside(index, "exact_depth")
         return None if path is None else self._exact_camera.metres(read_depth(path, self.camera.shape))
 
     def _beside(self, index: int, kind: str) -> Path | None:
-        """Return the path of the image of another kind with the name of a depth image, or None without one."""
+        """Return the image of another kind with a depth image's name; None if there is none."""
         name = f"{kind}/{PurePosixPath(self._depth[index].name).stem}.png"
         path = self.path / name
         if not os.path.lexists(path):
@@ -123,7 +132,7 @@ def _read_description(folder: Path) -> Mapping[str, Any]:
 
 def _check_description(fields: Any) -> Mapping[str, Any]:
     if not isinstance(fields, dict):
-        raise InputError(f"expected a JSON object that says how the recording was made, found {type(fields).__name__}")
+        raise InputError(f"expected a JSON object that describes the recording, found {type(fields).__name__}")
     return fields
 
 

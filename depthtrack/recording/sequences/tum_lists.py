@@ -1,6 +1,7 @@
-"""The text files of a TUM RGB-D folder (`timestamp filename` per line), and the association of two of them.
+"""The image lists of a TUM RGB-D folder, and the association of two of them.
 
-Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
+A line holds `timestamp filename`.
+Source: Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
 """
 
 import math
@@ -15,25 +16,26 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_lines
 
 MAX_FRAMES = 1_000_000
-"""Most images in one list: nine hours at 30 Hz."""
+"""Largest number of images in a list: nine hours at 30 Hz."""
 MAX_LIST_BYTES = 1 << 26
-"""Largest list file read: room for that many lines, and a bound on what an absurd file can take."""
+"""Largest list file read, a bound on memory that allows for `MAX_FRAMES` lines."""
 MAX_COLOUR_DELAY = 0.02
-"""Largest difference of timestamps, in seconds, at which a colour image still belongs to a depth image."""
+"""Largest difference of timestamps, seconds, between associated depth and colour images."""
 
 
 @dataclass(frozen=True, slots=True)
 class ListedFile:
-    """One line of a list: when the image was taken (seconds) and its name within the folder."""
+    """One line of a list: the timestamp (seconds) and the file's name within the folder."""
 
     timestamp: float
     name: str
 
 
 def read_list(folder: Path, list_name: str) -> list[ListedFile]:
-    """Return the lines of `depth.txt` or `rgb.txt`; whether the files exist is checked frame by frame.
+    """Return the lines of `depth.txt` or `rgb.txt`, without a check that the files exist.
 
-    Raises: InputError if no image is listed, timestamps do not increase, or a file lies outside `folder`.
+    Raises:
+        InputError: if no image is listed, timestamps do not increase, or a file lies outside `folder`.
     """
     path = folder / list_name
     files: list[ListedFile] = []
@@ -60,7 +62,7 @@ def read_list(folder: Path, list_name: str) -> list[ListedFile]:
 
 
 def associate(depth: ArrayLike, colour: ArrayLike, max_difference: float = MAX_COLOUR_DELAY) -> dict[int, int]:
-    """Return the index of the nearest colour image for each depth image that has one within `max_difference`.
+    """Return the nearest colour image of each depth image that has one within `max_difference`.
 
     `depth` (D,) and `colour` (C,) are strictly increasing timestamps in seconds. Of two equally near colour images the
     earlier one is taken. Unlike in TUM's associate.py, a colour image may serve two depth images: with cameras half a
@@ -88,7 +90,7 @@ def _parse(line: str, where: str) -> ListedFile:
 
 
 class _Inside:
-    """Checks that a listed name stays within a folder; follows links, each directory once.
+    """Checks that a listed name lies within a folder; follows the links of each directory once.
 
     It works on strings: a list has one name per frame, and path objects would take longer than reading the list.
     """
@@ -99,7 +101,7 @@ class _Inside:
         self._directories: dict[str, bool] = {}
 
     def holds(self, name: str) -> bool:
-        # Backslashes and drive letters lead elsewhere on Windows; names that cannot be printed could steer a terminal.
+        # Backslashes and drive letters leave the folder on Windows; control characters could steer a terminal.
         if (
             name.startswith("/")
             or name[1:2] == ":"
