@@ -61,7 +61,7 @@ def system_name() -> str:
 
 
 def processor_name() -> str:
-    """Return the processor's model name; its architecture if the system does not report the model."""
+    """Return the processor's model name; its architecture if the model is not reported."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

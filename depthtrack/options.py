@@ -1,6 +1,6 @@
-"""Options: frozen dataclasses whose fields carry unit, meaning and source, with a JSON round trip.
+"""Options: frozen dataclasses whose fields have unit, meaning and source; JSON round trip.
 
-This module needs neither numpy nor numba, so that `--help` stays fast.
+This module imports neither numpy nor numba, so that `--help` is fast.
 """
 
 import dataclasses
@@ -18,9 +18,9 @@ _MEANING, _UNIT, _SOURCE, _ADVANCED = "meaning", "unit", "source", "advanced"
 
 
 def option(default: Any, meaning: str, *, unit: str = "", source: str = "", advanced: bool = False) -> Any:
-    """Return a dataclass field with its documentation; a dataclass as default becomes a nested group.
+    """Return a dataclass field with its documentation; a default dataclass is a nested group.
 
-    advanced: the option, or all options of the group, are not listed by `--help`.
+    advanced: whether `--help` omits the option, or all options of the group.
     """
     metadata = {_MEANING: meaning, _UNIT: unit, _SOURCE: source, _ADVANCED: advanced}
     if dataclasses.is_dataclass(default):
@@ -32,8 +32,9 @@ def option(default: Any, meaning: str, *, unit: str = "", source: str = "", adva
 class Parameter:
     """One option of a configuration.
 
-    `path` is its dotted place. `name` is the last part of the path if that is unique in the configuration, or among the
-    options that are not `advanced`; else the path.
+    path: dotted names of its groups and its field.
+    name: the last part of the path if it is unique among all options, or among those not `advanced`; else the path.
+    kind: its type.
     """
 
     path: str
@@ -47,7 +48,7 @@ class Parameter:
 
 
 def parameters(configuration: Any) -> list[Parameter]:
-    """Return all options of a configuration (an instance), in order, with their current values as defaults."""
+    """Return all options of a configuration, in order, with its values as defaults."""
     found = list(_leaves(configuration, ""))
     last = [path.rpartition(".")[2] for path, *_ in found]
     listed = [name for name, (*_, documentation) in zip(last, found, strict=True) if not documentation[_ADVANCED]]
@@ -77,7 +78,7 @@ def with_options(configuration: T, values: Mapping[str, Any]) -> T:
     """Return the configuration with some options replaced, named by `Parameter.name` or path.
 
     Raises:
-        InputError: an option does not exist, or a value has the wrong type.
+        InputError: if an option does not exist, or a value has the wrong type.
     """
     known = parameters(configuration)
     paths = {parameter.path: parameter for parameter in known} | {parameter.name: parameter for parameter in known}
@@ -106,7 +107,7 @@ def to_json(configuration: Any) -> str:
 
 
 def _strict(value: Any) -> Any:
-    """Replace numbers that strict JSON lacks by their names, which `from_data` reads back."""
+    """Replace numbers that strict JSON lacks by their names, which `from_data` accepts."""
     if isinstance(value, dict):
         return {key: _strict(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
@@ -115,10 +116,10 @@ def _strict(value: Any) -> Any:
 
 
 def from_data(kind: type[T], data: Any, where: str) -> T:
-    """Return the configuration that plain data describe; options that are absent keep their defaults.
+    """Return the configuration of plain data; absent options keep their defaults.
 
     Raises:
-        InputError: `data` hold an unknown option, or a value of the wrong type or range. It names `where`.
+        InputError: if an option is unknown, or a value has the wrong type or range; it names `where`.
     """
     from pydantic import ConfigDict, TypeAdapter, ValidationError
 

@@ -1,4 +1,4 @@
-"""The data folders that come with the program: `sequences/` and `shaders/`."""
+"""The data folders of the program, `sequences/` and `shaders/`."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource_folder(name: str) -> Path:
-    """Return the folder `name` inside an installed package (wheel), or beside the package in a checkout.
+    """Return the data folder `name`: inside an installed package, or beside a checked-out one.
 
     Raises:
         InputError: if neither exists, because the installation is broken.

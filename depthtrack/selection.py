@@ -1,4 +1,4 @@
-"""The greedy choice of items that differ from each other."""
+"""Greedy selection of items that differ from each other."""
 
 from collections.abc import Callable, Iterable
 
@@ -8,9 +8,9 @@ from depthtrack.types import Array
 
 
 def distinct(ranked: Iterable[int], distance: Callable[[int, list[int]], Array], least: float, count: int) -> list[int]:
-    """Return the first `count` indices, in order, that differ by at least `least` from those chosen before.
+    """Return up to `count` indices, in order, that are at least `least` apart.
 
-    distance: returns the distances (N,) of one index from N chosen ones; a distance that is NaN counts as too small.
+    distance: returns the distances (N,) of one index from N chosen ones; NaN counts as too small.
     """
     chosen: list[int] = []
     for index in map(int, ranked):

@@ -1,4 +1,4 @@
-"""Cameras: projection, windows and resampling, and files that describe no camera."""
+"""Cameras: projection, crops, resampling, and files that are not cameras."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ FIELDS = json.loads(CAMERA.to_json())
     left=st.integers(-50, 600),
     top=st.integers(-50, 400),
 )
-def test_unprojecting_undoes_projecting_in_every_window(u: float, v: float, z: float, left: int, top: int) -> None:
+def test_unprojection_inverts_projection_in_every_crop(u: float, v: float, z: float, left: int, top: int) -> None:
     point = CAMERA.unproject([u, v], z)
     np.testing.assert_allclose(CAMERA.project(point), [u, v], atol=1e-6)
     region = CAMERA.crop(Rect.of_size(left, top, 96, 64))
@@ -39,7 +39,7 @@ def test_resizing_keeps_corners_aligned(z: float, x: float) -> None:
     assert half.shape == (240, 320)
 
 
-def test_points_behind_the_lens_have_no_pixel() -> None:
+def test_points_behind_the_camera_have_no_pixel() -> None:
     assert np.isnan(CAMERA.project([0.1, 0.1, -1.0])).all()
 
 
@@ -67,7 +67,7 @@ def test_json_round_trip(tmp_path: Path) -> None:
         {"fx": True},
     ],
 )
-def test_absurd_cameras_are_refused_by_name(tmp_path: Path, change: dict[str, object]) -> None:
+def test_cameras_out_of_range_are_rejected_by_name(tmp_path: Path, change: dict[str, object]) -> None:
     path = tmp_path / "camera.json"
     path.write_text(json.dumps({**FIELDS, **change}))
     with pytest.raises(InputError, match=next(iter(change))):
@@ -75,7 +75,7 @@ def test_absurd_cameras_are_refused_by_name(tmp_path: Path, change: dict[str, ob
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", "{'width': 1}", '{"width": 640}'])
-def test_files_that_are_no_camera_are_refused(tmp_path: Path, text: str) -> None:
+def test_files_that_are_not_cameras_are_rejected(tmp_path: Path, text: str) -> None:
     path = tmp_path / "camera.json"
     path.write_text(text)
     with pytest.raises(InputError, match=r"camera\.json"):

@@ -1,4 +1,4 @@
-"""Distance to tapered capsules, held to the balls that make them up."""
+"""The distance to a tapered capsule agrees with that to many balls along its axis."""
 
 import numpy as np
 from hypothesis import given

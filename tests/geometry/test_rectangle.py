@@ -26,7 +26,7 @@ def test_a_crop_has_the_images_pixels_and_zeros_outside(rect: Rect) -> None:
 
 
 @given(RECTS, RECTS)
-def test_a_pasted_crop_shows_the_image_where_all_three_reach(rect: Rect, outer: Rect) -> None:
+def test_a_pasted_crop_has_the_image_in_the_common_part(rect: Rect, outer: Rect) -> None:
     canvas = rect.paste(rect.crop(IMAGE), outer)
     for x, y in pixels(outer):
         shown = (x, y) in pixels(rect) and 0 <= x < 12 and 0 <= y < 9
@@ -52,7 +52,7 @@ def test_the_bounding_box_is_the_smallest_that_holds_the_mask(points: list[tuple
 
 
 @given(RECTS, RECTS)
-def test_relative_coordinates_come_back(rect: Rect, outer: Rect) -> None:
+def test_relative_coordinates_are_invertible(rect: Rect, outer: Rect) -> None:
     assert rect.relative_to(outer).shifted(outer.left, outer.top) == rect
 
 
@@ -61,7 +61,7 @@ def test_relative_coordinates_come_back(rect: Rect, outer: Rect) -> None:
     st.floats(0.01, 0.3),
     st.tuples(st.floats(-1, 1), st.floats(-1, 1)),
 )
-def test_the_region_around_a_point_shows_all_that_is_near(
+def test_the_region_around_a_point_contains_all_near_points(
     centre: tuple[float, float, float], reach: float, step: tuple[float, float]
 ) -> None:
     camera = Camera(96, 64, 80.0, 70.0, 47.5, 31.5)

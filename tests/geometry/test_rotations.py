@@ -1,4 +1,4 @@
-"""Axioms of rotations, for the numpy functions and for the compiled ones."""
+"""The numpy and the compiled functions fulfil the axioms of rotations and agree."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ ANGLES = st.one_of(
 
 
 class Numpy:
-    """The numpy functions of single quaternions."""
+    """Numpy functions of single quaternions."""
 
     product = staticmethod(quaternion_product)
     exp = staticmethod(quaternion_exp)
@@ -38,7 +38,7 @@ class Numpy:
 
 
 class Compiled:
-    """The compiled functions, with the signatures of the numpy ones."""
+    """Compiled functions with the signatures of the numpy ones."""
 
     @staticmethod
     def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ KINDS = pytest.mark.parametrize("kind", [Numpy, Compiled])
 
 
 def quaternions(seed: int, count: int) -> np.ndarray:
-    """Unit quaternions of either sign."""
+    """Return unit quaternions of either sign."""
     q = np.random.default_rng(seed).normal(size=(count, 4))
     return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
 
@@ -133,7 +133,7 @@ def test_log_is_the_inverse_of_exp(kind: Kind, seed: int, angle: float) -> None:
 
 @KINDS
 @given(seed=SEEDS, angle=st.floats(0, 40))
-def test_exp_is_scipys_and_log_takes_the_short_way(kind: Kind, seed: int, angle: float) -> None:
+def test_exp_agrees_with_scipy_and_log_takes_the_short_way(kind: Kind, seed: int, angle: float) -> None:
     vector = angle * direction(seed)
     expected = Rotation.from_rotvec(vector).as_matrix()
     np.testing.assert_allclose(kind.matrix(kind.exp(vector)), expected, atol=1e-13)
@@ -144,7 +144,7 @@ def test_exp_is_scipys_and_log_takes_the_short_way(kind: Kind, seed: int, angle:
 
 @KINDS
 @given(seed=SEEDS, a=st.floats(-1.5, 1.5), b=st.floats(-1.5, 1.5))
-def test_turns_about_one_axis_add_up(kind: Kind, seed: int, a: float, b: float) -> None:
+def test_rotations_about_one_axis_add_up(kind: Kind, seed: int, a: float, b: float) -> None:
     axis = direction(seed)
     np.testing.assert_allclose(
         kind.product(kind.exp(a * axis), kind.exp(b * axis)), kind.exp((a + b) * axis), atol=1e-14
@@ -163,7 +163,7 @@ def test_compiled_functions_agree_with_numpy(seed: int, angle: float) -> None:
 
 
 @given(seed=SEEDS, angle=ANGLES)
-def test_a_matrix_leads_back_to_its_quaternion(seed: int, angle: float) -> None:
+def test_the_matrix_of_a_quaternion_gives_the_quaternion(seed: int, angle: float) -> None:
     for q in (normalised(quaternions(seed, 1)[0]), normalised(quaternion_exp(angle * direction(seed)))):
         back = quaternion_from_matrix(rotation_matrix(q))
         assert min(np.abs(back - q).max(), np.abs(back + q).max()) < 1e-7

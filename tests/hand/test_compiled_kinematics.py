@@ -1,4 +1,4 @@
-"""The compiled kinematics, held to the reference in plain numpy."""
+"""The compiled kinematics agree with the reference in plain numpy."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) ->
     pose, model = random_pose(rng), HandModel(shape)
     bodies, T = BodyPoses.at(Chain.of(shape), pose), reference_transforms(Chain.of(shape), pose)
     np.testing.assert_allclose(bodies.T, T[:, :3], atol=1e-12)
-    # A point of each body moves with each angle as its hinge says.
+    # A point of each body moves with each angle about the angle's axis.
     points = np.einsum("bij,j->bi", T[:, :3, :3], rng.normal(0, 0.02, 3)) + T[:, :3, 3]
     J = model.point_jacobian(pose, np.arange(16), points)[:, :, 6:]
     for angle in range(20):
@@ -33,7 +33,7 @@ def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) ->
 
 
 @given(seed=SEEDS, length=st.floats(0.1, 10))
-def test_batches_are_placed_as_single_poses_and_as_the_reference(seed: int, length: float) -> None:
+def test_batches_agree_with_single_poses_and_the_reference(seed: int, length: float) -> None:
     shape, rng = HandShape(scale=0.9), np.random.default_rng(seed)
     poses = np.stack([random_pose(rng) for _ in range(6)]).reshape(2, 3, 27)
     model, scaled = HandModel(shape), poses.copy()

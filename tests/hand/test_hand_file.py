@@ -1,4 +1,4 @@
-"""Hands from files: sizes, rigs, and hand files that refer to a rig."""
+"""Reading of hand files, rigs, and hand files that refer to a rig."""
 
 import json
 import shutil
@@ -32,7 +32,7 @@ def test_a_rig_and_its_hand_file_are_the_same_hand(rig: Path) -> None:
     assert Skin.of(load_hand(file)) is Skin.of(hand)
 
 
-def test_a_relative_path_is_looked_up_beside_the_hand_file(rig: Path) -> None:
+def test_a_relative_path_starts_at_the_hand_file(rig: Path) -> None:
     hand, file = load_hand(rig), rig.with_name("hand.json")
     fields = json.loads(hand.to_json())
     fields["rig"]["path"] = "hand.glb"
@@ -41,7 +41,7 @@ def test_a_relative_path_is_looked_up_beside_the_hand_file(rig: Path) -> None:
 
 
 def test_the_joints_are_the_rigs_own(rig: Path) -> None:
-    """A rig of the average hand: each finger has the joints of the hand that it was made from."""
+    """A rig exported from the average hand has that hand's joints."""
     straight = make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20))
     fingers = [HandModel(hand).keypoints(straight)[1:].reshape(5, 4, 3) for hand in (HandShape(), load_hand(rig))]
     ours, theirs = (np.linalg.norm(np.diff(joints, axis=1), axis=-1) for joints in fingers)
@@ -59,7 +59,7 @@ def test_scale_and_side_change_the_mesh(rig: Path) -> None:
     assert tips.max() < 2e-3
 
 
-def test_a_rig_that_changed_or_is_gone_is_refused(rig: Path) -> None:
+def test_a_changed_or_missing_rig_is_rejected(rig: Path) -> None:
     hand = load_hand(rig)
     rig.write_bytes(rig.read_bytes().replace(b"depthtrack", b"othertrack"))
     with pytest.raises(InputError, match="must have the SHA-256"):
@@ -69,7 +69,7 @@ def test_a_rig_that_changed_or_is_gone_is_refused(rig: Path) -> None:
         Skin.of(hand.with_(scale=1.02))
 
 
-def test_other_sizes_than_the_rigs_are_refused(rig: Path) -> None:
+def test_other_sizes_than_the_rigs_are_rejected(rig: Path) -> None:
     hand = load_hand(rig)
     with pytest.raises(InputError, match="only scale and side may differ"):
         Skin.of(hand.with_(palm_length=0.1))

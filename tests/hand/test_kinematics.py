@@ -1,4 +1,4 @@
-"""Kinematics: both sides, batches, and derivatives against finite differences."""
+"""Kinematics of both sides and batches; Jacobians agree with finite differences."""
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ def test_endpoints_and_joints_agree_with_the_transforms(seed: int) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_signs_of_the_angles(side: Side) -> None:
-    """Flexion brings a fingertip towards the palm's side; abduction leans it towards the thumb."""
+    """Flexion moves a fingertip to the palmar side; abduction moves it towards the thumb."""
     model = HandModel(HandShape(side=side))
     at_rest = model.endpoints(make_pose(np.zeros(3), [1, 0, 0, 0], np.zeros(20)))
     tip = {name: at_rest[ENDPOINT_NAMES.index(f"{name}_tip")] for name in ("thumb", "index")}
@@ -108,7 +108,7 @@ def test_moves_names_the_ancestors() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_within_limits_moves_to_the_nearest_point(seed: int) -> None:
+def test_within_limits_clips_to_the_range(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pose = make_pose(rng.normal(size=3), rng.normal(size=4), rng.uniform(-3, 3, 20))
     nearest = within_limits(pose)

@@ -1,4 +1,4 @@
-"""Hand sizes: the JSON file, its checks, and what a size changes."""
+"""Hand sizes: the JSON file, its checks, and published anthropometry."""
 
 import json
 from pathlib import Path
@@ -33,7 +33,7 @@ def test_json_round_trip(tmp_path_factory: pytest.TempPathFactory, scale: float,
 
 
 def test_sizes_agree_with_published_anthropometry() -> None:
-    """Adult means, sexes averaged: hand length 183 mm, breadth at the knuckles 84 mm (Greiner 1991), within 5 %."""
+    """Adult means of both sexes within 5 %: length 183 mm, knuckle breadth 84 mm (Greiner 1991)."""
     points = HandModel(HandShape()).keypoints(REST)
     assert np.linalg.norm(points[12] - points[0]) == pytest.approx(0.183, rel=0.05)
     shape = HandShape()
@@ -65,7 +65,7 @@ def test_limits_are_ranges_that_hold_the_rest_pose() -> None:
         ({"scale": "wide"}, "cannot read"),
     ],
 )
-def test_bad_files_are_refused_by_name(tmp_path: Path, change: dict[str, object], message: str) -> None:
+def test_bad_files_are_rejected_by_name(tmp_path: Path, change: dict[str, object], message: str) -> None:
     fields = {**json.loads(HandShape().to_json()), **change}
     path = tmp_path / "hand.json"
     path.write_text(json.dumps(fields))
@@ -74,7 +74,7 @@ def test_bad_files_are_refused_by_name(tmp_path: Path, change: dict[str, object]
     assert "hand.json" in str(caught.value)
 
 
-def test_metres_instead_of_millimetres_are_noticed(tmp_path: Path) -> None:
+def test_metres_instead_of_millimetres_are_rejected(tmp_path: Path) -> None:
     fields = json.loads(HandShape().to_json())
     for finger in fields["fingers"].values():
         finger["lengths_mm"] = [x / 1000 for x in finger["lengths_mm"]]

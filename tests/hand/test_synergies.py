@@ -1,4 +1,4 @@
-"""Synergies: what principal components promise, their file, the command, and the sets that come along."""
+"""Synergies: properties of principal components, their file, the command and bundled sets."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def postures(seed: int, count: int = 200, kinds: int = 20) -> np.ndarray:
-    """(count, 20) radians: random mixtures of `kinds` patterns, of falling size."""
+    """Return random mixtures (count, 20), radians, of `kinds` patterns of decreasing size."""
     rng = np.random.default_rng(seed)
     mixtures = rng.normal(size=(count, kinds)) * 0.6 ** np.arange(kinds)
     return np.asarray(rng.normal(size=20) * 0.2 + mixtures @ rng.normal(size=(kinds, 20)) * 0.2)
@@ -50,7 +50,7 @@ def test_variances_are_those_of_the_coefficients_and_add_up(seed: int) -> None:
 
 @given(seed=SEEDS)
 def test_no_other_directions_lose_less(seed: int) -> None:
-    """The first k components leave the least error of all k-dimensional planes through the mean (Eckart, Young)."""
+    """The first k components have the least error of all k-dimensional planes (Eckart, Young)."""
     X, rng = postures(seed), np.random.default_rng(seed)
     synergies = Synergies.fit(X).truncated(3)
     least = np.sum((synergies.angles(synergies.project(X)) - X) ** 2)
@@ -91,7 +91,7 @@ def test_batches_and_single_postures_agree() -> None:
     )
 
 
-def test_what_is_no_set_of_postures_is_refused() -> None:
+def test_arrays_that_are_not_postures_are_rejected() -> None:
     for bad, reason in (
         (np.zeros((5, 19)), "20 finite angles"),
         (np.full((5, 20), np.nan), "20 finite angles"),
@@ -103,7 +103,9 @@ def test_what_is_no_set_of_postures_is_refused() -> None:
 
 
 @given(seed=SEEDS, kept=st.integers(1, 20), spread=st.sampled_from([1e-4, 1.0]))
-def test_the_file_tells_the_same(tmp_path_factory: pytest.TempPathFactory, seed: int, kept: int, spread: float) -> None:
+def test_the_file_round_trip_keeps_the_synergies(
+    tmp_path_factory: pytest.TempPathFactory, seed: int, kept: int, spread: float
+) -> None:
     path = tmp_path_factory.mktemp("synergies") / "set.json"
     synergies = Synergies.fit(postures(seed) * spread, 'a "quoted" source\n').truncated(kept)
     save_synergies(synergies, path)
@@ -116,7 +118,7 @@ def test_the_file_tells_the_same(tmp_path_factory: pytest.TempPathFactory, seed:
     assert [file.name for file in path.parent.iterdir()] == ["set.json"]
 
 
-def test_a_file_that_does_not_fit_together_is_refused(tmp_path: Path) -> None:
+def test_an_inconsistent_file_is_rejected(tmp_path: Path) -> None:
     good = json.loads(Synergies.fit(postures(5)).truncated(3).to_json())
     path = tmp_path / "set.json"
 
@@ -129,11 +131,11 @@ def test_a_file_that_does_not_fit_together_is_refused(tmp_path: Path) -> None:
             load_synergies(path)
 
     refuses({"components": []}, "1 to 20 components")
-    refuses({"components": good["components"][:1] * 2}, "orthogonal")
-    refuses({}, "orthogonal", component={"thumb": [5, 0, 0, 0]})
+    refuses({"components": good["components"][:1] * 2}, "orthonormal")
+    refuses({}, "orthonormal", component={"thumb": [5, 0, 0, 0]})
     refuses({}, "four angles", component={finger: [0, 0, 1] for finger in FINGERS})
-    refuses({}, "no lower limit", component={"lower_deg": 2, "upper_deg": 1})
-    refuses({}, "descend", component={"standard_deviation_deg": 0.001})
+    refuses({}, "at most the upper ones", component={"lower_deg": 2, "upper_deg": 1})
+    refuses({}, "descending", component={"standard_deviation_deg": 0.001})
     refuses({"total_standard_deviation_deg": 0.1}, "total variance")
     refuses({"total_standard_deviation_deg": float("nan")}, "JSON has no NaN")
     refuses({}, "finite|cannot read", component={"upper_deg": 10**400})
@@ -151,7 +153,7 @@ def test_a_file_that_does_not_fit_together_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", synergy_names())
-def test_the_sets_that_come_along_are_sound_and_name_their_source(name: str) -> None:
+def test_bundled_sets_are_valid_and_name_their_source(name: str) -> None:
     synergies = load_synergies(name)
     assert len(synergies) == 20
     assert "Apache-2.0" in synergies.source
@@ -163,8 +165,8 @@ def test_the_sets_that_come_along_are_sound_and_name_their_source(name: str) -> 
     assert np.all(synergies.components[flexions, 0] > 0)
 
 
-def test_the_sets_cover_what_their_readme_says() -> None:
-    """And as much as the paper's: 80 % with 3 and 90 % with 6 components; 90 % with 3 on grasps."""
+def test_bundled_sets_cover_the_variance_of_their_readme() -> None:
+    """The shares are the paper's: 80 % with 3 and 90 % with 6 components; 90 % with 3 on grasps."""
     varied, grasps = load_synergies(), load_synergies("leap-grasps")
     assert [varied.variance_share(3), varied.variance_share(6)] == pytest.approx([0.868, 0.943], abs=5e-4)
     assert [grasps.variance_share(3), grasps.variance_share(6)] == pytest.approx([0.929, 0.990], abs=5e-4)
@@ -176,7 +178,7 @@ def write_table(path: Path, angles: np.ndarray) -> None:
     path.write_text("\n".join(rows))
 
 
-def test_fitting_and_telling_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_fits_and_prints_synergies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     X = postures(6)
     for name, half in (("a", X[:100]), ("b", X[100:])):
         write_table(tmp_path / f"{name}.csv", half)
@@ -212,7 +214,7 @@ def test_the_picture_shows_a_hand_that_closes(tmp_path: Path, capsys: pytest.Cap
     assert "wrote the picture" in capsys.readouterr().out
     page = cv2.imread(str(path))
     assert page is not None
-    # The hand, brighter than its ground, reaches less far up from one deviation to the next.
+    # The hand, brighter than the background, becomes shorter from one deviation to the next.
     bright = (page.max(axis=2) > 100)[120:-30]
     columns = np.array_split(bright[:, 200:], 5, axis=1)
     heights = [np.ptp(np.flatnonzero(column.sum(axis=1) > 3)) for column in columns]
@@ -229,7 +231,7 @@ def test_the_picture_shows_a_hand_that_closes(tmp_path: Path, capsys: pytest.Cap
         ["info", "leap", "--picture", "set.png", "--components", "21"],
     ],
 )
-def test_mistakes_end_in_one_sentence(
+def test_errors_are_one_sentence(
     arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Every vector operation of compiled kernels against numpy, lane by lane."""
+"""Every vector operation of compiled kernels agrees with numpy, lane by lane."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +18,7 @@ VECTORS = [pytest.param(vector, id=f"{vector.element}x{vector.lanes}") for vecto
 
 
 def numbers(vector: Vector, seed: int, count: int) -> Lanes:
-    """(count, lanes) numbers of both signs, some equal to each other, some 0."""
+    """Return numbers (count, lanes) of both signs, some equal to each other, some 0."""
     values = np.random.default_rng(seed).normal(scale=10, size=(count, vector.lanes)).astype(str(vector.element))
     values[:, 1] = 0
     values[:, 2] = values[0, 2]
@@ -26,14 +26,14 @@ def numbers(vector: Vector, seed: int, count: int) -> Lanes:
 
 
 def results(vector: Vector, calculate: Callable[..., None], count: int, *operands: Lanes) -> Lanes:
-    """What a compiled function stores: (count, lanes)."""
+    """Return the numbers (count, lanes) that a compiled function stores."""
     out = np.full(count * vector.lanes, np.nan, str(vector.element))
     calculate(out, *operands)
     return out.reshape(count, vector.lanes)
 
 
 @pytest.mark.parametrize("vector", VECTORS)
-def test_arithmetic_is_rounded_as_numpy_rounds_it(vector: Vector) -> None:
+def test_arithmetic_is_rounded_like_numpys(vector: Vector) -> None:
     load, n = loader(vector), vector.lanes
 
     @numba.njit
@@ -84,7 +84,7 @@ def test_comparisons_make_masks_that_combine_and_select(vector: Vector) -> None:
 
 
 @pytest.mark.parametrize("vector", VECTORS)
-def test_what_goes_across_lanes(vector: Vector) -> None:
+def test_operations_across_lanes(vector: Vector) -> None:
     load, half = loader(vector), vector.lanes // 2
 
     @numba.njit
@@ -119,7 +119,7 @@ def test_the_larger_lane_is_never_nan_unless_the_second_is(vector: Vector) -> No
     np.testing.assert_array_equal(results(vector, calculate, 1, x, y), [expected])
 
 
-def test_estimates_are_good_enough_for_one_newton_step() -> None:
+def test_estimates_are_accurate_enough_for_one_newton_step() -> None:
     load = loader(F32X16)
 
     @numba.njit
@@ -133,7 +133,7 @@ def test_estimates_are_good_enough_for_one_newton_step() -> None:
         reciprocal, reciprocal_sqrt = results(F32X16, calculate, 2, x)
         np.testing.assert_allclose(reciprocal * x, 1, rtol=2**-11)
         np.testing.assert_allclose(reciprocal_sqrt * np.sqrt(x), 1, rtol=2**-11)
-    # Where there is no root, the kernel relies on NaN, and on infinity at 0.
+    # The kernel relies on NaN if there is no root, and on infinity at 0.
     x[:4] = -1, -1e-30, 0, 0
     reciprocal, reciprocal_sqrt = results(F32X16, calculate, 2, x)
     assert np.isnan(reciprocal_sqrt[:2]).all()

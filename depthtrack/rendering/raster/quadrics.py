@@ -58,7 +58,7 @@ def _bound(focal, principal, size, c, cz, s_cc, s_cz, s_zz):
 
 @kernel_part
 def span(size, low_a, high_a, za, low_b, high_b, zb):
-    """Return the pixels (low, high) of two ends together, all if z = 0 is between them."""
+    """Return the pixels (low, high) of two ends together; all if z = 0 is between them."""
     across = za * zb < 0.0
     low, high = vmin(low_a, low_b), vmax(high_a, high_b)
     return select(across, 0.0, low), select(across, size - 1.0, high)
@@ -66,7 +66,7 @@ def span(size, low_a, high_a, za, low_b, high_b, zb):
 
 @kernel_part
 def _write(table, slot, camera, bounds, q, G, C):
-    """Write the coefficients of A = d^T G d, -B = d.q and C; return their origin, a pixel (u, v).
+    """Write the coefficients of A = d^T G d, -B = d.q, C; return their origin, a pixel (u, v).
 
     bounds: (u_low, u_high, v_low, v_high), pixels; G: symmetric, as (xx, yy, zz, xy, xz, yz).
     C vanishes if the optical centre lies on the surface; a floor avoids the division by zero.

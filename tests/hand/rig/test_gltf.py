@@ -41,8 +41,8 @@ def test_text_files_with_inline_or_neighbouring_buffers(own_glb: Path, tmp_path:
 
 
 @pytest.mark.parametrize("given", [True, False])
-def test_without_inverse_bind_matrices_the_nodes_place_the_mesh(own_glb: Path, tmp_path: Path, given: bool) -> None:
-    """By the standard they are the identity: vertices are then in the frames of their joints."""
+def test_without_inverse_bind_matrices_the_nodes_define_the_mesh(own_glb: Path, tmp_path: Path, given: bool) -> None:
+    """The standard's default is the identity: vertices are in the frames of their joints."""
     rig = next(read_rigs(own_glb))
     strongest = rig.bound[np.arange(len(rig.bound)), rig.weights.argmax(axis=1)]
     names = list(rig.names)
@@ -123,7 +123,7 @@ def test_unusable_files_get_one_sentence(own_glb: Path, tmp_path: Path, spoil: A
     assert str(path) in str(caught.value)
 
 
-def test_buffers_outside_the_folder_are_refused(own_glb: Path, tmp_path: Path) -> None:
+def test_buffers_outside_the_folder_are_rejected(own_glb: Path, tmp_path: Path) -> None:
     document, binary = parts(own_glb)
     (tmp_path / "outside.bin").write_bytes(binary)
     (tmp_path / "rig").mkdir()
@@ -136,8 +136,8 @@ def test_buffers_outside_the_folder_are_refused(own_glb: Path, tmp_path: Path) -
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_damage_never_ends_in_a_traceback(own_glb: Path, tmp_path: Path, data: st.DataObject) -> None:
-    """Cut anywhere, or with any number or name of its description replaced: read, or refused with a sentence."""
+def test_a_damaged_file_is_read_or_rejected_in_a_sentence(own_glb: Path, tmp_path: Path, data: st.DataObject) -> None:
+    """The damage truncates the file, or replaces a number or name of its JSON."""
     path = tmp_path / "damaged.gltf"
     if data.draw(st.booleans()):
         whole = own_glb.read_bytes()

@@ -1,4 +1,4 @@
-"""Rigged hands from glTF files: our own skins come back the same, and rigs of other programs fit."""
+"""Rigged hands from glTF files: exported skins read back equal, and rigs of other programs."""
 
 import json
 from pathlib import Path
@@ -26,8 +26,8 @@ FIST = np.radians([(12, 22, 45, 45), (4, 80, 100, 60), (0, 85, 100, 60), (-4, 85
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_our_own_skin_comes_back_in_every_pose(tmp_path: Path, side: Side) -> None:
-    """Exported and read again, both meshes lie on each other in a fist somewhere in space."""
+def test_an_exported_skin_reads_back_equal_in_every_pose(tmp_path: Path, side: Side) -> None:
+    """Both meshes coincide in a fist at a random position and orientation."""
     shape = DEFAULT.with_(side=side, scale=1.1)
     skin, path = Skin.of(shape), tmp_path / "hand.glb"
     export_glb(skin, path)
@@ -39,7 +39,7 @@ def test_our_own_skin_comes_back_in_every_pose(tmp_path: Path, side: Side) -> No
     for name in ("palm_breadth", "palm_length", "palm_thickness", "wrist_breadth", "wrist_thickness"):
         assert getattr(again.shape, name) == pytest.approx(getattr(shape, name) * 1.1, rel=0.2)
 
-    # Its palm frame points y at the middle knuckle, so it is turned a little, and its abductions count from there.
+    # The rig's palm frame has y towards the middle knuckle, so it is rotated, and abductions count from there.
     knuckle = shape.bases[2] - HandShape().wrist
     turn = np.arctan2(knuckle[0], knuckle[1])
     c, s = np.cos(turn), np.sin(turn) * shape.mirror
@@ -57,8 +57,8 @@ def test_our_own_skin_comes_back_in_every_pose(tmp_path: Path, side: Side) -> No
     assert again.to_trimesh(theirs).volume == pytest.approx(skin.to_trimesh(ours).volume, rel=1e-4)
 
 
-def test_unknown_names_are_mapped_by_a_file_beside_the_rig(own_glb: Path, tmp_path: Path) -> None:
-    """Joints called bone0, bone1, ...; the side shows in the bend of the fingers."""
+def test_a_file_beside_the_rig_maps_unknown_names(own_glb: Path, tmp_path: Path) -> None:
+    """Joints have the names bone0, bone1, ...; the bend of the fingers gives the side."""
     document, binary = parts(own_glb)
     names = {name: f"bone{n}" for n, name in enumerate(JOINT_NAMES)}
     for node in document["nodes"]:
@@ -98,7 +98,7 @@ def test_other_units_are_recognised_by_the_size_of_a_hand(
         read_rigged_hand(path, unit=3 * unit)
 
 
-def test_a_mirrored_node_makes_the_other_hand(own_glb: Path, tmp_path: Path) -> None:
+def test_a_mirrored_node_gives_the_other_side(own_glb: Path, tmp_path: Path) -> None:
     document, binary = parts(own_glb)
     document["nodes"].append({"name": "root", "children": [0], "scale": [-1, 1, 1]})
     left, right = load_skin(write_gltf(tmp_path / "mirrored.gltf", document, binary)), load_skin(own_glb)
@@ -127,7 +127,7 @@ def test_an_open_wrist_is_closed(own_glb: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("letter", ["R", "L"])
 def test_a_makehuman_hand(real_data: Path, tmp_path: Path, letter: str) -> None:
-    """A CC0 mesh made by others: names, metacarpals, eight influences a vertex, decimetres, an open wrist."""
+    """A CC0 mesh has metacarpals, eight influences a vertex, decimetres and an open wrist."""
     with np.load(real_data / "meshes" / "makehuman-hand" / f"hand_{letter}.npz") as hand:
         heads, tails, names = hand["head"] * 0.1, hand["tail"] * 0.1, [str(name) for name in hand["bones"]]
     path = write_makehuman_rig(tmp_path / "hand.glb", real_data, letter)
@@ -136,7 +136,7 @@ def test_a_makehuman_hand(real_data: Path, tmp_path: Path, letter: str) -> None:
     phalanges = [[names.index(f"finger{f}-{k}.{letter}") for k in (1, 2, 3)] for f in range(1, 6)]
     bones = np.linalg.norm(tails - heads, axis=-1)[phalanges]
     np.testing.assert_allclose(skin.shape.lengths[:, :2], bones[:, :2], rtol=0, atol=0.5e-3)
-    # Bones end inside the fingertip, our last length reaches its skin.
+    # Its bones end inside the fingertip; our last length ends at its skin.
     assert np.all((skin.shape.lengths[:, 2] - bones[:, 2] > -1e-3) & (skin.shape.lengths[:, 2] - bones[:, 2] < 8e-3))
 
     model = HandModel(skin.shape)
@@ -148,7 +148,7 @@ def test_a_makehuman_hand(real_data: Path, tmp_path: Path, letter: str) -> None:
     for finger in range(1, 5):
         joint = model.joints(fist)[body_of(finger, 1)]
         assert np.linalg.norm(vertices - joint, axis=-1).min() > 0.6 * skin.shape.radii[finger, 1]
-    # Our own flesh on the sizes measured there is about as large.
+    # The skin built from the measured sizes is about as large.
     assert skin.to_trimesh(skin.rest).is_watertight
     built = Skin.of(skin.shape.with_(rig=None))
     straight = make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20))
@@ -156,7 +156,7 @@ def test_a_makehuman_hand(real_data: Path, tmp_path: Path, letter: str) -> None:
 
 
 def test_only_the_hand_of_a_body_is_kept(own_glb: Path, tmp_path: Path) -> None:
-    """A forearm bone above the wrist, with skin of its own, stays behind."""
+    """The skin of a forearm bone above the wrist is removed."""
     skin = Skin.of(DEFAULT)
     rig = next(read_rigs(own_glb))
     weights = np.zeros((len(rig.vertices), 17))

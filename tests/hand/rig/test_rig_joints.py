@@ -34,7 +34,7 @@ def test_other_bones_are_no_fingers(name: str) -> None:
 
 
 def test_metacarpals_tips_and_flat_hierarchies() -> None:
-    """WebXR's 25 joints with no tree at all: words order each finger, metacarpals and tips fall away."""
+    """Names order WebXR's 25 joints without a tree; metacarpals and tips are left out."""
     words = ("tip", "phalanx-distal", "phalanx-intermediate", "phalanx-proximal", "metacarpal")
     fingers = ("thumb", "index-finger", "middle-finger", "ring-finger", "pinky-finger")
     names = [f"{f}-{w}" for f in fingers for w in words if (f, w) != ("thumb", "phalanx-intermediate")] + ["wrist"]
@@ -44,7 +44,7 @@ def test_metacarpals_tips_and_flat_hierarchies() -> None:
 
 
 def test_anatomical_names_order_a_flat_rig() -> None:
-    """MediaPipe's landmarks as joints, in any order."""
+    """MediaPipe's landmarks are joints in any order."""
     fingers = {
         "THUMB": ("CMC", "MCP", "IP"),
         **dict.fromkeys(("INDEX_FINGER", "MIDDLE_FINGER", "RING_FINGER", "PINKY"), ("MCP", "PIP", "DIP")),
@@ -54,7 +54,7 @@ def test_anatomical_names_order_a_flat_rig() -> None:
     assert [[names[j] for j in row] for row in found] == [[f"{f}_{j}" for j in js] for f, js in fingers.items()]
 
 
-def test_unloaded_fourth_joints_are_tips_and_sides_are_kept_apart() -> None:
+def test_fourth_joints_without_weights_are_tips_and_sides_do_not_mix() -> None:
     names = [f"{side}Hand{f.title()}{k}" for side in ("Left", "Right") for f in FINGERS for k in (1, 2, 3, 4)]
     parents = np.array([n - 1 if n % 4 else -1 for n in range(len(names))])
     loads = np.array([0.0 if n % 4 == 3 else 1.0 for n in range(len(names))])

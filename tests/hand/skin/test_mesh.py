@@ -1,4 +1,4 @@
-"""The skinned mesh: closed for any hand, faithful to its sizes, and whole in extreme postures."""
+"""The skinned mesh is closed, has the hand's sizes, and keeps its shape in extreme postures."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def posed(angles: Array) -> Array:
 
 
 def varied(seed: int, side: str = "right") -> HandShape:
-    """Sizes about as far from the default as people are, and somewhat further."""
+    """Return sizes that differ from the default slightly more than people's do."""
     rng = np.random.default_rng(seed)
     return DEFAULT.with_(
         side=side,
@@ -46,7 +46,7 @@ def varied(seed: int, side: str = "right") -> HandShape:
 
 @settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), side=st.sampled_from(["right", "left"]))
-def test_closed_with_fingertips_and_wrist_where_the_sizes_say(seed: int, side: str) -> None:
+def test_the_mesh_is_closed_and_has_the_sizes_of_the_hand(seed: int, side: str) -> None:
     shape = varied(seed, side)
     skin = Skin.of(shape)
     mesh = skin.to_trimesh(skin.rest)
@@ -67,7 +67,7 @@ def test_weights_are_convex_and_stay_on_their_finger() -> None:
     assert skin.weights.min() >= 0
     np.testing.assert_allclose(skin.weights.sum(axis=-1), 1, rtol=0, atol=1e-12)
     by_finger = skin.weights[:, 1:].reshape(-1, 5, 3).sum(axis=-1)
-    # A web belongs to its two neighbours; nothing belongs to fingers further apart, and tips to one alone.
+    # A web follows its two adjacent fingers only, and a tip follows one finger.
     for finger in range(5):
         for other in range(finger + 2, 5):
             assert np.minimum(by_finger[:, finger], by_finger[:, other]).max() < 0.02
@@ -78,7 +78,7 @@ def test_weights_are_convex_and_stay_on_their_finger() -> None:
     assert skin.weights[np.argmin(skin.rest[:, 1]), 0] == 1
 
 
-def test_rest_pose_gives_the_rest_mesh_back() -> None:
+def test_the_rest_pose_gives_the_rest_mesh() -> None:
     skin = Skin.of(DEFAULT)
     np.testing.assert_allclose(skin.at(rest_pose(DEFAULT)), skin.rest, rtol=0, atol=1e-12)
 
@@ -99,7 +99,7 @@ def test_blending_agrees_with_the_plain_sum() -> None:
             np.testing.assert_allclose(vertices[pose, v], expected[:3], rtol=0, atol=1e-12)
 
 
-def test_normals_look_outward() -> None:
+def test_normals_point_outward() -> None:
     skin = Skin.of(DEFAULT)
     vertices = skin.at(np.stack([posed(np.zeros(20)), posed(SPLAYED)]))
     normals = skin.normals(vertices)
@@ -135,7 +135,7 @@ def test_left_hand_mirrors_the_right() -> None:
 def test_every_size_changes_the_mesh(
     changes: dict[str, object], body: int, direction: tuple[int, int, int], where: tuple[float, float]
 ) -> None:
-    """A body's flesh reaches a millimetre further in the direction that its size is about, at heights y `where`."""
+    """The skin moves by a millimetre in the direction of the size, at heights y of `where`."""
 
     def reach(skin: Skin) -> float:
         vertices = skin.at(posed(np.zeros(20)))
@@ -146,13 +146,13 @@ def test_every_size_changes_the_mesh(
 
 
 @pytest.mark.parametrize("name", EXTREMES)
-def test_extreme_postures_stay_whole(name: str) -> None:
+def test_extreme_postures_keep_the_volume(name: str) -> None:
     skin, model = Skin.of(DEFAULT), HandModel(DEFAULT)
     transforms = model.transforms(posed(EXTREMES[name]))
     vertices = skin.vertices(transforms)
     volume = skin.to_trimesh(vertices).volume / skin.to_trimesh(skin.rest).volume
     assert 0.94 < volume < 1.06
-    # A face is turned inside out when it opposes the blend of the rotations that carry it: folds at creases only.
+    # A face is inverted if its normal opposes its blended rotation, which only folds at creases may do.
     carried = np.einsum(
         "fb,bij->fij", skin.weights[skin.faces].mean(axis=1), (transforms @ skin.T_body_rest)[:, :3, :3]
     )
@@ -170,7 +170,7 @@ def _edges(skin: Skin, vertices: Array) -> tuple[Array, Array]:
 
 
 def test_bent_joints_keep_their_thickness() -> None:
-    """No candy wrapper: in a fist the skin stays at least 0.8 radii away from the middle joints of the fingers."""
+    """In a fist the skin stays 0.8 radii or more from the middle joints (no candy wrapper)."""
     skin, model = Skin.of(DEFAULT), HandModel(DEFAULT)
     vertices, joints = skin.at(posed(FIST)), model.joints(posed(FIST))
     for finger in range(1, 5):
@@ -180,7 +180,7 @@ def test_bent_joints_keep_their_thickness() -> None:
 
 @pytest.mark.parametrize(("angles", "mean_mm", "p95_mm"), [(SPLAYED, 1.2, 4.5), (FIST, 1.2, 4.5)])
 def test_skin_and_primitives_agree(angles: Array, mean_mm: float, p95_mm: float) -> None:
-    """Distance from the primitives' visible surface to the skin; the palm's square wrist corners differ most."""
+    """The primitives lie close to the skin; the palm's corners at the wrist differ most."""
     skin, model, primitives = Skin.of(DEFAULT), HandModel(DEFAULT), Primitives.of(DEFAULT)
     transforms = model.transforms(posed(angles))
     surface = _visible_surface(primitives, primitives.transforms(transforms))
@@ -192,7 +192,7 @@ def test_skin_and_primitives_agree(angles: Array, mean_mm: float, p95_mm: float)
 
 
 def _visible_surface(primitives: Primitives, T_palm_unit: Array) -> Array:
-    """Points of every primitive's surface that lie inside no other one."""
+    """Return points of the primitives' surfaces that lie outside all other primitives."""
     rng = np.random.default_rng(0)
     points, owners = [], []
     for n, (kind, T) in enumerate(zip(primitives.kinds, T_palm_unit, strict=True)):
@@ -216,7 +216,7 @@ def _visible_surface(primitives: Primitives, T_palm_unit: Array) -> Array:
     return np.asarray(surface[free])
 
 
-def test_impossible_flesh_is_refused() -> None:
+def test_sizes_without_a_closed_skin_are_rejected() -> None:
     with pytest.raises(InputError, match="five free fingers"):
         Skin.of(DEFAULT.with_(radii=DEFAULT.radii * 0.02))
 
