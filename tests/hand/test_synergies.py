@@ -197,11 +197,11 @@ def test_the_command_fits_and_prints_synergies(tmp_path: Path, capsys: pytest.Ca
     np.testing.assert_allclose(fields["mean"], expected.mean, atol=1e-8)
 
 
-def test_angles_can_be_kept_within_the_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_angles_can_be_clipped_to_the_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_table(tmp_path / "wild.csv", 4 * postures(7) / np.abs(postures(7)).max() * 0.75)
     out = tmp_path / "set.json"
     assert main(["synergies", "fit", str(tmp_path / "wild.csv"), "-o", str(out), "--within-limits"]) == 0
-    assert "moved there" in capsys.readouterr().out
+    assert "clipped" in capsys.readouterr().out
     mean = Synergies.from_json(out).mean
     assert np.all((mean >= LOWER) & (mean <= UPPER))
 

@@ -74,7 +74,7 @@ def test_absent_parts_are_reported_as_absent(info: Any, tmp_path: Path, capsys: 
         assert facts[thing] == 0
     assert main(["info", str(tmp_path / "bare")]) == 0
     text = capsys.readouterr().out
-    for line in ("frames         1\n", "no reading at all", "colour         none", "ground truth   none"):
+    for line in ("frames         1\n", "no reading; in steps of", "colour         none", "ground truth   none"):
         assert line in text
 
 
