@@ -32,6 +32,13 @@ def true_poses(recording: Path) -> NDArray[np.float64]:
     return truth.poses
 
 
+def shifted(poses: NDArray[np.float64], mm: float, frames: slice = slice(None)) -> NDArray[np.float64]:
+    """Return poses whose endpoint errors are exactly `mm`."""
+    out = poses.copy()
+    out[frames, 0] += mm / 1000
+    return out
+
+
 def write_run(
     folder: Path,
     recording: Path,

@@ -1,7 +1,6 @@
 """Synthetic recordings: exact ground truth, reproducible bytes and all options."""
 
 import json
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +19,8 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording.sequences.tum import TumSequence
 from depthtrack.rendering.raycast import raycast
 from depthtrack.rendering.triangles import rasterise
-from depthtrack.synthesis.forearm import LARGEST_BEND, Forearm
-from depthtrack.synthesis.generate import Synthesis, Synthesiser, SyntheticFrame, write_recording
-from depthtrack.synthesis.painting import SkinTone
-from depthtrack.synthesis.randomness import Stream, generator
-from depthtrack.synthesis.viewpoint import VIEWPOINT_COUNT, Viewpoint
-
-
-def _made(**options: Any) -> Synthesiser:
-    return Synthesiser(Synthesis(**options))
+from depthtrack.synthesis.generate import Synthesiser, SyntheticFrame, write_recording
+from tests.support.synthesis import synthesiser
 
 
 def _bytes(folder: Path) -> dict[str, bytes]:
@@ -38,7 +30,7 @@ def _bytes(folder: Path) -> dict[str, bytes]:
 def test_the_same_options_give_the_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
     options: dict[str, Any] = {"motion": "random", "sensor": "kinect1", "background": "room", "frames": 5, "seed": 4}
     for name, threads, seed in (("one", 1, 4), ("three", 3, 4), ("other", 1, 5)):
-        write_recording(_made(**options | {"seed": seed}), tmp_path / name, threads=threads)
+        write_recording(synthesiser(**options | {"seed": seed}), tmp_path / name, threads=threads)
     one, three, other = (_bytes(tmp_path / name) for name in ("one", "three", "other"))
     assert len(one) > 5 * 4
     assert one == three
@@ -47,15 +39,15 @@ def test_the_same_options_give_the_same_bytes_for_any_number_of_threads(tmp_path
 
 def test_any_frame_can_be_synthesised_alone() -> None:
     options: dict[str, Any] = {"sensor": "realsense", "background": "wall", "depth_noise": 0.002, "skin_flips": 0.05}
-    in_order = list(_made(**options, frames=4).frames(threads=2))
-    alone = _made(**options)[3]
+    in_order = list(synthesiser(**options, frames=4).frames(threads=2))
+    alone = synthesiser(**options)[3]
     for name in ("depth", "colour", "mask", "skin", "exact_depth", "pose", "joints"):
         np.testing.assert_array_equal(getattr(in_order[3], name), getattr(alone, name))
 
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
 def test_ground_truth_is_that_of_the_hand_alone_except_for_occlusions(model: Any) -> None:
-    made = _made(model=model, background="room", seed=2)
+    made = synthesiser(model=model, background="room", seed=2)
     frame, camera, shape = made[300], made.sensor.camera, HandShape()
     transforms = HandModel(shape).transforms(frame.pose)
     if model == "primitives":
@@ -91,7 +83,7 @@ def _beyond_wrist(made: Synthesiser, frame: SyntheticFrame) -> tuple[Any, Any]:
 @pytest.mark.parametrize("model", ["primitives", "skin"])
 @pytest.mark.parametrize("index", [0, 100, 258, 340])
 def test_masks_of_all_hand_models_end_at_the_plane_of_the_wrist(model: Any, index: int) -> None:
-    made = _made(model=model, background="room", seed=2)
+    made = synthesiser(model=model, background="room", seed=2)
     frame = made[index]
     beyond, near = _beyond_wrist(made, frame)
     assert frame.mask[near & (beyond < 0)].all()
@@ -101,7 +93,7 @@ def test_masks_of_all_hand_models_end_at_the_plane_of_the_wrist(model: Any, inde
 
 @pytest.mark.parametrize("model", ["primitives", "skin"])
 def test_fingers_of_an_open_hand_project_into_its_mask(model: Any) -> None:
-    made = _made(model=model, background="wall")
+    made = synthesiser(model=model, background="wall")
     for index in (0, 30, 60):
         frame = made[index]
         near = cv2.dilate(frame.mask.astype(np.uint8), np.ones((7, 7), np.uint8))
@@ -110,7 +102,7 @@ def test_fingers_of_an_open_hand_project_into_its_mask(model: Any) -> None:
 
 
 def test_without_a_background_the_image_shows_the_hand_alone() -> None:
-    frame = _made()[0]
+    frame = synthesiser()[0]
     np.testing.assert_array_equal(frame.depth > 0, frame.mask)
     np.testing.assert_array_equal(frame.skin, frame.mask)
     assert np.all(frame.colour[~frame.mask] == 0)
@@ -118,8 +110,8 @@ def test_without_a_background_the_image_shows_the_hand_alone() -> None:
 
 
 def test_a_left_hand_gives_the_mirror_image() -> None:
-    right = _made(forearm=True, motion="grasp")[50]
-    left = _made(forearm=True, motion="grasp", hand=HandShape(side="left"))[50]
+    right = synthesiser(forearm=True, motion="grasp")[50]
+    left = synthesiser(forearm=True, motion="grasp", hand=HandShape(side="left"))[50]
     np.testing.assert_allclose(left.joints, right.joints * [-1, 1, 1], atol=1e-9)
     same = left.mask == right.mask[:, ::-1]
     assert np.sum(~same) <= 5  # pixels on an edge may show either surface
@@ -130,118 +122,8 @@ def test_a_left_hand_gives_the_mirror_image() -> None:
     assert np.quantile(apart, 0.999) < 5e-4
 
 
-def test_viewpoints_are_distinct_on_a_hemisphere_and_directed_at_the_hand() -> None:
-    views = [Viewpoint(n, 0.8) for n in range(VIEWPOINT_COUNT)]
-    assert len(views) == 8
-    positions = []
-    for view in views:
-        T = view.transform
-        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
-        assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
-        np.testing.assert_allclose(view.transform_points(np.zeros(3)), [0, 0, 0.8], atol=1e-12)
-        positions.append(-T[:3, :3].T @ T[:3, 3])
-    assert np.all(np.array(positions)[:, 2] < 0)  # all are on the frontal hemisphere
-    assert min(np.linalg.norm(a - b) for a, b in combinations(positions, 2)) > 2 * 0.8 * np.sin(np.radians(15))
-    np.testing.assert_allclose(views[0].transform[:3, :3], np.eye(3), atol=1e-12)
-
-
-def test_every_viewpoint_sees_the_same_hand_at_the_same_distance() -> None:
-    frames = [_made(viewpoint=n, distance=0.7)[100] for n in range(VIEWPOINT_COUNT)]
-    sizes = [np.linalg.norm(f.joints[:, None] - f.joints[None], axis=-1) for f in frames]
-    for frame, size in zip(frames, sizes, strict=True):
-        np.testing.assert_allclose(size, sizes[0], atol=1e-12)
-        assert np.linalg.norm(frame.pose[:3]) == pytest.approx(0.7, abs=0.05)
-        assert frame.mask.sum() > 2000
-
-
-def test_distance_and_scale_change_the_size_of_the_hand_in_the_image() -> None:
-    area = {d: _made(distance=d)[0].mask.sum() for d in (0.5, 1.0, 2.5)}
-    assert area[0.5] / area[1.0] == pytest.approx(4, rel=0.1)
-    assert area[0.5] / area[2.5] == pytest.approx(25, rel=0.1)
-    assert _made(hand=HandShape(scale=0.8))[0].mask.sum() / area[0.5] == pytest.approx(0.64, rel=0.1)
-
-
-@pytest.mark.parametrize("model", ["primitives", "skin"])
-@pytest.mark.parametrize("motion", ["everyday", "grasp", "random"])
-def test_the_forearm_is_skin_outside_the_mask_and_connected_to_the_hand(model: Any, motion: str) -> None:
-    made = _made(motion=motion, model=model, forearm=True, seed=1)
-    for index in range(0, len(made), 75):
-        frame = made[index]
-        forearm = frame.skin & ~frame.mask
-        assert forearm.sum() > 0.2 * frame.mask.sum()
-        pieces, _ = cv2.connectedComponents(frame.skin.astype(np.uint8))
-        assert pieces == 2  # background and one arm
-        # The forearm begins where the hand ends.
-        beside = forearm & (cv2.dilate(frame.mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
-        assert beside.any()
-
-
-def test_the_wrist_bends_towards_the_elbow_within_its_limit() -> None:
-    arm, palm = Forearm(HandShape()), np.eye(4)
-    straight, slightly, far = ([0, -0.3, 0.0], [0, -0.3, 0.05], [0, 0.0, 0.3])
-    assert np.linalg.norm(arm.bend(palm, np.array(straight))) == pytest.approx(0, abs=1e-9)
-    np.testing.assert_allclose(arm.bend(palm, np.array(slightly)), [np.arctan2(-0.05, 0.254), 0, 0], atol=0.01)
-    assert np.linalg.norm(arm.bend(palm, np.array(far))) < LARGEST_BEND
-    frame = arm.frame(palm, arm.bend(palm, np.array(far)))
-    np.testing.assert_allclose(frame[:3, :3] @ arm.shape.wrist + frame[:3, 3], arm.shape.wrist, atol=1e-12)
-
-
-@pytest.mark.parametrize("side", ["right", "left"])
-def test_the_forearm_is_a_closed_mesh_with_outward_normals(side: Any) -> None:
-    arm = Forearm(HandShape(side=side, scale=1.1))
-    vertices, normals = arm.mesh(np.eye(4), np.array([0.4, 0.1, -0.2]))
-    faces = np.sort(arm.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    assert np.all(np.unique(faces, axis=0, return_counts=True)[1] == 2)
-    a, b, c = (vertices[arm.faces[:, k]] for k in range(3))
-    of_faces = np.cross(b - a, c - a)
-    assert (
-        np.einsum("ij,ij->", a, of_faces) / 6 > 5e-4
-    )  # its volume exceeds half a litre, so faces are oriented outward
-    agree = np.einsum("fkj,fj->fk", normals[arm.faces], of_faces)
-    assert np.mean(agree > 0) > 0.99
-
-
-def test_a_room_is_cluttered_and_clearly_behind_the_hand() -> None:
-    frame = _made(background="room", distance=0.5, seed=6)[10]
-    arm = frame.skin & (frame.exact_depth < 1)
-    face = frame.skin & ~arm
-    behind = frame.exact_depth[~arm]
-    assert behind.min() > 0.5 + 0.8
-    assert behind.max() == pytest.approx(3.0)
-    assert len(np.unique(np.round(behind, 1))) > 8
-    # The bystander's face has a skin colour and is smaller than the hand.
-    assert 500 < face.sum() < frame.mask.sum()
-    hue = cv2.cvtColor(frame.colour, cv2.COLOR_RGB2HSV)[..., 0]
-    assert abs(float(np.median(hue[face])) - float(np.median(hue[frame.mask]))) < 8
-
-
-def test_skin_varies_between_people_and_over_the_hand() -> None:
-    tones = np.array([SkinTone.sample(generator(seed, 0, Stream.SKIN)).back for seed in range(200)])
-    luminance = tones @ [0.2126, 0.7152, 0.0722]
-    assert luminance.min() < 0.13
-    assert luminance.max() > 0.35
-    assert np.all(tones[:, 0] > tones[:, 1])
-    assert np.all(tones[:, 1] > tones[:, 2])
-    frame = _made(sensor="ideal", seed=1)[0]
-    assert np.all(frame.colour[frame.mask].std(axis=0) > 3)
-    assert np.all(SkinTone.sample(generator(9, 0, Stream.SKIN)).palm >= tones[9] - 0.02)
-
-
-@pytest.mark.parametrize("share", [0.05, 0.3])
-def test_skin_flips_change_that_share_of_labels_and_their_colours(share: float) -> None:
-    clean, flipped = _made(background="wall")[40], _made(background="wall", skin_flips=share)[40]
-    changed = clean.skin ^ flipped.skin
-    assert changed.mean() == pytest.approx(share, abs=0.005)
-    assert changed[clean.skin].mean() == pytest.approx(share, abs=0.02)
-    np.testing.assert_array_equal(np.any(clean.colour != flipped.colour, axis=-1), changed)
-    np.testing.assert_array_equal(clean.mask, flipped.mask)
-    redness = flipped.colour[..., 0].astype(int) - flipped.colour[..., 2]
-    assert np.mean(redness[flipped.skin & changed] > 10) > 0.99
-    assert np.mean(redness[~flipped.skin & changed] < 10) > 0.99
-
-
 def test_depth_noise_is_added_to_the_sensor_reading() -> None:
-    clean, noisy = _made()[40], _made(depth_noise=0.01)[40]
+    clean, noisy = synthesiser()[40], synthesiser(depth_noise=0.01)[40]
     error = (noisy.depth - clean.depth)[clean.mask]
     assert error.std() == pytest.approx(0.01, rel=0.05)
     np.testing.assert_array_equal(clean.exact_depth, noisy.exact_depth)
@@ -249,7 +131,7 @@ def test_depth_noise_is_added_to_the_sensor_reading() -> None:
 
 @pytest.mark.parametrize("sensor", ["ideal", "kinect1", "kinect2", "realsense"])
 def test_every_sensor_reads_the_hand_at_its_default_distance(sensor: Any) -> None:
-    made = _made(sensor=sensor, background="wall")
+    made = synthesiser(sensor=sensor, background="wall")
     for index in range(0, 360, 90):
         frame = made[index]
         assert np.mean(frame.depth[frame.mask] > 0) > 0.75
@@ -258,12 +140,12 @@ def test_every_sensor_reads_the_hand_at_its_default_distance(sensor: Any) -> Non
 
 
 def test_frames_and_rate_set_the_sampling_of_the_motion() -> None:
-    assert len(_made()) == 360
-    assert len(_made(rate=60)) == 720
-    assert len(_made(frames=7)) == 7
-    assert len(_made(motion="random")) == 360
-    assert len(_made(motion="random", frames=500)) == 500
-    np.testing.assert_allclose(_made(rate=60).poses[::2], _made().poses, atol=1e-12)
+    assert len(synthesiser()) == 360
+    assert len(synthesiser(rate=60)) == 720
+    assert len(synthesiser(frames=7)) == 7
+    assert len(synthesiser(motion="random")) == 360
+    assert len(synthesiser(motion="random", frames=500)) == 500
+    np.testing.assert_allclose(synthesiser(rate=60).poses[::2], synthesiser().poses, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -285,7 +167,7 @@ def test_frames_and_rate_set_the_sampling_of_the_motion() -> None:
 )
 def test_invalid_options_raise_an_input_error(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        _made(**options)
+        synthesiser(**options)
 
 
 def test_the_command_writes_a_readable_recording_with_its_ground_truth(
@@ -301,7 +183,7 @@ def test_the_command_writes_a_readable_recording_with_its_ground_truth(
     assert truth.poses is not None
     assert truth.joints is not None
     assert truth.hand == HandShape(side="left", scale=0.9)
-    made = _made(
+    made = synthesiser(
         motion="grasp", sensor="kinect2", background="room", hand=truth.hand, viewpoint=2, seed=8, frames=3
     )  # fmt: skip
     for index, frame in enumerate(sequence):
@@ -327,7 +209,7 @@ def test_the_command_writes_a_readable_recording_with_its_ground_truth(
 
 
 def test_colours_of_flipped_pixels_are_stored_without_loss(tmp_path: Path) -> None:
-    made = _made(frames=1, skin_flips=0.1)
+    made = synthesiser(frames=1, skin_flips=0.1)
     write_recording(made, tmp_path / "flipped")
     sequence = TumSequence(tmp_path / "flipped")
     colour = sequence[0].colour

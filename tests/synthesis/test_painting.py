@@ -1,0 +1,48 @@
+"""Colours: skin tones, the bystander and flipped labels."""
+
+import cv2
+import numpy as np
+import pytest
+
+from depthtrack.synthesis.painting import SkinTone
+from depthtrack.synthesis.randomness import Stream, generator
+from tests.support.synthesis import synthesiser
+
+
+def test_a_room_is_cluttered_and_clearly_behind_the_hand() -> None:
+    frame = synthesiser(background="room", distance=0.5, seed=6)[10]
+    arm = frame.skin & (frame.exact_depth < 1)
+    face = frame.skin & ~arm
+    behind = frame.exact_depth[~arm]
+    assert behind.min() > 0.5 + 0.8
+    assert behind.max() == pytest.approx(3.0)
+    assert len(np.unique(np.round(behind, 1))) > 8
+    # The bystander's face has a skin colour and is smaller than the hand.
+    assert 500 < face.sum() < frame.mask.sum()
+    hue = cv2.cvtColor(frame.colour, cv2.COLOR_RGB2HSV)[..., 0]
+    assert abs(float(np.median(hue[face])) - float(np.median(hue[frame.mask]))) < 8
+
+
+def test_skin_varies_between_people_and_over_the_hand() -> None:
+    tones = np.array([SkinTone.sample(generator(seed, 0, Stream.SKIN)).back for seed in range(200)])
+    luminance = tones @ [0.2126, 0.7152, 0.0722]
+    assert luminance.min() < 0.13
+    assert luminance.max() > 0.35
+    assert np.all(tones[:, 0] > tones[:, 1])
+    assert np.all(tones[:, 1] > tones[:, 2])
+    frame = synthesiser(sensor="ideal", seed=1)[0]
+    assert np.all(frame.colour[frame.mask].std(axis=0) > 3)
+    assert np.all(SkinTone.sample(generator(9, 0, Stream.SKIN)).palm >= tones[9] - 0.02)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_skin_flips_change_that_share_of_labels_and_their_colours(share: float) -> None:
+    clean, flipped = synthesiser(background="wall")[40], synthesiser(background="wall", skin_flips=share)[40]
+    changed = clean.skin ^ flipped.skin
+    assert changed.mean() == pytest.approx(share, abs=0.005)
+    assert changed[clean.skin].mean() == pytest.approx(share, abs=0.02)
+    np.testing.assert_array_equal(np.any(clean.colour != flipped.colour, axis=-1), changed)
+    np.testing.assert_array_equal(clean.mask, flipped.mask)
+    redness = flipped.colour[..., 0].astype(int) - flipped.colour[..., 2]
+    assert np.mean(redness[flipped.skin & changed] > 10) > 0.99
+    assert np.mean(redness[~flipped.skin & changed] < 10) > 0.99
