@@ -21,7 +21,7 @@ from depthtrack.report.series import TrackerSeries
 from depthtrack.types import Array, Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import close_up_regions
-from depthtrack.viewing.depth_colours import depth_range
+from depthtrack.viewing.depth_colours import keypoint_depth_range
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton
 from depthtrack.viewing.panels import captioned, draw_layer, tile_grid
 from depthtrack.viewing.shading import draw_surface
@@ -68,9 +68,7 @@ class SideBySide:
             close_up_regions(self.sequence.camera, keypoints, known), self.sequence.camera, keypoints, known
         )
         self._regions = dict(zip(self.indices, regions, strict=True))
-        depths = keypoints[known, :, 2]
-        near, far = depth_range(depths.astype(np.float32), (1.0, 99.0)) if depths.size else (0.3, 1.5)
-        self._range = max(near - 0.06, 0.05), far + 0.1
+        self._range = keypoint_depth_range(keypoints[known], margin=0.1)
 
     def picture(self, frame: Frame) -> Image:
         """Return all trackers' panels of a frame (h, w, 3), each with its tracker's name and error."""

@@ -4,11 +4,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.types import Depth, Image
+from depthtrack.types import Array, Depth, Image
 from depthtrack.viewing.theme import NO_READING
 
 NEAR_LIMIT = 0.1
 """Smallest valid depth, metres; nearer readings are sensor artefacts."""
+_DEFAULT_RANGE = 0.3, 1.5
+"""Near and far without any reading, metres."""
 
 
 def depth_range(depth: Depth, percent: tuple[float, float] = (0.2, 98.0)) -> tuple[float, float]:
@@ -20,10 +22,23 @@ def depth_range(depth: Depth, percent: tuple[float, float] = (0.2, 98.0)) -> tup
     """
     readings = depth[np.isfinite(depth) & (depth >= NEAR_LIMIT)]
     if readings.size == 0:
-        return 0.3, 1.5
+        return _DEFAULT_RANGE
     near, far = (float(value) for value in np.percentile(readings, percent))
     # A fronto-parallel plane would have an empty range.
     return near, max(far, near + 0.05)
+
+
+def keypoint_depth_range(keypoints: Array, margin: float = 0.06) -> tuple[float, float]:
+    """Return the range (near, far) of a hand's surface from its keypoints, metres.
+
+    keypoints (..., 3): metres, camera frame.
+    margin: added behind the farthest keypoints, metres.
+    """
+    depths = keypoints[..., 2]
+    if depths.size == 0:
+        return _DEFAULT_RANGE
+    near, far = depth_range(depths.astype(np.float32), (1.0, 99.0))
+    return max(near - 0.06, 0.05), far + margin
 
 
 def depth_to_rgb(depth: Depth, near: float, far: float) -> Image:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Literal
 
+import cv2
 import numpy as np
 
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
@@ -13,7 +14,7 @@ from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import close_up_regions
-from depthtrack.viewing.depth_colours import depth_range
+from depthtrack.viewing.depth_colours import keypoint_depth_range
 from depthtrack.viewing.overlay import dimmed, draw_skeleton
 from depthtrack.viewing.panels import blank, captioned, draw_layer, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb
@@ -143,11 +144,7 @@ def annotated_run_frame(replayed: ReplayedFrame, model: HandModel) -> AnnotatedF
 
 def hand_depth_range(replay: Replay, margin: float = 0.06) -> tuple[float, float]:
     """Return near and far (metres) of the tracked hand, with `margin` metres behind it."""
-    depths = HandModel(replay.hand).keypoints(replay.run.poses[_trusted(replay)])[..., 2]
-    if depths.size == 0:
-        return 0.3, 1.5
-    near, far = depth_range(depths.astype(np.float32), (1.0, 99.0))
-    return max(near - 0.06, 0.05), far + margin
+    return keypoint_depth_range(HandModel(replay.hand).keypoints(replay.run.poses[_trusted(replay)]), margin)
 
 
 def _trusted(replay: Replay) -> Mask:
@@ -163,16 +160,8 @@ def _of_width(image: Image, width: int) -> Image:
 def _draw_frame(image: Image, region: Rect, factor: float) -> None:
     """Draw the outline of a close-up region, in place."""
     left, top, right, bottom = region.scaled(factor)
-    height, width = image.shape[:2]
     for colour, grow in ((OUTLINE, 1), (FAINT_TEXT, 0)):
-        rows = slice(max(top - grow, 0), max(bottom + grow, 0))
-        columns = slice(max(left - grow, 0), max(right + grow, 0))
-        for x in (left - grow, right + grow - 1):
-            if 0 <= x < width:
-                image[rows, x] = colour
-        for y in (top - grow, bottom + grow - 1):
-            if 0 <= y < height:
-                image[y, columns] = colour
+        cv2.rectangle(image, (left - grow, top - grow), (right + grow - 1, bottom + grow - 1), colour)
 
 
 def _draw_scale(image: Image) -> None:

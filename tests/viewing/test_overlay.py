@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
-from depthtrack.viewing.depth_colours import colour_scale, depth_range, depth_to_rgb
+from depthtrack.viewing.depth_colours import colour_scale, depth_range, depth_to_rgb, keypoint_depth_range
 from depthtrack.viewing.overlay import FINGER_BONES, PALM_BONES, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FINGER_COLOURS, NO_READING, TRUE_MASK
@@ -56,6 +56,14 @@ def test_depth_range_ignores_outliers_and_missing_readings() -> None:
 def test_depth_range_is_never_empty(depth: NDArray[np.float64]) -> None:
     near, far = depth_range(depth.astype(np.float32))
     assert 0 < near < far
+
+
+def test_keypoint_depth_range_contains_the_hand_and_the_margin() -> None:
+    keypoints = open_hand()
+    near, far = keypoint_depth_range(keypoints, margin=0.2)
+    assert 0 < near < keypoints[:, 2].min()
+    assert far == pytest.approx(keypoints[:, 2].max() + 0.2, abs=0.06)
+    assert keypoint_depth_range(keypoints[:0]) == depth_range(np.zeros((4, 4), dtype=np.float32))
 
 
 # Masks
