@@ -1,4 +1,4 @@
-"""Bounded reading, atomic writing and JSON."""
+"""Test bounded reading, atomic writing and JSON."""
 
 import json
 import os
@@ -28,7 +28,7 @@ from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.motion_file import read_table
 
 
-def test_text_comes_back_without_the_mark_of_spreadsheets(tmp_path: Path) -> None:
+def test_text_is_read_without_byte_order_mark(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_bytes(b"\xef\xbb\xbfone\r\ntw\xc3\xb6")
     assert read_text(path) == "one\ntwö"
@@ -39,7 +39,7 @@ def test_text_comes_back_without_the_mark_of_spreadsheets(tmp_path: Path) -> Non
     ("data", "message"),
     [(None, "missing or no regular file"), (b"\xff\xfe", "not UTF-8"), (b"x" * 11, "at most 10 bytes long, found 11")],
 )
-def test_what_is_no_small_text_is_refused(tmp_path: Path, data: bytes | None, message: str) -> None:
+def test_missing_binary_and_long_texts_are_rejected(tmp_path: Path, data: bytes | None, message: str) -> None:
     path = tmp_path / "text"
     if data is not None:
         path.write_bytes(data)
@@ -48,17 +48,17 @@ def test_what_is_no_small_text_is_refused(tmp_path: Path, data: bytes | None, me
 
 
 @pytest.mark.parametrize("read", [Camera.from_json, HandShape.from_json, read_configuration, read_rows])
-def test_files_larger_than_memory_are_refused_unread(tmp_path: Path, read: Callable[[Path], object]) -> None:
+def test_files_larger_than_memory_are_rejected_unread(tmp_path: Path, read: Callable[[Path], object]) -> None:
     for name in ("run.json", "poses.csv"):
         (tmp_path / name).touch()
-        os.truncate(tmp_path / name, 1 << 40)  # sparse: it takes no room
+        os.truncate(tmp_path / name, 1 << 40)  # sparse, so it uses no disk
     path = tmp_path if read in (read_configuration, read_rows) else tmp_path / "run.json"
     with pytest.raises(InputError, match="bytes long, found 1,099,511,627,776"):
         read(path)
 
 
 @pytest.mark.parametrize("read", [Synergies.from_json, SkinColourModel.load, read_table])
-def test_readers_of_small_files_refuse_large_and_endless_ones(read: Callable[[Path], object], tmp_path: Path) -> None:
+def test_readers_of_small_files_reject_large_and_endless_ones(read: Callable[[Path], object], tmp_path: Path) -> None:
     with (tmp_path / "large").open("wb") as file:
         file.truncate(1 << 23)
     with pytest.raises(InputError, match="bytes long, found 8,388,608"):
@@ -76,7 +76,7 @@ def test_bytes_are_returned_up_to_the_bound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["a\nb\r\nö", b"\x00\xff"])
-def test_a_written_file_holds_the_content_and_nothing_stays_beside_it(tmp_path: Path, content: str | bytes) -> None:
+def test_a_written_file_has_the_content_and_no_temporary_file_remains(tmp_path: Path, content: str | bytes) -> None:
     for _ in range(2):
         write_atomic(tmp_path / "file.txt", content)
         assert (tmp_path / "file.txt").read_bytes() == (content.encode() if isinstance(content, str) else content)
@@ -149,7 +149,7 @@ def test_malformed_json_is_one_sentence(tmp_path: Path, text: str | None, messag
     assert "\n" not in str(caught.value)
 
 
-def test_json_is_built(tmp_path: Path) -> None:
+def test_json_is_converted(tmp_path: Path) -> None:
     (tmp_path / "file.json").write_text('{"x": 2}')
     assert read_json(tmp_path / "file.json", "the number", _number) == 2.0
 

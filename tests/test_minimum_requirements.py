@@ -1,4 +1,4 @@
-"""The list of lowest versions, which the second environment of the continuous integration installs."""
+"""Test the list of lowest versions, which continuous integration installs."""
 
 import runpy
 from pathlib import Path
@@ -21,7 +21,7 @@ def test_lower_bounds_become_versions(stated: str, lowest: str) -> None:
     assert SCRIPT["lowest"](stated) == lowest
 
 
-def test_what_is_no_requirement_is_refused() -> None:
+def test_text_without_requirement_is_rejected() -> None:
     with pytest.raises(ValueError, match="expected a requirement"):
         SCRIPT["lowest"](">= 3")
 

@@ -1,4 +1,4 @@
-"""The data folders travel with every kind of installation."""
+"""Test that all kinds of installation contain the data folders."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ _REPORT = (
 
 @pytest.fixture(scope="module")
 def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with an sdist, and the wheel built from that sdist."""
+    """Return a folder with an sdist and the wheel from it."""
     folder = tmp_path_factory.mktemp("dist")
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(ROOT)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -28,7 +28,7 @@ def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def installed(package: Path, folder: Path) -> list[str]:
-    """Install a distribution alone into a folder, and ask it from elsewhere where its data is."""
+    """Install a distribution into a folder, and return the paths of its data."""
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
     subprocess.run([*pip, "--target", str(folder / "site"), str(package)], check=True, capture_output=True)
     done = subprocess.run(
@@ -43,7 +43,7 @@ def installed(package: Path, folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("pattern", ["*.whl", "*.tar.gz"])
-def test_wheel_and_sdist_carry_their_data(distributions: Path, tmp_path: Path, pattern: str) -> None:
+def test_wheel_and_sdist_contain_the_data_folders(distributions: Path, tmp_path: Path, pattern: str) -> None:
     (package,) = distributions.glob(pattern)
     everyday, shaders, *_ = installed(package, tmp_path)
     assert Path(everyday).is_relative_to(tmp_path / "site")
@@ -53,7 +53,7 @@ def test_wheel_and_sdist_carry_their_data(distributions: Path, tmp_path: Path, p
     assert (tmp_path / "site" / "depthtrack" / "py.typed").is_file()
 
 
-def test_sdist_holds_what_building_and_testing_need(distributions: Path) -> None:
+def test_the_sdist_contains_the_files_to_build_and_test(distributions: Path) -> None:
     (sdist,) = distributions.glob("*.tar.gz")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
@@ -63,10 +63,10 @@ def test_sdist_holds_what_building_and_testing_need(distributions: Path) -> None
     assert any(name.startswith("tests/") for name in names)
 
 
-def test_a_checkout_finds_its_own_folders() -> None:
+def test_a_checkout_uses_its_own_folders() -> None:
     assert resource_folder("sequences") == ROOT / "sequences"
 
 
-def test_a_missing_folder_is_told() -> None:
+def test_a_missing_folder_is_reported() -> None:
     with pytest.raises(InputError, match="reinstall"):
         resource_folder("no-such-folder")

@@ -1,4 +1,4 @@
-"""The greedy choice: what is chosen differs, what is left out is near something chosen before it."""
+"""Test the greedy choice: chosen items differ, and others are near an earlier chosen one."""
 
 import numpy as np
 from hypothesis import given

@@ -1,1 +1,1 @@
-"""Speed on this machine, and the experiments of the papers."""
+"""Benchmarks: speed on this machine, and experiments of the papers."""

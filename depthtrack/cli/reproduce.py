@@ -95,7 +95,7 @@ def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterab
 def _as_text(done: "Reproduction", folder: Path) -> str:
     from depthtrack.text_table import aligned
 
-    lines = [("", "paper, in its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
+    lines = [("", "paper, from its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
     reused = f"{done.reused} of them reused, " if done.reused else ""
     time = f"{done.seconds:.0f} s ({done.cell_seconds:.0f} s in all workers)"
     return "\n".join(

@@ -1,4 +1,4 @@
-"""The benchmark of surface fitting: that it measures the settings it names, in its units, on poses that are right."""
+"""Test the benchmark of surface fitting: settings, units, and correct poses."""
 
 import json
 from dataclasses import fields, replace
@@ -20,7 +20,7 @@ def motion() -> ObservedMotion:
 
 
 @pytest.mark.slow
-def test_the_headline_is_3000_points_and_five_by_five(motion: ObservedMotion) -> None:
+def test_the_first_setting_has_3000_points_and_five_by_five_iterations(motion: ObservedMotion) -> None:
     assert SETTINGS[0] == HEADLINE
     row = ik.measure(motion, HEADLINE, 1e-6)
     assert 2800 < row.points < 3200
@@ -28,7 +28,7 @@ def test_the_headline_is_3000_points_and_five_by_five(motion: ObservedMotion) ->
     assert (row.icp, row.inner) == (5, 5)
     assert 0 < row.error_deg < 1
     assert 0 < row.error_mm < 1
-    # One call of each of the four frames, however short the time.
+    # Each of the four frames is called at least once.
     assert row.calls == 4
     assert 0 < row.frame_ms <= row.frame_ms_median
     assert {"target", "predict", "fit", "retry"} <= set(row.stage_ms)
@@ -40,12 +40,12 @@ def test_the_headline_is_3000_points_and_five_by_five(motion: ObservedMotion) ->
     ("setting", "lowest_deg", "highest_deg"),
     [
         (Setting("cylinders", "point"), 1.5, 5),
-        # Six synergies lose more than two degrees, whatever fits them.
+        # Six synergies alone have an error of more than two degrees.
         (Setting("skin", "plane", "6+6"), 2, 5),
         (replace(HEADLINE, subsample=30, icp=2, inner=1), 0.3, 3),
     ],
 )
-def test_a_row_is_of_its_setting(
+def test_a_row_belongs_to_its_setting(
     motion: ObservedMotion, setting: Setting, lowest_deg: float, highest_deg: float
 ) -> None:
     row, headline = ik.measure(motion, setting, 1e-6), ik.measure(motion, HEADLINE, 1e-6)
@@ -55,16 +55,18 @@ def test_a_row_is_of_its_setting(
     assert headline.error_deg < lowest_deg < row.error_deg < highest_deg
 
 
-def test_every_model_residual_and_freedom_is_there_once() -> None:
+def test_all_combinations_occur_once() -> None:
     assert len(set(SETTINGS)) == len(SETTINGS)
-    usual = {(s.model, s.residual, s.freedom) for s in SETTINGS if s.subsample == 3}
-    assert len(usual) == 2 * 3 * 2
+    combinations = {(s.model, s.residual, s.freedom) for s in SETTINGS if s.subsample == 3}
+    assert len(combinations) == 2 * 3 * 2
     for seconds in (0.0, float("nan"), 1e9):
         with pytest.raises(InputError, match="seconds"):
             ik.plan(seconds)
 
 
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_prints_text_and_writes_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ik, "plan", lambda seconds: ik.IkPlan(seconds, (HEADLINE, Setting("cylinders"))))
     out = tmp_path / "bench.json"
     arguments = ["bench", "ik", "--seconds", "0.001", "--out", str(out)]

@@ -1,4 +1,4 @@
-"""Work in a process of its own: its items come through, and so does the reason when it fails."""
+"""Test a generator in its own process: items and errors arrive."""
 
 import os
 import time
@@ -15,19 +15,19 @@ def numbers_then(end: str) -> Iterator[int]:
     yield 2
     if end == "raise":
         raise KeyError("lost")
-    if end == "refuse":
+    if end == "reject":
         raise InputError("this cannot be: do that")
     if end == "die":
         os._exit(7)
 
 
-def silent() -> Iterator[int]:
+def slow() -> Iterator[int]:
     time.sleep(60)
     yield 1
 
 
-def test_all_that_is_given_arrives() -> None:
-    process, *rest = in_own_process(numbers_then, "well", patience=60)
+def test_all_items_arrive() -> None:
+    process, *rest = in_own_process(numbers_then, "well", timeout=60)
     assert process != os.getpid()
     assert rest == [2]
 
@@ -36,25 +36,25 @@ def test_all_that_is_given_arrives() -> None:
     ("end", "error", "message"),
     [
         ("raise", ProcessFailureError, "KeyError: 'lost'"),
-        ("refuse", InputError, "this cannot be: do that"),
+        ("reject", InputError, "this cannot be: do that"),
         ("die", ProcessFailureError, "exit code 7"),
     ],
 )
-def test_a_failure_comes_after_what_was_given(end: str, error: type[Exception], message: str) -> None:
-    items = in_own_process(numbers_then, end, patience=60)
+def test_a_failure_comes_after_the_items(end: str, error: type[Exception], message: str) -> None:
+    items = in_own_process(numbers_then, end, timeout=60)
     assert next(items) != os.getpid()
     assert next(items) == 2
     with pytest.raises(error, match=message):
         next(items)
 
 
-def test_silence_is_not_waited_for() -> None:
-    with pytest.raises(ProcessFailureError, match="gave nothing for 1 s"):
-        next(in_own_process(silent, patience=1))
+def test_a_late_item_is_an_error() -> None:
+    with pytest.raises(ProcessFailureError, match="after 1 s without a result"):
+        next(in_own_process(slow, timeout=1))
 
 
-def test_leaving_early_stops_the_process() -> None:
-    items = in_own_process(numbers_then, "well", patience=60)
+def test_closing_the_generator_stops_the_process() -> None:
+    items = in_own_process(numbers_then, "well", timeout=60)
     process = next(items)
     items.close()
     with pytest.raises(ProcessLookupError):

@@ -1,4 +1,4 @@
-"""The experiments of Schroeder et al. 2014: what they vary, what they measure, and how it is summarised."""
+"""Test the experiments of Schroeder et al. 2014: cells, measurements, tables."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def cells_of(name: str, **options: Any) -> list[Cell]:
     return load_experiment(name).cells(ExperimentOptions(**options))
 
 
-def said(name: str, rows: list[Row]) -> dict[str, float | None]:
+def compared(name: str, rows: list[Row]) -> dict[str, float | None]:
     return {each.what: each.ours for each in load_experiment(name).compare(rows)}
 
 
@@ -50,21 +50,21 @@ def test_synergies_of_a_set_a_motion_a_file_and_recorded_postures(tmp_path: Path
     np.testing.assert_allclose(recorded.postures, signs.postures[::5])
 
 
-def test_a_chosen_basis_is_found_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_resolved_name_has_an_absolute_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     save_synergies(load_synergies("leap-grasps"), tmp_path / "mine.json")
     monkeypatch.chdir(tmp_path)
     assert resolve_name("mine.json", "leap") == str(tmp_path / "mine.json")
     assert resolve_name(None, "leap") == "leap"
     (tmp_path / "signs").mkdir()
     assert resolve_name("signs", "leap") == "signs"
-    with pytest.raises(InputError, match=r"no synergies 'nonsense': name a set \(leap, leap-grasps\)"):
+    with pytest.raises(InputError, match=r"no synergies 'nonsense': give a set \(leap, leap-grasps\)"):
         resolve_name("nonsense", "leap")
 
 
-# What is varied
+# Cells
 
 
-def test_the_cells_are_the_papers() -> None:
+def test_the_cells_are_those_of_the_paper() -> None:
     assert [cell["icp_iterations"] for cell in cells_of("schroeder-8")] == list(range(1, 11))
     assert {cell["subsampling"] for cell in cells_of("schroeder-8")} == {3}
     assert [cell["subsampling"] for cell in cells_of("schroeder-9")] == list(range(1, 11))
@@ -91,12 +91,12 @@ def test_the_cells_are_the_papers() -> None:
     ):
         mine = [cell for cell in signs if (cell["way"], cell["synergies"], cell["sign"]) == (way, name, 3)]
         assert [cell["repetition"] for cell in mine] == list(range(times))
-    with pytest.raises(InputError, match="hold no sign"):
+    with pytest.raises(InputError, match="contain no sign"):
         cells_of("schroeder-11", frames=3)
 
 
 @pytest.mark.parametrize("name", FITTING)
-def test_quick_is_coarser_and_options_reach_the_cells(name: str, tmp_path: Path) -> None:
+def test_the_quick_version_is_coarser_and_options_reach_the_cells(name: str, tmp_path: Path) -> None:
     full, quick = cells_of(name), cells_of(name, quick=True)
     assert 0 < len(quick) <= len(full)
     assert {tuple(cell) for cell in [*full, *quick]} == {tuple(full[0])}
@@ -110,36 +110,36 @@ def test_quick_is_coarser_and_options_reach_the_cells(name: str, tmp_path: Path)
         assert str(own) in used <= {None, str(own), "grasp"}
 
 
-# What is measured
+# Measurements
 
 
-def follow(**changes: Any) -> Row:
+def tracked(**changes: Any) -> Row:
     (cell,) = schroeder.cells(ExperimentOptions(frames=6), [changes])
-    return schroeder.follow(**cell)
+    return schroeder.track_motion(**cell)
 
 
-def test_following_is_repeatable_and_finds_the_hand() -> None:
-    row, again = follow(), follow()
+def test_tracking_is_repeatable_and_accurate() -> None:
+    row, again = tracked(), tracked()
     assert 0 < row["error_deg"] < 1
     assert 0 < row["error_mm"] < 1
     assert row["error_deg"] == pytest.approx(np.mean(row["frame_errors_deg"]), abs=1e-3)
     assert len(row["frame_errors_deg"]) == 6
     assert row["ms_per_frame"] > 0
     assert {**row, "ms_per_frame": 0} == {**again, "ms_per_frame": 0}
-    assert follow(subsampling=6)["points"] == pytest.approx(row["points"] / 2, abs=1)
-    assert follow(icp_iterations=1)["error_deg"] != row["error_deg"]
+    assert tracked(subsampling=6)["points"] == pytest.approx(row["points"] / 2, abs=1)
+    assert tracked(icp_iterations=1)["error_deg"] != row["error_deg"]
 
 
-def test_following_takes_model_and_space_from_the_cell() -> None:
-    assert 0 < follow(model="cylinders")["error_deg"] < 4
-    # One synergy cannot tell the postures of a moving hand apart.
-    assert follow(synergies="leap", components=1)["error_deg"] > 3 * follow()["error_deg"]
-    assert follow(synergies="everyday", components=12)["error_deg"] < 1.5
+def test_model_and_synergies_of_the_cell_are_used() -> None:
+    assert 0 < tracked(model="cylinders")["error_deg"] < 4
+    # One synergy is not enough for the postures of the motion.
+    assert tracked(synergies="leap", components=1)["error_deg"] > 3 * tracked()["error_deg"]
+    assert tracked(synergies="everyday", components=12)["error_deg"] < 1.5
 
 
 @pytest.mark.parametrize(("variant", "highest_deg"), [("default", 0.5), ("paper", 4)])
-def test_a_sign_is_found_from_its_frame_alone(variant: Literal["default", "paper"], highest_deg: float) -> None:
-    """One of the signs that need the hierarchy."""
+def test_a_sign_is_estimated_from_a_single_frame(variant: Literal["default", "paper"], highest_deg: float) -> None:
+    """The sign needs the hierarchy."""
 
     def row(way: schroeder_11.Way, synergies: str = "signs") -> Row:
         return schroeder_11.measure(sign=19, way=way, synergies=synergies, variant=variant, repetition=0)
@@ -151,13 +151,13 @@ def test_a_sign_is_found_from_its_frame_alone(variant: Literal["default", "paper
     assert row("hierarchical", schroeder_11.OTHERS)["error_deg"] not in (found["error_deg"], flat["error_deg"])
 
 
-def test_signs_are_where_nothing_moves() -> None:
+def test_static_intervals_of_poses() -> None:
     poses = np.zeros((30, 27))
     poses[:, 9] = np.concatenate([np.zeros(6), np.linspace(0.1, 1, 10), np.ones(9), [2, 3, 3, 3, 4]])
     assert schroeder_11.static_intervals(poses) == [(0, 5), (15, 24)]
 
 
-def test_postures_are_approximated_the_better_the_more_components() -> None:
+def test_more_components_approximate_postures_better() -> None:
     rows = [schroeder_7.measure(synergies="signs", postures="signs", components=n) for n in (1, 4, 12, 20)]
     errors = [row["error_deg"] for row in rows]
     assert errors == sorted(errors, reverse=True)
@@ -169,7 +169,7 @@ def test_postures_are_approximated_the_better_the_more_components() -> None:
 
 
 def test_an_approximation_is_the_projection_onto_the_components(tmp_path: Path) -> None:
-    """Postures along two directions: one component keeps the wider, and what it loses can be told by hand."""
+    """One component keeps the wider of two directions, so the error follows by hand."""
     wide, narrow = np.eye(20)[5], np.eye(20)[9]
     angles = np.radians([30 * wide, -30 * wide, 8 * narrow, -8 * narrow])
     row = schroeder_7.measure(synergies=str(write_postures(tmp_path / "few.csv", angles)), postures=None, components=1)
@@ -178,7 +178,7 @@ def test_an_approximation_is_the_projection_onto_the_components(tmp_path: Path) 
     assert row["variance_percent"] == pytest.approx(100 * 900 / 964)
 
 
-# How it is summarised: against cases worked out by hand
+# Tables, compared with cases computed by hand
 
 
 def row(error: float, **values: Any) -> Row:
@@ -186,15 +186,15 @@ def row(error: float, **values: Any) -> Row:
     return schroeder.DEFAULTS | measured | {"ms_per_frame": 5.0, "frame_errors_deg": [error]} | values
 
 
-def test_iterations_and_subsampling() -> None:
+def test_figures_of_iterations_and_subsampling() -> None:
     rows = [row(error, icp_iterations=n, ms_per_frame=n + 1.0) for n, error in ((1, 8.0), (5, 2.0), (10, 1.5))]
-    assert list(said("schroeder-8", rows).values()) == [2.0, 0.25, 4.0, 6.0, pytest.approx(11 / 6)]
-    assert list(said("schroeder-8", rows[:1]).values()) == [None] * 5
+    assert list(compared("schroeder-8", rows).values()) == [2.0, 0.25, 4.0, 6.0, pytest.approx(11 / 6)]
+    assert list(compared("schroeder-8", rows[:1]).values()) == [None] * 5
     rows = [row(3.0, subsampling=10), row(1.0, ms_per_frame=4.0)]
-    assert list(said("schroeder-9", rows).values()) == [1.0, 3.0, 2.0, 4.0, 250.0]
+    assert list(compared("schroeder-9", rows).values()) == [1.0, 3.0, 2.0, 4.0, 250.0]
 
 
-def test_grasps_with_all_angles_and_with_synergies() -> None:
+def test_figures_of_grasps_with_all_angles_and_with_synergies() -> None:
     rows = [
         row(12.0),
         row(4.0, synergies="other-grasps", components=5, ms_per_frame=4.0),
@@ -202,11 +202,11 @@ def test_grasps_with_all_angles_and_with_synergies() -> None:
         row(3.5, synergies="other-grasps", components=8),
         row(2.0, synergies="grasp", components=3),
     ]
-    assert list(said("schroeder-10", rows).values()) == [12.0, 4.0, 3.5, 2.0, 3.0, 5.0, 24.0, 8.0, 200.0, 250.0]
-    assert said("schroeder-10", rows[:1])["synergies of other grasps alone"] is None
+    assert list(compared("schroeder-10", rows).values()) == [12.0, 4.0, 3.5, 2.0, 3.0, 5.0, 24.0, 8.0, 200.0, 250.0]
+    assert compared("schroeder-10", rows[:1])["synergies of other grasps alone"] is None
 
 
-def test_signs_by_way_and_synergies() -> None:
+def test_figures_of_signs_by_method_and_synergies() -> None:
     def row(way: str, synergies: str, error: float) -> Row:
         return {
             "way": way,
@@ -219,12 +219,20 @@ def test_signs_by_way_and_synergies() -> None:
 
     rows = [row("hierarchical", "signs", error) for error in (0.2, 0.3, 1.6)]
     rows += [row("hierarchical", schroeder_11.OTHERS, 2.0), row("all angles at once", "signs", 9.0)]
-    assert list(said("schroeder-11", rows).values()) == [pytest.approx(0.7), 9, 0.1, pytest.approx(1.4), 2, 0.3, 1.6]
+    assert list(compared("schroeder-11", rows).values()) == [
+        pytest.approx(0.7),
+        9,
+        0.1,
+        pytest.approx(1.4),
+        2,
+        0.3,
+        1.6,
+    ]
     first = load_experiment("schroeder-11").tabulate(rows)[0]
     assert (first["estimates"], first["within_1_deg_percent"]) == (3, pytest.approx(200 / 3))
 
 
-def test_cylinders_beside_the_mesh() -> None:
+def test_figures_of_cylinders_and_mesh() -> None:
     rows = [
         row(error, model=model, synergies=name, components=count)
         for (name, count), errors in {(None, None): (2, 4), ("everyday", 6): (3, 3.5), ("leap", 6): (8, 9)}.items()
@@ -244,18 +252,18 @@ def test_cylinders_beside_the_mesh() -> None:
     ]
 
 
-def test_shares_of_the_variance_stand_beside_the_papers() -> None:
+def test_figures_of_the_variance() -> None:
     measured = {"error_deg": 5.0, "particular_deg": 6.0, "p95_deg": 9.0, "error_mm": 4.0}
     rows = [
         {"synergies": name, "postures": "grasp", "components": n, "variance_percent": 10.0 * n} | measured
         for name, n in (("leap", 3), ("leap", 6), ("leap-grasps", 3))
     ]
-    found = said("schroeder-7", rows)
+    found = compared("schroeder-7", rows)
     assert found["variance in the first 3 of leap"] == 30.0
     assert found["variance in the first 6 of leap"] == 60.0
     assert found["variance in the first 2 of leap-grasps"] is None
     assert found["mean error of grasp, 6 of leap"] == 5.0
     mine = [row | {"synergies": "/data/mine.csv", "postures": None} for row in rows[:2]]
-    assert list(said("schroeder-7", mine).values()) == [None, 30.0, 60.0, 5.0]
-    assert "mean error of its postures, 6 of mine" in said("schroeder-7", mine)
+    assert list(compared("schroeder-7", mine).values()) == [None, 30.0, 60.0, 5.0]
+    assert "mean error of its postures, 6 of mine" in compared("schroeder-7", mine)
     assert short_label("/data/a-name-that-has-no-end.csv") == "a-name-that-h..."

@@ -1,4 +1,4 @@
-"""The benchmark of scoring: that it times what it says, reports in its units, and survives those it measures."""
+"""Test the benchmark of scoring: workload, times, units, and scorers that do not run."""
 
 import json
 import sys
@@ -24,7 +24,7 @@ from depthtrack.machine import describe_machine, usable_cores
 from depthtrack.rendering.oracle import OracleScorer
 
 
-def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:
+def test_the_workload_is_a_swarm_around_a_hand_at_half_a_metre() -> None:
     workloads = make_workloads()
     native, *reduced = workloads
     assert [workload.roi for workload in workloads] == list(ROIS)
@@ -33,7 +33,7 @@ def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:
         assert camera.width == camera.height
         assert camera.fx == PRESETS["kinect1"].fx
         assert 0.4 < target.depth[target.silhouette].mean() < 0.6
-        # All of the hand, with room around it.
+        # The whole hand with a margin.
         edge = np.ones(camera.shape, np.bool_)
         edge[4:-4, 4:-4] = False
         assert target.silhouette.any()
@@ -51,7 +51,7 @@ def test_the_workload_is_a_swarm_around_a_hand_half_a_metre_away() -> None:
     assert native.expected.shape == (len(native.targets), CHECKED)
 
 
-def test_time_is_that_of_the_call() -> None:
+def test_the_time_is_that_of_the_call() -> None:
     durations = time_calls(lambda: time.sleep(0.002), 0.02)
     assert 1 <= len(durations) <= 10
     assert durations.min() >= 0.002
@@ -71,43 +71,43 @@ def test_rows_of_a_backend() -> None:
         assert row.microseconds == pytest.approx(1e6 / row.hypotheses_per_s)
         assert row.calls >= len(workloads[0].targets)
         assert row.first_call_s > 0
-        # A pixel whose match hangs on the last bit of a depth may move the energy by this much.
+        # The last bit of one pixel's depth can change the energy by this difference.
         assert row.energy_error < 0.05
 
 
 class MisplacedOracle(OracleScorer):
-    """Sees every hypothesis 5 mm too far to the right."""
+    """Oracle that moves each hypothesis by 5 mm to the right."""
 
     def score(self, poses: np.ndarray) -> np.ndarray:  # type: ignore[override]
         return super().score(poses + np.eye(27)[0] * 0.005)
 
 
-def test_wrong_energies_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_energies_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scoring, "create_scorer", lambda name, shape: MisplacedOracle(shape))
     (row,) = scoring.measure("oracle", make_workloads(["64"]), 0.001)
     assert row.energy_error > 0.5
 
 
-def test_unusable_plans_are_refused() -> None:
+def test_invalid_plans_are_rejected() -> None:
     with pytest.raises(InputError, match=r"raster.*embree; found vulkan"):
         scoring.plan(["raster", "vulkan"])
     for seconds in (0.0, -1.0, float("nan"), 1e9):
         with pytest.raises(InputError, match="seconds"):
             scoring.plan(["raster"], seconds)
-    assert scoring.plan(["raster", "raster"]).specs == ("raster",)
-    assert "oracle" not in scoring.plan().specs
+    assert scoring.plan(["raster", "raster"]).scorers == ("raster",)
+    assert "oracle" not in scoring.plan().scorers
 
 
-def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, error: str) -> None:
-    """Put an `open3d` before any other that fails to be imported."""
+def break_open3d(folder: Path, monkeypatch: pytest.MonkeyPatch, error: str) -> None:
+    """Make the import of `open3d` fail."""
     (folder / "open3d.py").write_text(f"raise {error}\n")
     monkeypatch.syspath_prepend(folder)
 
 
-def test_the_command_measures_what_can_run_and_tells_who_is_absent(
+def test_the_command_measures_available_scorers_and_lists_absent_ones(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stand_in(tmp_path, monkeypatch, "ModuleNotFoundError")
+    break_open3d(tmp_path, monkeypatch, "ModuleNotFoundError")
     out = tmp_path / "bench.json"
     arguments = ["bench", "score", "--backends", "raster", "open3d", "--seconds", "0.01", "--out", str(out)]
     assert main([*arguments, "--json"]) == 0
@@ -121,18 +121,20 @@ def test_the_command_measures_what_can_run_and_tells_who_is_absent(
     assert report["machine"]["versions"]["numba"]
 
 
-def test_the_table_has_a_line_a_row_and_a_word_on_the_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    stand_in(tmp_path, monkeypatch, "ImportError('libusb is missing')")
+def test_the_text_has_a_line_per_row_and_the_reasons_of_absent_scorers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_open3d(tmp_path, monkeypatch, "ImportError('libusb is missing')")
     report = scoring.run(scoring.ScorePlan(("raster", "open3d"), 0.001, ("64",)))
     text = scoring.as_text(report)
     assert sum(line.startswith("raster   64   64x64 ") for line in text.splitlines()) == len(report.rows)
-    assert "open3d: installed, but it cannot be loaded: libusb is missing" in text
+    assert "open3d: installed, but does not load: libusb is missing" in text
 
 
-def test_nothing_to_measure_is_an_error(
+def test_a_report_without_rows_is_an_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stand_in(tmp_path, monkeypatch, "ModuleNotFoundError")
+    break_open3d(tmp_path, monkeypatch, "ModuleNotFoundError")
     assert main(["bench", "score", "--backends", "open3d", "--seconds", "0.01"]) == 2
     captured = capsys.readouterr()
     assert INSTALL["open3d"] in captured.out
@@ -140,10 +142,10 @@ def test_nothing_to_measure_is_an_error(
 
 
 @pytest.mark.parametrize("name", BASELINES)
-def test_rivals_see_what_the_oracle_sees(name: str) -> None:
-    """But for their facets: in a process of its own, as one of them claims OpenGL for itself."""
+def test_baselines_agree_with_the_oracle_except_for_facets(name: str) -> None:
+    """Each runs in its own process, since one sets the platform of OpenGL."""
     try:
-        rows = list(in_own_process(scoring.measure, name, make_workloads(["native", "64"]), 1e-3, patience=120))
+        rows = list(in_own_process(scoring.measure, name, make_workloads(["native", "64"]), 1e-3, timeout=120))
     except BaselineMissingError as missing:
         pytest.skip(f"{name}: {missing}")
     assert [row.roi for row in rows] == ["native", "64"]
@@ -152,8 +154,7 @@ def test_rivals_see_what_the_oracle_sees(name: str) -> None:
         assert row.energy_error < 3
 
 
-def test_a_rival_of_ours_needs_no_library_to_be_scored_as_rivals_are() -> None:
-    """The objective that rivals share, on the oracle's own depth maps."""
+def test_the_objective_of_baselines_on_depth_maps_of_the_oracle() -> None:
     (workload,) = make_workloads(["96"])
     oracle = OracleScorer(workload.shape)
 
@@ -169,9 +170,9 @@ def test_a_rival_of_ours_needs_no_library_to_be_scored_as_rivals_are() -> None:
             return oracle.render(next(poses))
 
     poses = iter(workload.poses[0])
-    rival = Perfect(HandShape())
-    rival.set_target(workload.targets[0])
-    np.testing.assert_allclose(rival.score(workload.poses[0, :CHECKED]), workload.expected[0], atol=0.01)
+    baseline = Perfect(HandShape())
+    baseline.set_target(workload.targets[0])
+    np.testing.assert_allclose(baseline.score(workload.poses[0, :CHECKED]), workload.expected[0], atol=0.01)
 
 
 def test_the_machine_is_described() -> None:

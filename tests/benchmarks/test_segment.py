@@ -1,4 +1,4 @@
-"""The benchmark of segmentation: what it times, on what, and in which units it tells."""
+"""Test the benchmark of segmentation: recordings, times, units."""
 
 import json
 from dataclasses import replace
@@ -23,7 +23,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_rows_tell_time_and_accuracy_with_and_without_colour(recording: Path) -> None:
+def test_rows_have_time_and_iou_with_and_without_colour(recording: Path) -> None:
     plan = segmenting.plan([recording], seconds=0.05)
     threads = cv2.getNumThreads()
     report = segmenting.run(plan)
@@ -49,7 +49,7 @@ def test_without_colour_there_is_one_row(recording: Path) -> None:
     assert report.rows[0].iou is None
 
 
-def test_unless_told_it_measures_every_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_default_is_a_recording_of_each_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(segmenting, "FRAMES", 2)
     plan = segmenting.plan()
     assert [shot.name for shot in plan.shots] == ["everyday, kinect1", "everyday, kinect2", "everyday, realsense"]
@@ -59,10 +59,10 @@ def test_unless_told_it_measures_every_camera(monkeypatch: pytest.MonkeyPatch) -
         assert all(mask is not None and mask.shape == shot.frames[0].depth.shape for mask in shot.truth)
 
 
-def test_refuses_what_shows_no_hand(recording: Path) -> None:
+def test_recordings_without_a_hand_are_rejected(recording: Path) -> None:
     shot = segmenting.plan([recording]).shots[0]
     empty = [replace(frame, depth=np.zeros_like(frame.depth)) for frame in shot.frames]
-    with pytest.raises(InputError, match="no hand is seen in frame 0"):
+    with pytest.raises(InputError, match="frame 0 shows no hand"):
         segmenting.run(SegmentPlan([replace(shot, frames=empty)], 0.01))
     with pytest.raises(InputError, match="seconds"):
         segmenting.plan(seconds=0)

@@ -1,1 +1,1 @@
-"""The papers' experiments: what each varies and measures, what the paper says of it, and how both are drawn."""
+"""Experiments of the papers: cells, measurements, tables, and comparison with the paper."""

@@ -1,4 +1,4 @@
-"""What an experiment is: cells to measure, a table of what came of them, and the paper's word beside it."""
+"""Experiments: cells to measure, the table of their rows, and the comparison with the paper."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,16 +10,20 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 QUICK_RESOLUTION = 96
+"""Longest side of the region of interest in a quick version, pixels."""
 
 
 @dataclass(frozen=True)
 class ExperimentOptions:
-    """What a user may choose; an experiment takes note of what it varies or leaves open.
+    """Options of the user; an experiment ignores those that it varies or does not use.
 
-    `quick`: few cells and repetitions, swarms at a reduced resolution. `repetitions` with different seeds,
-    None for the experiment's own number; `resolution` of the region of interest, its longest side in pixels, None for
-    the sensor's own (QUICK_RESOLUTION when quick); `frames` at the beginning of the motion, None for all; `synergies`
-    in place of the experiment's own, by a name that `load_source` knows.
+    quick: few cells and repetitions, and swarms at a reduced resolution.
+    variant: trackers of this program or those of the papers.
+    renderer: renderer of the swarm.
+    repetitions: number of seeds; None for the number of the experiment.
+    resolution: longest side of the region of interest, pixels; None for the sensor's, or QUICK_RESOLUTION if quick.
+    frames: number of first frames of the motion; None for all.
+    synergies: name for `synergy_sources.load_source`; None for the synergies of the experiment.
     """
 
     quick: bool = False
@@ -32,20 +36,31 @@ class ExperimentOptions:
 
     @property
     def side(self) -> int | None:
-        """Longest side of the region of interest, pixels; None is the sensor's own."""
+        """Longest side of the region of interest, pixels; None for that of the sensor."""
         return QUICK_RESOLUTION if self.quick and self.resolution is None else self.resolution
 
     def seeds(self, own: int, quick: int) -> range:
-        """Seeds of the repetitions, where the experiment has `own` of them, or `quick` ones. Raises InputError."""
+        """Return the seeds of the repetitions.
+
+        own, quick: number of repetitions of the experiment, and of its quick version.
+
+        Raises:
+            InputError: if the number is out of range.
+        """
         count = (quick if self.quick else own) if self.repetitions is None else self.repetitions
         if not 1 <= count <= 10_000:
-            raise InputError(f"repetitions must lie between 1 and 10000, found {count}")
+            raise InputError(f"--repetitions must be from 1 to 10000, found {count}")
         return range(count)
 
 
 @dataclass(frozen=True)
 class PaperComparison:
-    """One statement of the paper's text, and what we measured; `ours` None where the cells do not tell."""
+    """A figure in the text of a paper, and the measured one.
+
+    what: description of the figure.
+    paper: figure in the paper.
+    ours: measured figure; None if the cells do not contain it.
+    """
 
     what: str
     paper: str
@@ -54,16 +69,20 @@ class PaperComparison:
 
     @property
     def ours_text(self) -> str:
+        """Measured figure with its unit."""
         return "-" if self.ours is None else f"{self.ours:.3g} {self.unit}"
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment of a paper. All its cells have the same names, and so have all its rows, and its table's.
+    """An experiment of a paper. All cells, all rows and all lines of the table have equal keys.
 
-    `measure` is a module-level function of a cell's values, by name, that gives the measured ones. `tabulate` makes
-    the table that people read from the rows of all cells, `compare` sets the rows beside the paper's text, `draw`
-    plots them on matplotlib axes.
+    source: paper and figure.
+    cells: returns the cells for the options of the user.
+    measure: module-level function that takes the values of a cell by keyword and returns the measured values.
+    tabulate: returns the table of the rows of all cells.
+    compare: returns the figures of the paper beside those of the rows.
+    draw: plots the rows on matplotlib axes.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What experiments on following a motion share."""
+"""Switch off the recovery of trackers for the experiments of the papers."""
 
 from depthtrack.options import parameters, with_options
 from depthtrack.tracking.configuration import TrackerConfig
@@ -14,9 +14,9 @@ _OFF = {
 
 
 def without_recovery(config: TrackerConfig) -> TrackerConfig:
-    """Return a tracker that never loses the hand and never searches.
+    """Return the configuration without losses and without searches.
 
-    A search would correct what an experiment measures, and cost more than many frames.
+    A search would correct the error that an experiment measures, and takes more time than many frames.
     """
     known = {parameter.path for parameter in parameters(config)}
     return with_options(config, {name: value for name, value in _OFF.items() if name in known})

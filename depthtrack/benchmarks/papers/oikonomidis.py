@@ -1,4 +1,4 @@
-"""Following the hand through the `everyday` motion: the measurement that Fig. 2a to 2d of Oikonomidis 2011 repeat."""
+"""Track the `everyday` motion with a swarm, as in Fig. 2a to 2d of Oikonomidis 2011."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import closing
@@ -25,15 +25,17 @@ DEFAULTS: Cell = {
     "particles": 64,
     "generations": 25,
 }
-"""What an experiment leaves as it is: the budget that the paper retained, half a metre, a perfect sensor."""
-
+"""Values that an experiment does not vary: the budget that the paper retained, 0.5 m, a perfect sensor."""
 
 TRACKERS = {"default": "pso", "paper": "oikonomidis2011"}
 """Tracker of each variant."""
 
 
 def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
-    """Every condition, a change from the usual one, as often as the options ask, each time with another seed."""
+    """Return the cells of the conditions, one per seed.
+
+    conditions: values that differ from DEFAULTS.
+    """
     return [
         DEFAULTS | condition | tracker_cell(options) | {"frames": options.frames, "repetition": seed}
         for condition in conditions
@@ -42,11 +44,11 @@ def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
 
 
 def tracker_cell(options: ExperimentOptions) -> Cell:
-    """The part of a cell that says how the tracker works."""
+    """Return the values of a cell that configure the tracker."""
     return {"variant": options.variant, "renderer": options.renderer, "resolution": options.side}
 
 
-def follow(
+def track_motion(
     *,
     distance_m: float,
     viewpoint: int,
@@ -60,12 +62,12 @@ def follow(
     frames: int | None,
     repetition: int,
 ) -> Row:
-    """Track from the true first pose on, by the swarm alone: a frame's budget stays what the cell says.
+    """Track the motion from the true first pose by the swarm alone, with the budget of the cell.
 
-    `error_mm` is the paper's Delta: the phalanx endpoints' distance from the truth, over all of them and all frames.
-    Repetitions see the same frames and differ in the swarm's seed.
+    `error_mm` is Delta of the paper: the mean endpoint error over all endpoints and frames. Repetitions track the same
+    frames with another seed of the swarm.
     """
-    seen = observed_motion(
+    motion = observed_motion(
         Synthesis(
             distance=distance_m,
             viewpoint=viewpoint,
@@ -84,21 +86,25 @@ def follow(
             resolution=resolution,
         )
     )
-    with closing(create_tracker(config, seen.hand)) as tracker:
-        estimates = [tracker.start(seen[0], seen.poses[0]), *(tracker.track(seen[i]) for i in range(1, len(seen)))]
-    model, poses = HandModel(seen.hand), np.array([estimate.pose for estimate in estimates])
-    error = endpoint_error(model, poses, model, seen.poses).statistics()
+    with closing(create_tracker(config, motion.hand)) as tracker:
+        first = tracker.start(motion[0], motion.poses[0])
+        estimates = [first, *(tracker.track(motion[i]) for i in range(1, len(motion)))]
+    model, poses = HandModel(motion.hand), np.array([estimate.pose for estimate in estimates])
+    error = endpoint_error(model, poses, model, motion.poses).statistics()
     return {
         "error_mm": error["mean"],
         "median_frame_mm": error["median"],
         "p95_frame_mm": error["p95"],
-        "angle_error_deg": angle_error(poses, seen.poses).statistics()["mean"],
+        "angle_error_deg": angle_error(poses, motion.poses).statistics()["mean"],
         "ms_per_frame": float(np.median([sum(estimate.stage_ms.values()) for estimate in estimates])),
     }
 
 
 def tabulate(rows: Sequence[Row], by: Sequence[str]) -> list[Row]:
-    """A line for every combination of the values of `by`: M_d, the median of Delta over the repetitions, and more."""
+    """Return one line per combination of the values in `by`, with medians over the repetitions.
+
+    `error_mm` is M_d of the paper, the median of Delta.
+    """
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
         groups.setdefault(tuple(row[name] for name in by), []).append(row)
@@ -120,6 +126,6 @@ def _summary(rows: Sequence[Row]) -> Row:
 
 
 def median_error(rows: Sequence[Row], **values: Any) -> float | None:
-    """M_d, millimetres, of the rows that have these values; None without any."""
+    """Return M_d, mm, of the rows with these values; None without any."""
     errors = [row["error_mm"] for row in rows if all(row[name] == value for name, value in values.items())]
     return float(np.median(errors)) if errors else None

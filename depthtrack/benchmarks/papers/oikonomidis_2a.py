@@ -1,4 +1,4 @@
-"""Fig. 2a of Oikonomidis et al. 2011: the error against the swarm's particles and generations."""
+"""Fig. 2a of Oikonomidis et al. 2011: error against particles and generations."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,10 @@ PARTICLES, QUICK_PARTICLES = (16, 32, 64, 128, 256), (16, 64, 128)
 GENERATIONS, QUICK_GENERATIONS = (5, 10, 15, 20, 25, 30, 40, 50), (10, 25, 40)
 
 RETAINED = {"particles": 64, "generations": 25}
-"""The budget of all further experiments, for more particles or generations gained at most half a millimetre."""
+"""Budget of the further experiments of the paper; a larger one reduced the error by at most 0.5 mm."""
 
 PAPER_MM = 5.0
-"""Its error at half a metre with that budget, read from the text on Fig. 2b."""
+"""Error of the paper at 0.5 m with that budget, from its text on Fig. 2b."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
@@ -37,10 +37,10 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     return [
         PaperComparison("error at 64 particles x 25 generations", "5 mm (its Fig. 2b, 0.5 m)", ours, "mm"),
         PaperComparison(
-            "what more of either gains at most", "0.5 mm", None if ours is None else ours - min(larger), "mm"
+            "largest gain of a larger budget", "0.5 mm", None if ours is None else ours - min(larger), "mm"
         ),
         PaperComparison(
-            "frames a second at 64 x 25 (ours: on one core)",
+            "frames per second at 64 x 25 (ours: one core)",
             "15 (GTX 580)",
             speeds[0] if speeds else None,
             "Hz",
@@ -65,7 +65,7 @@ EXPERIMENT = Experiment(
     title="Error against particles and generations",
     source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2a",
     cells=cells,
-    measure=oikonomidis.follow,
+    measure=oikonomidis.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Fig. 2b of Oikonomidis et al. 2011: the error against the hand's distance from the sensor."""
+"""Fig. 2b of Oikonomidis et al. 2011: error against the distance from the sensor."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 
 DISTANCES, QUICK_DISTANCES = (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5), (0.5, 1.0, 1.5, 2.0, 2.5)
 PAPER = {0.5: 5.0, 2.5: 7.5}
-"""Metres and millimetres, read from the text: 5 mm at half a metre, no more than 7.5 mm even at 2.5 m."""
+"""Errors of the paper, mm, by distance, m, from its text: 5 mm at 0.5 m, at most 7.5 mm at 2.5 m."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
@@ -36,7 +36,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
         distances, [line["lowest_mm"] for line in table], [line["highest_mm"] for line in table], alpha=0.2, lw=0
     )
     axes.plot(distances, [line["error_mm"] for line in table], marker="o", label="ours (band: all repetitions)")
-    axes.plot(*zip(*PAPER.items(), strict=True), "D", color="black", label="paper, read from its text", zorder=3)
+    axes.plot(*zip(*PAPER.items(), strict=True), "D", color="black", label="paper, from its text", zorder=3)
     axes.set(xlabel="distance from the sensor (m)", ylabel="error $M_d$ (mm)", ylim=(0, None))
     axes.legend()
 
@@ -46,7 +46,7 @@ EXPERIMENT = Experiment(
     title="Error against the distance from the sensor",
     source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2b",
     cells=cells,
-    measure=oikonomidis.follow,
+    measure=oikonomidis.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

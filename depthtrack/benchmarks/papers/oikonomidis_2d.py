@@ -1,4 +1,4 @@
-"""Fig. 2d of Oikonomidis et al. 2011: the error from eight viewpoints on a hemisphere around the scene."""
+"""Fig. 2d of Oikonomidis et al. 2011: error from eight viewpoints around the scene."""
 
 from collections.abc import Sequence
 
@@ -22,28 +22,28 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     errors = [line["error_mm"] for line in tabulate(rows)]
     return [
         PaperComparison(
-            "largest less smallest error of the viewpoints", "not significant", max(errors) - min(errors), "mm"
+            "largest minus smallest error of the viewpoints", "not significant", max(errors) - min(errors), "mm"
         ),
-        PaperComparison("largest error of the viewpoints", "not told", max(errors), "mm"),
+        PaperComparison("largest error of the viewpoints", "not given", max(errors), "mm"),
     ]
 
 
 def draw(axes: Axes, rows: Sequence[Row]) -> None:
     table = tabulate(rows)
     error = [line["error_mm"] for line in table]
-    max_distance = [
+    bars = [
         [line["error_mm"] - line["lowest_mm"] for line in table],
         [line["highest_mm"] - line["error_mm"] for line in table],
     ]
     axes.errorbar(
         [line["viewpoint"] for line in table],
         error,
-        max_distance,
+        bars,
         fmt="o",
         capsize=4,
         label="ours (bars: all repetitions)",
     )
-    axes.axhline(5, color="black", linestyle="--", lw=1, label="paper at 0.5 m (its Fig. 2b), read from its text")
+    axes.axhline(5, color="black", linestyle="--", lw=1, label="paper at 0.5 m (its Fig. 2b), from its text")
     axes.set(
         xlabel="viewpoint (0: frontal)",
         ylabel="error $M_d$ (mm)",
@@ -58,7 +58,7 @@ EXPERIMENT = Experiment(
     title="Error from eight viewpoints",
     source=f"{oikonomidis.OIKONOMIDIS_2011}, Fig. 2d",
     cells=cells,
-    measure=oikonomidis.follow,
+    measure=oikonomidis.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Fig. 4 of Oikonomidis et al. 2011: a pose from a single frame, without a guess; how far it is from the truth."""
+"""Fig. 4 of Oikonomidis et al. 2011: error of poses from single frames."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -18,13 +18,15 @@ from depthtrack.hand.pose import ORIENTATION
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import observed_motion
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.types import Array
 
 FRAMES = 45
-"""Frames at regular intervals; the paper took its 45 from a real recording, of which it held tracked poses for true."""
+"""Number of evenly spaced frames. The paper uses 45 of a real recording, and tracked poses as ground truth."""
 SEEDS, QUICK_SEEDS = 20, 5
 CLOSE_MM = 40.0
-"""An estimate this close to the truth, or closer, counts as good in the paper."""
+"""Largest error of a successful estimate in the paper."""
 SECOND_PEAK_MM = 80.0
+"""Error at the second peak of the paper's histogram."""
 WITHIN = "estimates within 4 cm"
 BIN_MM, LAST_BIN_MM = 2.5, 120.0
 
@@ -47,18 +49,17 @@ def measure(
     resolution: int | None,
     repetition: int,
 ) -> Row:
-    """Find the pose in one frame of `everyday`, half a metre away, from that frame's observation alone.
+    """Estimate the pose in one frame of `everyday` at 0.5 m, without initial guess.
 
-    `mirrored`: the estimated palm faces away from where the true one does, by more than a right angle, as when the
-    back of the hand is taken for its inside.
+    `mirrored`: the palm's normal is more than 90 degrees from the true one, as if back and inside were swapped.
     """
-    seen = observed_motion(Synthesis())
+    motion = observed_motion(Synthesis())
     config = tracker_config(oikonomidis.TRACKERS[variant], seed=repetition, renderer=renderer, resolution=resolution)
-    with closing(create_tracker(config, seen.hand)) as tracker:
-        estimate = tracker.start(seen[frame])
+    with closing(create_tracker(config, motion.hand)) as tracker:
+        estimate = tracker.start(motion[frame])
     assert estimate.pose is not None
-    model, true_pose = HandModel(seen.hand), seen.poses[frame]
-    turned = palm_turned(estimate.pose, true_pose)
+    model, true_pose = HandModel(motion.hand), motion.poses[frame]
+    turned = palm_angle(estimate.pose, true_pose)
     return {
         "error_mm": float(endpoint_error(model, estimate.pose[None], model, true_pose[None]).values[0]),
         "palm_turned_deg": turned,
@@ -69,14 +70,17 @@ def measure(
     }
 
 
-def palm_turned(pose: np.ndarray, true_pose: np.ndarray) -> float:
-    """Angle, degrees, between the palms' normals of two poses (27,)."""
+def palm_angle(pose: Array, true_pose: Array) -> float:
+    """Return the angle between the normals of two palms, degrees.
+
+    pose, true_pose: (27,).
+    """
     normals = [rotation_matrix(each[ORIENTATION])[:, 2] for each in (pose, true_pose)]
     return float(np.degrees(np.arccos(np.clip(normals[0] @ normals[1], -1, 1))))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    """The histogram: what share of all estimates lies in each interval of the error, and how many are mirrored."""
+    """Return the histogram of the error: shares of all and of mirrored estimates, percent."""
     edges = np.arange(0, LAST_BIN_MM + BIN_MM, BIN_MM)
     number = np.minimum(np.searchsorted(edges, [row["error_mm"] for row in rows], side="right") - 1, len(edges) - 1)
     mirrored = np.array([row["mirrored"] for row in rows])
@@ -96,9 +100,9 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     return [
         PaperComparison(WITHIN, "74 %", 100 * float(np.mean(error <= CLOSE_MM)), "%"),
         PaperComparison("mirrored poses", "the peak at about 8 cm", 100 * float(mirrored.mean()), "%"),
-        PaperComparison("median error", "not told", float(np.median(error)), "mm"),
+        PaperComparison("median error", "not given", float(np.median(error)), "mm"),
         PaperComparison(
-            "median time of a start", "not told", float(np.median([row["ms"] for row in rows])) / 1000, "s"
+            "median time of a start", "not given", float(np.median([row["ms"] for row in rows])) / 1000, "s"
         ),
     ]
 
@@ -107,15 +111,15 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     table = tabulate(rows)
     left = [line["from_mm"] / 10 for line in table]
     mirrored = np.array([line["mirrored_percent"] for line in table])
-    rightly = np.array([line["share_percent"] for line in table]) - mirrored
+    upright = np.array([line["share_percent"] for line in table]) - mirrored
     bars: dict[str, Any] = {"width": BIN_MM / 10, "align": "edge", "edgecolor": "white", "lw": 0.5}
-    axes.bar(left, rightly, label="ours, right way round", **bars)
-    axes.bar(left, mirrored, bottom=rightly, label="ours, mirrored", **bars)
+    axes.bar(left, upright, label="ours, not mirrored", **bars)
+    axes.bar(left, mirrored, bottom=upright, label="ours, mirrored", **bars)
     close = next(item for item in compare(rows) if item.what == WITHIN)
     mark(axes, CLOSE_MM / 10, f"within 4 cm:\nours {close.ours_text}\npaper {close.paper}")
-    mark(axes, SECOND_PEAK_MM / 10, "the paper's second peak:\nmirrored poses")
+    mark(axes, SECOND_PEAK_MM / 10, "second peak of the paper:\nmirrored poses")
     axes.set(
-        xlabel="error (cm)", ylabel="share of estimates (%)", xlim=(0, None), ylim=(0, 1.2 * max(mirrored + rightly))
+        xlabel="error (cm)", ylabel="share of estimates (%)", xlim=(0, None), ylim=(0, 1.2 * max(mirrored + upright))
     )
     axes.legend(loc="center right")
 

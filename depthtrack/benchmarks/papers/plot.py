@@ -1,4 +1,4 @@
-"""The picture of an experiment: ours as its module draws it, and below, the paper's text beside our figures."""
+"""Picture of an experiment: the plot of its module, and the figures of both below."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -21,16 +21,20 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.linewidth": 1.6,
     "lines.markersize": 4.5,
-    # Told apart by most eyes (Okabe and Ito 2008), in an order that also reads in grey.
+    # Distinct with colour blindness (Okabe and Ito 2008), in an order that is distinct in grey.
     "axes.prop_cycle": "cycler('color', ['#0072B2', '#E69F00', '#009E73', '#D55E00', '#CC79A7', '#56B4E9'])",
 }
 _INCHES = (7.2, 4.2)
+"""Width and height of the plot."""
 _LINE = 0.2
-"""Inches that a line of text takes below the axes."""
+"""Height of a line of text below the axes, inches."""
 
 
 def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[PaperComparison], note: str) -> bytes:
-    """The picture as a PNG file; `note` says how the rows came to be."""
+    """Return the picture as the content of a PNG file.
+
+    note: last line of the picture, which describes the measurements.
+    """
     below = [_head(), *map(_line, comparisons), ("", "", ""), (note, "", "")]
     height = _INCHES[1] + _LINE * (len(below) + 1)
     with rc_context(_STYLE):
@@ -49,13 +53,13 @@ def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[
 
 
 def mark(axes: Axes, x: float, text: str) -> None:
-    """A vertical line at `x`, with a word on what the paper says of it."""
+    """Draw a vertical line at `x` with a text beside it."""
     axes.axvline(x, color="0.5", linestyle=":")
     axes.text(x, 0.98, f" {text}".replace("\n", "\n "), va="top", color="0.35", transform=axes.get_xaxis_transform())
 
 
 def _head() -> tuple[str, str, str]:
-    return "", "paper, in its text", "ours"
+    return "", "paper, from its text", "ours"
 
 
 def _line(comparison: PaperComparison) -> tuple[str, str, str]:
@@ -65,16 +69,21 @@ def _line(comparison: PaperComparison) -> tuple[str, str, str]:
 def error_and_time(
     axes: Axes, x: Sequence[float], rows: Sequence[Row], at: float, paper_deg: float, paper_ms: float
 ) -> None:
-    """Mean joint angle error over `x` on the left axis, milliseconds of the median frame on the right one.
+    """Draw the mean joint angle error (left axis) and the time of the median frame (right axis).
 
-    In the paper, the error is less than `paper_deg` at x = `at`, and the time about `paper_ms`.
+    x: values on the horizontal axis, one per row.
+    at: value at which the paper gives its figures.
+    paper_deg: upper bound of the error in the paper, degrees.
+    paper_ms: time in the paper, ms.
     """
     box = axes.get_position()
     axes.set_position((box.x0, box.y0, 0.945 * box.width, box.height))
     clock = axes.twinx()
     axes.plot(x, [row["error_deg"] for row in rows], marker="o", label="ours: error, left")
     clock.plot(x, [row["ms_per_frame"] for row in rows], marker="s", color="C1", label="ours: time on one core, right")
-    axes.plot([at - 0.4, at + 0.4], [paper_deg] * 2, color="C0", linestyle="--", label="paper: error, less than this")
+    axes.plot(
+        [at - 0.4, at + 0.4], [paper_deg] * 2, color="C0", linestyle="--", label="paper: upper bound of the error"
+    )
     clock.plot(at, paper_ms, "D", color="C1", mec="black", ms=6, label="paper: time on eight threads")
     axes.set(ylabel="joint angle error (deg)", ylim=(0, 1.4 * axes.get_ylim()[1]))
     clock.set(ylabel="time of a frame (ms)", ylim=(0, 1.2 * clock.get_ylim()[1]))

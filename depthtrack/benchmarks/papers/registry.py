@@ -1,4 +1,4 @@
-"""The experiments by name; none is imported before it is asked for."""
+"""Registry of the experiments, which are imported on use."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -22,27 +22,29 @@ EXPERIMENTS = {
     "schroeder-11": f"{_HERE}.schroeder_11",
     "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
 }
-"""Modules that hold an `EXPERIMENT`; a name is the paper's first author, and the figure or section."""
+"""Modules with an `EXPERIMENT`, by the first author of the paper and the figure or section."""
 
 PAPERS = tuple(dict.fromkeys(name.partition("-")[0] for name in EXPERIMENTS))
+"""Names of the papers: their first authors."""
 
 SHORT_NAMES = {
     tail if tail.startswith("sec") else f"fig{tail}": name
     for name, tail in ((name, name.rpartition("-")[2]) for name in EXPERIMENTS)
 }
-"""Names without the paper's: no two papers here have a figure of the same number."""
+"""Full names by figure or section, which differ between the papers."""
 
 
 def load_experiment(name: str) -> Experiment:
-    """The experiment of this full name."""
+    """Return the experiment of a full name."""
     experiment: Experiment = import_module(EXPERIMENTS[name]).EXPERIMENT
     return experiment
 
 
 def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Experiments by full or short name, all of a paper by its author, or `all`; each once.
+    """Return the experiments of full names, short names, authors, or `all`; each once.
 
-    Raises InputError for others, naming those there are.
+    Raises:
+        InputError: if a name is unknown.
     """
     found: list[str] = []
     for name in names:
@@ -53,19 +55,23 @@ def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
             found.append(full)
         else:
             known = ", ".join(f"{short} ({full})" for short, full in SHORT_NAMES.items())
-            raise InputError(f"no figure '{name}': choose all, {', '.join(PAPERS)}, or some of {known}")
+            raise InputError(f"there is no figure '{name}': choose all, {', '.join(PAPERS)}, or some of {known}")
     return [load_experiment(name) for name in dict.fromkeys(found)]
 
 
 def full_cell(experiment: Experiment, cell: Cell) -> Cell:
-    """A cell as workers and journals know it: with the experiment's name, and the version that measures."""
+    """Return a cell with the name of its experiment and the version of the program."""
     return {"figure": experiment.name, "version": __version__} | cell
 
 
 def measure_cell(cell: Cell) -> Row:
-    """Measure a full cell. Raises InputError where this process has another version of depthtrack."""
+    """Return the measured values of a full cell.
+
+    Raises:
+        InputError: if this process has another version of depthtrack.
+    """
     arguments = dict(cell)
     figure, version = arguments.pop("figure"), arguments.pop("version")
     if version != __version__:
-        raise InputError(f"this worker has depthtrack {__version__}, the sweep needs {version}: install that one")
+        raise InputError(f"the sweep needs depthtrack {version}, the worker has {__version__}: install {version}")
     return load_experiment(figure).measure(**arguments)

@@ -1,7 +1,7 @@
-"""One experiment from its cells to its folder: rows, table, picture, and our figures beside the paper's.
+"""Run an experiment and write its folder.
 
-The folder holds `rows.jsonl` (a row a cell, written as they come; what an interrupted sweep goes on from),
-`table.csv`, `summary.json` and `figure.png`.
+The folder contains `rows.jsonl` with one row per cell, from which an interrupted sweep continues, `table.csv`,
+`summary.json` and `figure.png`.
 """
 
 import csv
@@ -22,16 +22,20 @@ from depthtrack.files import write_atomic
 from depthtrack.machine import Machine, describe_machine
 
 RowProgress = Callable[[Iterator[Row], int, int], Iterable[Row]]
-"""Watches new rows go by; told how many there are in all, and how many were there before."""
+"""Wraps the new rows, as a progress bar does. Takes the rows, the number of all rows, and that of existing rows."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A figure, reproduced.
+    """Summary of a reproduced figure.
 
-    `cells` in all, `reused` of which the folder had rows already; `seconds` that this call took, `cell_seconds` that
-    all cells together took, now or before; `table` as the experiment tabulates its rows; `machine` that called (a
-    cluster's workers may be others).
+    machine: machine of this process; workers of a cluster may run on others.
+    cells: number of cells.
+    reused: number of cells with existing rows.
+    seconds: time of this call.
+    cell_seconds: total time of all cells, existing ones included.
+    comparisons: figures of the paper beside ours.
+    table: table of the experiment.
     """
 
     figure: str
@@ -47,6 +51,7 @@ class Reproduction:
     table: list[Row]
 
     def to_json(self) -> dict[str, Any]:
+        """Return the summary as JSON values."""
         return asdict(self)
 
 
@@ -57,7 +62,14 @@ def reproduce(
     workers: Workers,
     progress: RowProgress = lambda rows, total, reused: rows,
 ) -> Reproduction:
-    """Measure the cells that `folder` has no row of yet, then write table, picture and summary there."""
+    """Measure the cells without a row in `folder`, then write table, picture and summary.
+
+    progress: wraps the new rows.
+
+    Raises:
+        InputError: if an option is unusable, or `rows.jsonl` is damaged.
+        SweepError: if a cell fails.
+    """
     begun = perf_counter()
     machine = describe_machine()
     cells = [full_cell(experiment, cell) for cell in experiment.cells(options)]
@@ -84,7 +96,10 @@ def reproduce(
 
 
 def as_note(done: Reproduction, cell: Cell) -> str:
-    """How the rows came to be, in one line; `cell`, any of them, tells what the experiment takes note of."""
+    """Return one line that describes the measurements.
+
+    cell: any cell, whose keys show the options that the experiment uses.
+    """
     options = done.options
     side = "native resolution" if options.side is None else f"{options.side} pixels"
     parts = [
@@ -99,7 +114,7 @@ def as_note(done: Reproduction, cell: Cell) -> str:
 
 
 def as_csv(table: Sequence[Row]) -> str:
-    """The table with a header line."""
+    """Return the table as CSV with a header line."""
     text = StringIO()
     writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""Following a motion by fitting the hand's surface: what Sec. VI of Schroeder et al. 2014 repeats and varies."""
+"""Track a motion by fitting the surface: the measurement of Schroeder et al. 2014, Sec. VI."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import closing
@@ -28,19 +28,21 @@ DEFAULTS: Cell = {
     "components": None,
     "soft": False,
 }
-"""What an experiment leaves as it is: five ICP iterations on a third of the points, all degrees of freedom."""
-
+"""Values that an experiment does not vary: five ICP iterations on a third of the points, all degrees of freedom."""
 
 TRACKERS = {"default": "ik", "paper": "schroeder2014"}
 """Tracker of each variant."""
 
 
 def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
-    """Every condition, a change from the usual one. The tracker draws nothing at random: once is enough."""
+    """Return the cells of the conditions; the tracker is deterministic, so each occurs once.
+
+    conditions: values that differ from DEFAULTS.
+    """
     return [DEFAULTS | condition | {"variant": options.variant, "frames": options.frames} for condition in conditions]
 
 
-def follow(
+def track_motion(
     *,
     motion: str,
     model: Literal["skin", "cylinders"],
@@ -52,18 +54,17 @@ def follow(
     variant: Literal["default", "paper"],
     frames: int | None,
 ) -> Row:
-    """Track from the true first pose on, by fitting alone.
+    """Track the motion from the true first pose by the surface fit alone.
 
-    The hand is rendered from the skin, as the paper's is, by a perfect sensor half a metre away. Of `synergies`, a
-    name that `load_source` knows, the first `components` are solved for; None solves for all angles, and so does
-    `soft`, drawn to what those synergies hold likely.
+    synergies: name for `synergy_sources.load_source`, to solve for its first `components`; None solves for all angles.
+    soft: solve for all angles with the synergies as a prior.
 
-    `error_deg` is the paper's posture error, the mean difference of the joint angles; `error_mm` the phalanx
-    endpoints' distance from the truth; both over all frames, and `frame_errors_deg` of each. `ms_per_frame` is the
-    processor time of the median frame, from the depth map to the pose, point cloud included: what the wall clock shows
-    on an idle core, whoever else is at work.
+    The hand is rendered from the skin, as in the paper, by a perfect sensor at 0.5 m. `error_deg` is the posture error
+    of the paper, the mean difference of the joint angles, and `error_mm` the endpoint error; both over all frames.
+    `frame_errors_deg` is the posture error of each frame. `ms_per_frame` is the CPU time of the median frame, point
+    cloud included, which does not depend on other processes.
     """
-    seen = observed_motion(Synthesis(motion=motion, model="skin", frames=frames))
+    observed = observed_motion(Synthesis(motion=motion, model="skin", frames=frames))
     config = without_recovery(
         tracker_config(
             TRACKERS[variant],
@@ -75,18 +76,18 @@ def follow(
     )
     known = None if synergies is None else load_source(synergies).synergies.truncated(components or 20)
     points, seconds, estimates = [], [], list[Estimate]()
-    with closing(create_tracker(config, seen.hand, synergies=known)) as tracker:
-        for index in range(len(seen)):
-            observation, begun = seen.uncached(index), process_time()
+    with closing(create_tracker(config, observed.hand, synergies=known)) as tracker:
+        for index in range(len(observed)):
+            observation, begun = observed.uncached(index), process_time()
             if index == 0:
-                estimates.append(tracker.start(observation, seen.poses[0]))
+                estimates.append(tracker.start(observation, observed.poses[0]))
             else:
                 estimates.append(tracker.track(observation))
             seconds.append(process_time() - begun)
             points.append(len(observation.points))
-    hand, poses = HandModel(seen.hand), np.array([estimate.pose for estimate in estimates])
-    angles, endpoints = angle_error(poses, seen.poses), endpoint_error(hand, poses, hand, seen.poses).statistics()
-    degrees = angles.statistics()
+    hand, poses = HandModel(observed.hand), np.array([estimate.pose for estimate in estimates])
+    angles = angle_error(poses, observed.poses)
+    degrees, endpoints = angles.statistics(), endpoint_error(hand, poses, hand, observed.poses).statistics()
     return {
         "error_deg": degrees["mean"],
         "median_frame_deg": degrees["median"],
@@ -100,19 +101,20 @@ def follow(
 
 
 MEASURED = ("error_deg", "median_frame_deg", "p95_frame_deg", "error_mm", "median_frame_mm", "points", "ms_per_frame")
+"""Measured values in the table."""
 
 
 def tabulate(rows: Sequence[Row], by: Sequence[str]) -> list[Row]:
-    """A line a row: what was varied, and what came of it."""
+    """Return one line per row, with the values in `by` and the measured ones."""
     return [{name: row[name] for name in (*by, *MEASURED)} for row in rows]
 
 
 def value(rows: Sequence[Row], name: str, **values: Any) -> float | None:
-    """What was measured under `name` in the row that has these values; None without one."""
+    """Return the measured value `name` in the row with these values; None without one."""
     found = [row[name] for row in rows if all(row[key] == wanted for key, wanted in values.items())]
     return float(found[0]) if found and found[0] is not None else None
 
 
 def ratio(a: float | None, b: float | None) -> float | None:
-    """a / b, where both are known."""
+    """Return a / b; None if one is unknown or b is 0."""
     return a / b if a is not None and b else None

@@ -1,4 +1,4 @@
-"""Fig. 10 of Schroeder et al. 2014 and its text: grasps whose fingers the back of the hand hides."""
+"""Fig. 10 of Schroeder et al. 2014: grasps with fingers behind the back of the hand."""
 
 from collections.abc import Sequence
 
@@ -12,23 +12,26 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 
 MOTION, OTHER_GRASPS = "grasp", "other-grasps"
 SHARE, LARGER_SHARE = 0.99, 0.998
-"""As many synergies are taken as cover this share of their variance, the paper's; and, alone, a few more of them."""
+"""Share of the variance that the synergies cover: that of the paper, and a larger one for synergies alone."""
 FRAME_RATE = 30
 PAPER_DEG = {"all angles": 12.0, "synergies alone": 4.0}
-"""Read from the text; which grasps its synergies are of, the tracked ones or others, it does not tell."""
+"""Errors in the text of the paper, which does not state whether its synergies are of the tracked grasps."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    """All angles; synergies of other grasps, and of these, alone and (not in the paper) as what angles are drawn to."""
-    ways = (False,) if options.variant == "paper" else (False, True)
-    spaces: list[Cell] = [{}]
+    """Return cells of all angles, and of synergies of other and these grasps.
+
+    Synergies are used alone and, which the paper does not, as a prior.
+    """
+    priors = (False,) if options.variant == "paper" else (False, True)
+    subspaces: list[Cell] = [{}]
     for name in dict.fromkeys([resolve_name(options.synergies, OTHER_GRASPS), MOTION]):
         synergies = load_source(name).synergies
         count, larger = synergies.components_for(SHARE), synergies.components_for(LARGER_SHARE)
-        spaces += [{"synergies": name, "components": count, "soft": soft} for soft in ways]
+        subspaces += [{"synergies": name, "components": count, "soft": soft} for soft in priors]
         if larger > count:
-            spaces.append({"synergies": name, "components": larger, "soft": False})
-    return schroeder.cells(options, ({"motion": MOTION} | space for space in spaces))
+            subspaces.append({"synergies": name, "components": larger, "soft": False})
+    return schroeder.cells(options, ({"motion": MOTION} | subspace for subspace in subspaces))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
@@ -48,31 +51,31 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         PaperComparison("synergies of other grasps alone", "about 4 deg", ours("error_deg"), "deg"),
         PaperComparison(
             f"{most} synergies of other grasps alone ({100 * LARGER_SHARE:g} %)",
-            "not told",
+            "not given",
             schroeder.value(rows, "error_deg", synergies=other, soft=False, components=most),
             "deg",
         ),
         PaperComparison("synergies of these grasps alone", "about 4 deg", ours("error_deg", MOTION), "deg"),
         PaperComparison(
-            "all angles, drawn to synergies of other grasps", "not told", ours("error_deg", soft=True), "deg"
+            "all angles, synergies of other grasps as prior", "not given", ours("error_deg", soft=True), "deg"
         ),
         PaperComparison("synergies for 99 % of other grasps' variance", "5", ours("components"), "of them"),
-        PaperComparison("endpoint error, all angles", "not told", ours("error_mm", None), "mm"),
-        PaperComparison("endpoint error, synergies of other grasps alone", "not told", ours("error_mm"), "mm"),
-        PaperComparison("frames a second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
-        PaperComparison("frames a second, synergies alone", "30 (8 threads)", hertz[1], "Hz"),
+        PaperComparison("endpoint error, all angles", "not given", ours("error_mm", None), "mm"),
+        PaperComparison("endpoint error, synergies of other grasps alone", "not given", ours("error_mm"), "mm"),
+        PaperComparison("frames per second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
+        PaperComparison("frames per second, synergies alone", "30 (8 threads)", hertz[1], "Hz"),
     ]
 
 
 def draw(axes: Axes, rows: Sequence[Row]) -> None:
     drawn = set[tuple[object, bool]]()
     for row in rows:
-        # Of other grasps' synergies, only as many as in the paper: they come first.
+        # Rows with the number of synergies of the paper come first; others are left out.
         if row["synergies"] == MOTION or (row["synergies"], row["soft"]) in drawn:
             continue
         drawn.add((row["synergies"], row["soft"]))
         soft, kind = row["soft"], "all angles" if row["synergies"] is None else "synergies alone"
-        colour, label = ("C2", "all angles, drawn to synergies") if soft else (_COLOURS[kind], kind)
+        colour, label = ("C2", "all angles, synergies as prior") if soft else (_COLOURS[kind], kind)
         seconds = np.arange(len(row["frame_errors_deg"])) / FRAME_RATE
         axes.plot(seconds, row["frame_errors_deg"], color=colour, label=f"ours, {label}")
         if not soft:
@@ -89,7 +92,7 @@ EXPERIMENT = Experiment(
     title="Grasps with hidden fingers: all angles, and synergies",
     source=f"{schroeder.SCHROEDER_2014}, Fig. 10",
     cells=cells,
-    measure=schroeder.follow,
+    measure=schroeder.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Fig. 11 of Schroeder et al. 2014 and its text: postures of signs from single frames, with a hierarchy and without."""
+"""Fig. 11 of Schroeder et al. 2014: signs from single frames, with and without hierarchy."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -35,36 +35,37 @@ Way = Literal["hierarchical", "all angles at once"]
 
 MOTION = "signs"
 OTHERS = "signs but this one"
-"""Synergies of all frames of the motion between the signs before and after."""
+"""Name of the synergies of the motion without the frames between the sign before and the sign after."""
 SEEDS = 5
-"""Our hierarchy draws postures to begin with; the paper's begins with the mean one."""
+"""Number of repetitions; our hierarchy starts from random postures, that of the paper from the mean one."""
 PAPER_DEG: dict[Way, float] = {"hierarchical": 0.4, "all angles at once": 22.0}
-"""Read from the text, as are about 10 s a frame."""
-_LEAST_HOLD = 5
-"""Frames that a posture stays the same where a sign is held."""
+"""Errors in the text of the paper, which also gives about 10 s per frame."""
+_SHORTEST_HOLD = 5
+"""Smallest number of frames with the same posture in which a sign is held."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    """A sign is what is held: its frame is the middle of the hold. Only what draws at random is repeated."""
+    """Return the cells of all signs; only random methods are repeated."""
     name = resolve_name(options.synergies, MOTION)
     ways: list[tuple[Way, str]] = [("hierarchical", name), ("all angles at once", name)]
     if name == MOTION:
         ways.insert(1, ("hierarchical", OTHERS))
-    drawn = options.variant == "default"
+    is_random = options.variant == "default"
     return [
         {"sign": number, "way": way, "synergies": which, "variant": options.variant, "repetition": seed}
         for number in range(len(_signs(options.frames)))
         for way, which in ways
-        for seed in (options.seeds(SEEDS, 1) if drawn and way == "hierarchical" else range(1))
+        for seed in (options.seeds(SEEDS, 1) if is_random and way == "hierarchical" else range(1))
     ]
 
 
 def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", "paper"], repetition: int) -> Row:
-    """Estimate the posture of a sign from its frame alone: the whole point cloud, and the true global pose.
+    """Estimate the posture of a sign from the middle frame of its hold and the true global pose.
 
-    Errors as in `schroeder.follow`; `s_per_frame` the processor time, point cloud included.
+    All points are used. The errors are those of `schroeder.track_motion`; `s_per_frame` is the CPU time, point cloud
+    included.
     """
-    seen, holds = _motion(None), _signs(None)
+    motion, holds = _motion(None), _signs(None)
     frame = sum(holds[sign]) // 2
     known = _without(sign) if synergies == OTHERS else load_source(synergies).synergies
     coarse_to_fine = (
@@ -72,11 +73,11 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
     )
     fit = SurfaceFitOptions(subsample=1, icp=PAPER_ICP if variant == "paper" else IcpOptions())
     _compile()
-    with closing(Toolkit(seen.hand, ScoringOptions(), synergies=known)) as tools:
-        observation, begun = seen.uncached(frame), process_time()
-        pose = estimate_single_frame(tools, observation, seen.poses[frame], coarse_to_fine, fit, repetition).pose
+    with closing(Toolkit(motion.hand, ScoringOptions(), synergies=known)) as tools:
+        observation, begun = motion.uncached(frame), process_time()
+        pose = estimate_single_frame(tools, observation, motion.poses[frame], coarse_to_fine, fit, repetition).pose
         seconds = process_time() - begun
-    hand, pose, true = HandModel(seen.hand), pose[None], seen.poses[[frame]]
+    hand, pose, true = HandModel(motion.hand), pose[None], motion.poses[[frame]]
     return {
         "frame": frame,
         "error_deg": float(angle_error(pose, true).values[0]),
@@ -86,10 +87,13 @@ def measure(*, sign: int, way: Way, synergies: str, variant: Literal["default", 
 
 
 def static_intervals(poses: Array) -> list[tuple[int, int]]:
-    """First and last frame of every stretch of poses (T, 27) in which nothing moves for a while."""
+    """Return the first and last frame of each interval in which the pose is constant.
+
+    poses: (T, 27).
+    """
     still = np.abs(np.diff(poses, axis=0)).max(axis=1) < 1e-9
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _LEAST_HOLD]
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _SHORTEST_HOLD]
 
 
 def _motion(frames: int | None) -> ObservedMotion:
@@ -99,12 +103,12 @@ def _motion(frames: int | None) -> ObservedMotion:
 def _signs(frames: int | None) -> list[tuple[int, int]]:
     found = static_intervals(_motion(frames).poses)
     if not found:
-        raise InputError(f"the first {frames} frames of {MOTION} hold no sign: ask for 25 or more")
+        raise InputError(f"the first {frames} frames of {MOTION} contain no sign: give --frames 25 or more")
     return found
 
 
 def _without(sign: int) -> Synergies:
-    """Synergies of the motion without a sign and the ways to and from it."""
+    """Return synergies of the motion without a sign and the transitions around it."""
     poses, holds = _motion(None).poses, _signs(None)
     first = holds[sign - 1][1] + 1 if sign > 0 else 0
     last = holds[sign + 1][0] if sign + 1 < len(holds) else len(poses)
@@ -113,16 +117,16 @@ def _without(sign: int) -> Synergies:
 
 @lru_cache(maxsize=1)
 def _compile() -> None:
-    """Let the first frame that is timed find everything compiled."""
-    seen = _motion(None)
+    """Compile the kernels, so that no timed frame does."""
+    motion = _motion(None)
     for coarse_to_fine, icp in ((CoarseToFine(), IcpOptions()), (PAPER_COARSE_TO_FINE, PAPER_ICP)):
         fit = SurfaceFitOptions(subsample=50, icp=icp)
-        with closing(Toolkit(seen.hand, ScoringOptions(), synergies=load_source(MOTION).synergies)) as tools:
-            estimate_single_frame(tools, seen.uncached(0), seen.poses[0], coarse_to_fine, fit)
+        with closing(Toolkit(motion.hand, ScoringOptions(), synergies=load_source(MOTION).synergies)) as tools:
+            estimate_single_frame(tools, motion.uncached(0), motion.poses[0], coarse_to_fine, fit)
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
-    """A line for each way and synergies: over all signs and repetitions."""
+    """Return one line per method and synergies, over all signs and repetitions."""
     table = []
     for way, synergies in dict.fromkeys((row["way"], row["synergies"]) for row in rows):
         mine = [row for row in rows if (row["way"], row["synergies"]) == (way, synergies)]
@@ -160,20 +164,20 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
             ours("s_per_frame", "hierarchical"),
             "s",
         ),
-        PaperComparison("endpoint error, hierarchical", "not told", ours("error_mm", "hierarchical"), "mm"),
+        PaperComparison("endpoint error, hierarchical", "not given", ours("error_mm", "hierarchical"), "mm"),
         PaperComparison(
-            "joint angle error, the sign unknown to the synergies",
-            "not told",
+            "joint angle error, synergies without the sign",
+            "not given",
             ours("error_deg", "hierarchical", others=True),
             "deg",
         ),
-        PaperComparison("hierarchical, median", "not told", ours("median_deg", "hierarchical"), "deg"),
-        PaperComparison("hierarchical, worst", "not told", ours("worst_deg", "hierarchical"), "deg"),
+        PaperComparison("hierarchical, median", "not given", ours("median_deg", "hierarchical"), "deg"),
+        PaperComparison("hierarchical, maximum", "not given", ours("worst_deg", "hierarchical"), "deg"),
     ]
 
 
 def draw(axes: Axes, rows: Sequence[Row]) -> None:
-    """Every sign: the median over the repetitions, and all of them."""
+    """Draw the median and the range over the repetitions of each sign."""
     labels = {
         ("all angles at once", False): ("C1", "s", "all angles at once"),
         ("hierarchical", True): ("C2", "^", "hierarchical, synergies of the other signs"),
@@ -197,7 +201,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 
 EXPERIMENT = Experiment(
     name="schroeder-11",
-    title="Signs from single frames, with a hierarchy and without",
+    title="Signs from single frames, with and without hierarchy",
     source=f"{SCHROEDER_2014}, Fig. 11",
     cells=cells,
     measure=measure,

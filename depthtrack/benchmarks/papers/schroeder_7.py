@@ -1,4 +1,4 @@
-"""Fig. 7 of Schroeder et al. 2014 and Sec. VI-A: what is left of postures in so many principal components."""
+"""Fig. 7 and Sec. VI-A of Schroeder et al. 2014: postures in few principal components."""
 
 from collections.abc import Sequence
 
@@ -17,16 +17,15 @@ from depthtrack.types import Array
 
 COUNTS, QUICK_COUNTS = tuple(range(1, 21)), (1, 2, 3, 4, 6, 8, 10, 12, 16, 20)
 SETS = (("signs", "signs"), ("leap", "signs"), ("leap-grasps", "grasp"))
-"""Synergies, and the motion whose postures they are to approximate: the motion's own, as in the paper, and those of
-other hands."""
+"""Synergies and the motion to approximate: synergies of the motion, as in the paper, and of other hands."""
 PAPER_SHARES: dict[str, dict[int, str]] = {
     "signs": {},
     "leap": {3: "about 80 %", 6: "about 90 %"},
     "leap-grasps": {2: "about 83 %", 3: "90 %"},
 }
-"""Share of the variance in so many components, read from the text of Sec. VI-A: of all its motions, and of grasps."""
+"""Share of the variance by number of components in the text of Sec. VI-A: of all motions, and of grasps."""
 EITHER = {2: "about 83 % of grasps", 3: "about 80 %, 90 % of grasps", 6: "about 90 %"}
-"""The same, for synergies of who knows what."""
+"""The same for other synergies."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
@@ -43,10 +42,12 @@ def cells(options: ExperimentOptions) -> list[Cell]:
 
 
 def measure(*, synergies: str, postures: str | None, components: int) -> Row:
-    """Approximate every posture of a motion, or of the set that the synergies were fitted to, by the first components.
+    """Approximate postures by the first components of synergies.
 
-    The posture that is least like their mean stands for the paper's particular one. Errors as in `schroeder.follow`,
-    the hand as a whole being where it is.
+    postures: motion with the postures; None for those of the synergies' fit.
+
+    The posture with the largest distance from the mean stands for the particular one of the paper. The errors are those
+    of `schroeder.track_motion` with the true global pose.
     """
     found = load_source(synergies)
     true = found.postures if postures is None else motion_postures(postures)
@@ -66,7 +67,7 @@ def measure(*, synergies: str, postures: str | None, components: int) -> Row:
 
 
 def _still(angles: Array) -> Array:
-    """Poses (N, 27) of a hand with finger angles (N, 20) that stays where it is."""
+    """Return poses (N, 27) with finger angles (N, 20) and a constant global pose."""
     return make_pose(np.zeros((len(angles), 3)), np.tile([1.0, 0, 0, 0], (len(angles), 1)), angles)
 
 
@@ -89,7 +90,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     errors = [
         PaperComparison(
             f"mean error of {_postures(rows, name)}, 6 of {short_label(name)}",
-            "not told",
+            "not given",
             value(rows, "error_deg", synergies=name, components=6),
             "deg",
         )
@@ -108,7 +109,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     axes.plot([], [], linestyle="--", color="0.3", label="mean of all postures")
     axes.set(xlabel="principal components", ylabel="joint angle error (deg)", ylim=(0, None), xlim=(0.5, 20.5))
     axes.set_xticks(COUNTS)
-    axes.legend(title="the posture least like the others", alignment="left")
+    axes.legend(title="posture with the largest distance from the mean", alignment="left")
 
 
 def _names(rows: Sequence[Row]) -> list[str]:
@@ -116,7 +117,7 @@ def _names(rows: Sequence[Row]) -> list[str]:
 
 
 def _postures(rows: Sequence[Row], name: str) -> str:
-    """What the synergies of this name are to approximate."""
+    """Return the name of the postures that the synergies of this name approximate."""
     motion = next(row["postures"] for row in rows if row["synergies"] == name)
     return "its postures" if motion is None else str(motion)
 

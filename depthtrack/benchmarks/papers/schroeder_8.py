@@ -1,4 +1,4 @@
-"""Fig. 8 of Schroeder et al. 2014: error and time against the number of ICP iterations."""
+"""Fig. 8 of Schroeder et al. 2014: error and time against ICP iterations."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,9 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 
 ITERATIONS, QUICK_ITERATIONS = tuple(range(1, 11)), (1, 2, 3, 5, 7, 10)
 RETAINED = 5
-"""Of all further experiments in the paper."""
+"""Iterations in the further experiments of the paper."""
 PAPER_DEG, PAPER_MS = 2.0, 40.0
-"""Read from the text: less than 2 degrees after five iterations; about 40 ms on all cores of an eight-core Xeon."""
+"""From the text: less than 2 degrees after five iterations; about 40 ms on all cores of an eight-core Xeon."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
@@ -32,12 +32,12 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     return [
         PaperComparison("joint angle error after 5 iterations", "under 2 deg", five, "deg"),
         PaperComparison(
-            "the same beside that of a single iteration", "under a third", schroeder.ratio(five, one), "of it"
+            "its ratio to the error after 1 iteration", "under a third", schroeder.ratio(five, one), "of it"
         ),
-        PaperComparison("endpoint error after 5 iterations", "not told", five_mm, "mm"),
+        PaperComparison("endpoint error after 5 iterations", "not given", five_mm, "mm"),
         PaperComparison("time of a frame, 5 iterations (ours: one core)", "about 40 ms (8 threads)", five_ms, "ms"),
         PaperComparison(
-            "time of 10 iterations beside that of 5", "grows linearly", schroeder.ratio(ten_ms, five_ms), "of it"
+            "ratio of the times of 10 and 5 iterations", "grows linearly", schroeder.ratio(ten_ms, five_ms), "of it"
         ),
     ]
 
@@ -54,7 +54,7 @@ EXPERIMENT = Experiment(
     title="Error and time against ICP iterations",
     source=f"{schroeder.SCHROEDER_2014}, Fig. 8",
     cells=cells,
-    measure=schroeder.follow,
+    measure=schroeder.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Fig. 9 of Schroeder et al. 2014: error and time against the subsampling of the point cloud."""
+"""Fig. 9 of Schroeder et al. 2014: error and time against subsampling of the points."""
 
 from collections.abc import Sequence
 
@@ -10,12 +10,11 @@ from depthtrack.benchmarks.papers.plot import error_and_time
 from depthtrack.evaluation.sweep.rows import Cell, Row
 
 SUBSAMPLINGS, QUICK_SUBSAMPLINGS = tuple(range(1, 11)), (1, 3, 5, 7, 10)
-"""Every so many-th point is used."""
+"""Values of n; every n-th point is used."""
 RETAINED = 3
-"""Of all further experiments in the paper."""
+"""Value in the further experiments of the paper."""
 PAPER_DEG, PAPER_MS = 2.0, 40.0
-"""Read from the text: less than 2 degrees (on Fig. 8, the same setting); about 40 ms on all cores of an eight-core
-Xeon."""
+"""From the text: less than 2 degrees (Fig. 8, same setting); about 40 ms on all cores of an eight-core Xeon."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
@@ -37,19 +36,21 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
             "deg",
         ),
         PaperComparison(
-            "the same with a tenth of the points",
-            "not told",
+            "joint angle error with a tenth of the points",
+            "not given",
             schroeder.value(rows, "error_deg", subsampling=SUBSAMPLINGS[-1]),
             "deg",
         ),
         PaperComparison(
             "endpoint error with a third of the points",
-            "not told",
+            "not given",
             schroeder.value(rows, "error_mm", subsampling=RETAINED),
             "mm",
         ),
-        PaperComparison("time of a frame at a third (ours: one core)", "about 40 ms (8 threads)", time, "ms"),
-        PaperComparison("frames a second at a third", "about 25", schroeder.ratio(1000, time), "Hz"),
+        PaperComparison(
+            "time of a frame with a third of the points (ours: one core)", "about 40 ms (8 threads)", time, "ms"
+        ),
+        PaperComparison("frames per second with a third of the points", "about 25", schroeder.ratio(1000, time), "Hz"),
     ]
 
 
@@ -64,7 +65,7 @@ EXPERIMENT = Experiment(
     title="Error and time against subsampling",
     source=f"{schroeder.SCHROEDER_2014}, Fig. 9",
     cells=cells,
-    measure=schroeder.follow,
+    measure=schroeder.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Sec. VI-C of Schroeder et al. 2014: cylinders in place of the mesh, for all angles and for few synergies."""
+"""Sec. VI-C of Schroeder et al. 2014: cylinders in place of the mesh."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,23 +14,23 @@ MODELS = ("skin", "cylinders")
 WORDS = {"skin": "mesh", "cylinders": "cylinders"}
 COMPONENTS, QUICK_COMPONENTS = (3, 6, 9, 12, 15, 18), (6, 12)
 REDUCED = 6
-"""The paper's (6 + 6) degrees of freedom."""
+"""Number of synergies in the (6 + 6) degrees of freedom of the paper."""
 PAPER_DEG = {"skin": 2.0, "cylinders": 4.0}
-"""Read from the text: all degrees of freedom."""
-BASES = (schroeder.DEFAULTS["motion"], "leap")
-"""The paper's synergies and motions come from the same recordings: so do the motion's own; and those of other hands."""
+"""Errors with all degrees of freedom in the text of the paper."""
+SOURCES = (schroeder.DEFAULTS["motion"], "leap")
+"""Synergies of the motion, as in the paper, and of other hands."""
 ALL_ANGLES = 21
-"""Where all angles stand on the plot's axis of synergies."""
+"""Position of all angles on the axis of synergies."""
 
 
 def cells(options: ExperimentOptions) -> list[Cell]:
-    names = [resolve_name(options.synergies, name) for name in BASES]
-    spaces: list[Cell] = [{}]
+    names = [resolve_name(options.synergies, name) for name in SOURCES]
+    subspaces: list[Cell] = [{}]
     for name in dict.fromkeys(names):
         known = len(load_source(name).synergies)
         counts = QUICK_COMPONENTS if options.quick else COMPONENTS
-        spaces += [{"synergies": name, "components": n} for n in counts if n <= known]
-    return schroeder.cells(options, ({"model": model} | space for space in spaces for model in MODELS))
+        subspaces += [{"synergies": name, "components": n} for n in counts if n <= known]
+    return schroeder.cells(options, ({"model": model} | subspace for subspace in subspaces for model in MODELS))
 
 
 def tabulate(rows: Sequence[Row]) -> list[Row]:
@@ -43,22 +43,22 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
     lines = [
         PaperComparison("joint angle error, all angles, mesh", "about 2 deg", skin, "deg"),
         PaperComparison("joint angle error, all angles, cylinders", "about 4 deg", cylinders, "deg"),
-        PaperComparison("endpoint error, all angles, mesh", "not told", skin_mm, "mm"),
-        PaperComparison("endpoint error, all angles, cylinders", "not told", cylinders_mm, "mm"),
+        PaperComparison("endpoint error, all angles, mesh", "not given", skin_mm, "mm"),
+        PaperComparison("endpoint error, all angles, cylinders", "not given", cylinders_mm, "mm"),
     ]
     for name in _names(rows):
         skin, cylinders = (
             schroeder.value(rows, "error_deg", model=model, synergies=name, components=REDUCED) for model in MODELS
         )
         lines += [
-            PaperComparison(f"6 + 6, synergies {_label(name)}, mesh", "not told", skin, "deg"),
+            PaperComparison(f"6 + 6, synergies {_label(name)}, mesh", "not given", skin, "deg"),
             PaperComparison(f"6 + 6, synergies {_label(name)}, cylinders", "virtually as mesh", cylinders, "deg"),
         ]
     full, few = (_hertz(rows, n) for n in (None, REDUCED))
     return [
         *lines,
-        PaperComparison("frames a second, all angles (ours: mesh, one core)", "25 (8 threads)", full, "Hz"),
-        PaperComparison("frames a second, 6 + 6", "30 (8 threads)", few, "Hz"),
+        PaperComparison("frames per second, all angles (ours: mesh, one core)", "25 (8 threads)", full, "Hz"),
+        PaperComparison("frames per second, 6 + 6", "30 (8 threads)", few, "Hz"),
     ]
 
 
@@ -84,7 +84,7 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
             "label": f"paper, {WORDS[model]}, all angles",
         }
         axes.plot(ALL_ANGLES + 0.3, PAPER_DEG[model], "D", **paper)
-    axes.set(xlabel="synergies solved for, besides the 6 of the global pose", ylabel="joint angle error (deg)")
+    axes.set(xlabel="synergies besides the 6 degrees of freedom of the global pose", ylabel="joint angle error (deg)")
     axes.set(ylim=(0, 1.5 * axes.get_ylim()[1]), xlim=(0, ALL_ANGLES + 1))
     axes.set_xticks([*COMPONENTS, ALL_ANGLES], [*map(str, COMPONENTS), "all angles"])
     axes.legend(ncols=2, loc="upper right")
@@ -107,7 +107,7 @@ EXPERIMENT = Experiment(
     title="Cylinders in place of the mesh",
     source=f"{schroeder.SCHROEDER_2014}, Sec. VI-C",
     cells=cells,
-    measure=schroeder.follow,
+    measure=schroeder.track_motion,
     tabulate=tabulate,
     compare=compare,
     draw=draw,

@@ -1,4 +1,4 @@
-"""Synergies by one name, whatever they come from: a set of ours, a file, a motion's postures, or recorded ones."""
+"""Load synergies by name: of an included set, a file, a motion, or recorded postures."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -15,12 +15,14 @@ from depthtrack.synthesis.motion_file import motion_names
 from depthtrack.types import Array
 
 _LABEL = 16
-"""Characters."""
+"""Largest number of characters in a label."""
 
 
 class SynergySource(NamedTuple):
-    """Synergies, and the postures (N, 20), radians, that they were fitted to; None where only the synergies are at
-    hand."""
+    """Synergies and their postures.
+
+    postures: (N, 20) finger angles of the fit, rad; None if they are not stored with the synergies.
+    """
 
     synergies: Synergies
     postures: Array | None
@@ -28,8 +30,14 @@ class SynergySource(NamedTuple):
 
 @lru_cache(maxsize=8)
 def load_source(name: str) -> SynergySource:
-    """The basis of this name: as `leap`, a .json of `synergies fit`, as `signs` that motion's own postures, or the path
-    of recorded postures. Raises InputError for another."""
+    """Return the synergies of a name.
+
+    name: an included set, as `leap`; a motion, as `signs`, for its postures; a .json from `synergies fit`; or the path
+        of recorded postures.
+
+    Raises:
+        InputError: if there are no synergies of this name.
+    """
     if name in synergy_names() or Path(name).suffix == ".json":
         return SynergySource(load_synergies(name), None)
     if name in motion_names():
@@ -38,29 +46,33 @@ def load_source(name: str) -> SynergySource:
         postures = read_postures(name).angles
     else:
         raise InputError(
-            f"no synergies '{name}': name a set ({', '.join(synergy_names())}), or a motion to take those of its own "
-            f"postures ({', '.join(motion_names())}), or give the path of a .json of synergies or of recorded postures"
+            f"there are no synergies '{name}': give a set ({', '.join(synergy_names())}), a motion "
+            f"({', '.join(motion_names())}), a .json of synergies, or a path of recorded postures"
         )
     return SynergySource(Synergies.fit(postures, name), postures)
 
 
 def resolve_name(name: str | None, own: str) -> str:
-    """The user's basis, or the experiment's own, as every worker can find it. Raises InputError where there is none."""
+    """Return the name of the user's synergies, or of the experiment's, with an absolute path.
+
+    Raises:
+        InputError: if there are no synergies of this name.
+    """
     name = own if name is None else name
     load_source(name)
-    return str(Path(name).resolve()) if Path(name).exists() and name not in _ours() else name
+    return str(Path(name).resolve()) if Path(name).exists() and name not in _included() else name
 
 
 def short_label(name: str) -> str:
-    """The name as there is room for it beside a figure."""
+    """Return the name, shortened for labels."""
     stem = Path(name).stem
     return stem if len(stem) <= _LABEL else f"{stem[: _LABEL - 3]}..."
 
 
 def motion_postures(motion: str) -> Array:
-    """Finger angles (N, 20), radians, of every frame of a motion."""
+    """Return the finger angles (N, 20) of all frames of a motion, rad."""
     return np.ascontiguousarray(Synthesiser(Synthesis(motion=motion)).poses[:, ANGLES])
 
 
-def _ours() -> list[str]:
+def _included() -> list[str]:
     return [*synergy_names(), *motion_names()]

@@ -1,1 +1,1 @@
-"""Speed: what `depthtrack bench` measures, beside the libraries that a user would turn to instead."""
+"""Speed benchmarks of `depthtrack bench`, beside alternative libraries."""

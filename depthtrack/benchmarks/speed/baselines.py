@@ -1,6 +1,6 @@
-"""What a user would score hypotheses with instead: ready renderers and ray casters, on a mesh of the same hand.
+"""Baselines: scorers with other renderers and ray casters, on a mesh of the same hand.
 
-Each draws one hypothesis at a time, as their interfaces have it, and hands its depth map to the same objective.
+Each renders one hypothesis at a time, as its interface requires, and passes the depth map to the same objective.
 """
 
 import os
@@ -27,15 +27,19 @@ INSTALL = {
     "open3d": "pip install open3d",
     "embree": "pip install 'depthtrack[embree]'",
 }
-"""Libraries compared with, and the line that brings each."""
+"""Command that installs each library."""
 
 
 class BaselineMissingError(DepthtrackError):
-    """A library to compare with is not installed, or cannot be loaded; the message names the line that brings it."""
+    """The library of a baseline is missing or does not load; the message gives the reason."""
 
 
 class Baseline(ScorerBase):
-    """A scorer that draws a mesh of the 37 primitives with someone else's library. Raises BaselineMissingError."""
+    """Scorer that renders a mesh of the 37 primitives with another library.
+
+    Raises:
+        BaselineMissingError: if the library is not installed or does not load.
+    """
 
     name: str
 
@@ -47,7 +51,7 @@ class Baseline(ScorerBase):
         except ModuleNotFoundError as error:
             raise BaselineMissingError(f"not installed: run  {INSTALL[self.name]}") from error
         except (ImportError, AttributeError, OSError) as error:
-            raise BaselineMissingError(f"installed, but it cannot be loaded: {error}") from error
+            raise BaselineMissingError(f"installed, but does not load: {error}") from error
 
     def set_target(self, target: Target) -> None:
         self._target = target
@@ -71,24 +75,27 @@ class Baseline(ScorerBase):
 
     @abstractmethod
     def _load(self) -> None:
-        """Import the library, and set up what does not depend on the observation."""
+        """Import the library and create the objects that do not depend on the observation."""
 
     @abstractmethod
     def _prepare(self, camera: Camera) -> None:
-        """Set up what depends on the camera alone."""
+        """Create the objects that depend on the camera."""
 
     @abstractmethod
     def _depth(self, transforms: Array) -> NDArray[np.floating]:
-        """Depth (h, w) in metres for T_camera_body (16, 4, 4), 0 where nothing is hit."""
+        """Return the depth (h, w) of a hypothesis, m; 0 for none.
+
+        transforms: (16, 4, 4) T_camera_body.
+        """
 
 
 class PyrenderScorer(Baseline):
-    """pyrender on EGL: one rigid mesh a body, its depth pass alone."""
+    """Depth pass of pyrender on EGL, with one rigid mesh per body."""
 
     name = "pyrender"
 
     def _load(self) -> None:
-        # Read once, when OpenGL is first imported; only a process of its own may do that.
+        # The first import of OpenGL reads this, so each baseline runs in its own process.
         os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
         import pyrender
         from trimesh import Trimesh
@@ -107,7 +114,7 @@ class PyrenderScorer(Baseline):
     def _prepare(self, camera: Camera) -> None:
         if self._eye is not None:
             self._scene.remove_node(self._eye)
-        # OpenGL's camera looks along -z with y up, and counts pixels from their corners.
+        # The camera of OpenGL views along -z with y up, and has pixel corners at whole numbers.
         intrinsics = self._pyrender.IntrinsicsCamera(camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5, 0.01, 10.0)
         self._eye = self._scene.add(intrinsics, pose=np.diag([1.0, -1.0, -1.0, 1.0]))
         if self._renderer is None:
@@ -126,7 +133,7 @@ class PyrenderScorer(Baseline):
 
 
 class RayCaster(Baseline):
-    """Casts a ray through every pixel; (dx, dy, 1) makes the distance along it the depth."""
+    """Scorer that casts a ray (dx, dy, 1) through each pixel, so that the distance is the depth."""
 
     def _prepare(self, camera: Camera) -> None:
         v, u = np.mgrid[: camera.height, : camera.width]
@@ -135,7 +142,7 @@ class RayCaster(Baseline):
 
 
 class Open3DScorer(RayCaster):
-    """Open3D's RaycastingScene, built anew for every hypothesis: its geometry cannot be moved."""
+    """RaycastingScene of Open3D, made for each hypothesis because its geometry is fixed."""
 
     name = "open3d"
 
@@ -158,7 +165,7 @@ class Open3DScorer(RayCaster):
 
 
 class EmbreeScorer(RayCaster):
-    """Embree through trimesh's binding `embreex`, at its lower level: trimesh's own calls take twice as long."""
+    """Embree through the binding `embreex`; the calls of trimesh would take twice as long."""
 
     name = "embree"
 

@@ -1,8 +1,8 @@
-"""`depthtrack bench ik`: from a segmented depth map to a pose by fitting the hand's surface, on one core.
+"""`depthtrack bench ik`: measure the surface fit, from depth map to pose, on one core.
 
-A frame is one call of the tracker: point cloud with normals of every pixel of the hand, prediction, alignment of the
-whole hand, ICP iterations, and the energy that tells whether the track holds. Segmentation is not in it. An iteration
-is one round of correspondences and the Gauss-Newton steps on them.
+A frame is one call of the tracker: point cloud with normals of all hand pixels, prediction, rigid alignment, ICP
+iterations, and the energy that decides whether the track is lost. Segmentation is left out. An iteration finds
+correspondences once and takes Gauss-Newton steps on them.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -14,9 +14,8 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from depthtrack.benchmarks.speed.timing import time_calls
+from depthtrack.benchmarks.speed.timing import checked_seconds, time_calls
 from depthtrack.benchmarks.speed.workload import FRAME_TIMES
-from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
@@ -38,15 +37,22 @@ from depthtrack.types import Array
 Freedom = Literal["26", "6+6"]
 
 DISTANCE = 0.59
-"""Metres: about 9,000 of a Kinect's pixels show the hand, of which the tracker's usual third makes 3,000."""
+"""Camera-to-hand distance, m, at which 9,000 pixels of a Kinect show the hand; the tracker uses 3,000 of them."""
 SYNERGIES = 6
-"""In "6+6", of the motion's own: those of other hands fit it worse, and then the tracker tries again."""
+"""Number of synergies in "6+6". They are fitted to the motion, since a worse fit would trigger searches."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is measured: every `subsample`-th point, matched to `model` by `residual`, `freedom` degrees of freedom,
-    `icp` rounds of correspondences with at most `inner` Gauss-Newton steps each."""
+    """Settings of one row.
+
+    model: surface.
+    residual: residual of the correspondences.
+    freedom: degrees of freedom.
+    subsample: one of this number of points is used.
+    icp: ICP iterations.
+    inner: largest number of Gauss-Newton steps per iteration.
+    """
 
     model: SurfaceName = "skin"
     residual: Residual = "symmetric"
@@ -69,7 +75,7 @@ class Setting:
         )
 
     def synergies(self, motion: ObservedMotion) -> Synergies | None:
-        """Return the synergies of the motion's own motion, None with all degrees of freedom."""
+        """Return synergies fitted to the motion; None with all degrees of freedom."""
         return None if self.freedom == "26" else Synergies.fit(motion.poses[:, ANGLES]).truncated(SYNERGIES)
 
 
@@ -88,11 +94,15 @@ SETTINGS: tuple[Setting, ...] = tuple(
 
 @dataclass(frozen=True)
 class IkRow:
-    """One setting, over all frames.
+    """Measurements of one setting over all frames.
 
-    `points` matched, on average. Best and median of many calls: `iteration_us` microseconds an ICP iteration,
-    `frame_ms` milliseconds a frame, of which median `stage_ms`; `frames_per_s` from the best, `frames_per_s_median`
-    from the median; `calls` timed. `error_deg` and `error_mm` of the frames' poses.
+    points: mean number of points.
+    iteration_us, iteration_us_median: microseconds per ICP iteration, best and median call.
+    frame_ms, frame_ms_median: milliseconds per frame, best and median call.
+    stage_ms: median milliseconds per frame of each stage.
+    frames_per_s, frames_per_s_median: frames per second from the best and the median call.
+    calls: number of timed calls.
+    error_deg, error_mm: mean errors of joint angles and endpoints.
     """
 
     points: int
@@ -116,7 +126,10 @@ class IkRow:
 
 @dataclass(frozen=True)
 class IkReport:
-    """All that `bench ik` measured; `machine` as it was before."""
+    """Report of `bench ik`.
+
+    machine: the machine before the measurements.
+    """
 
     benchmark: Literal["ik"]
     machine: Machine
@@ -125,32 +138,38 @@ class IkReport:
 
 @dataclass(frozen=True)
 class IkPlan:
-    """What to measure: `seconds` for each of `settings`."""
+    """Plan of a measurement: `seconds` for each setting."""
 
     seconds: float
     settings: tuple[Setting, ...] = SETTINGS
 
     @property
     def row_count(self) -> int:
+        """Number of rows."""
         return len(self.settings)
 
 
 def plan(seconds: float = 1.0) -> IkPlan:
-    """A plan for all settings. Raises InputError for an unusable time."""
-    if not 0 < seconds <= 600:
-        raise InputError(f"--seconds must lie between 0 and 600 a row, found {seconds:g}")
-    return IkPlan(seconds)
+    """Return a plan for all settings.
+
+    Raises:
+        InputError: if the time is out of range.
+    """
+    return IkPlan(checked_seconds(seconds))
 
 
 def run(plan: IkPlan, progress: Callable[[Iterator[IkRow]], Iterable[IkRow]] = iter) -> IkReport:
-    """Measure; `progress` may watch the rows go by."""
+    """Return the measurements of a plan.
+
+    progress: wraps the rows, as a progress bar does.
+    """
     machine, motion = describe_machine(), ObservedMotion(Synthesis(model="skin", distance=DISTANCE))
     rows = (measure(motion, setting, plan.seconds) for setting in plan.settings)
     return IkReport("ik", machine, list(progress(rows)))
 
 
 def measure(motion: ObservedMotion, setting: Setting, seconds: float) -> IkRow:
-    """The row of a setting, on four frames of the motion, each reached from the two before it."""
+    """Return the row of a setting: four frames of the motion, each tracked after two others."""
     frames = [round(at * motion.recording.rate) for at in FRAME_TIMES]
     share = seconds / len(frames) / 2
     with closing(create_tracker(setting.config, motion.hand, synergies=setting.synergies(motion))) as tracker:
@@ -184,7 +203,13 @@ def measure(motion: ObservedMotion, setting: Setting, seconds: float) -> IkRow:
 
 
 class _Timed(NamedTuple):
-    """A frame's `pose` (27,) and that of the frame `before` it; `seconds` of each call, median `stage_ms`."""
+    """Timed calls of one frame.
+
+    pose: (27,).
+    before: (27,) pose of the frame before.
+    seconds: time of each call.
+    stage_ms: median milliseconds of each stage.
+    """
 
     pose: Array
     before: Array
@@ -193,7 +218,7 @@ class _Timed(NamedTuple):
 
 
 def _time_frame(tracker: StageTracker, motion: ObservedMotion, index: int, seconds: float) -> _Timed:
-    """How long the tracker takes from the frame before to this one."""
+    """Return the time of the tracker for one frame."""
     before = [
         tracker.start(motion[index - 2], motion.poses[index - 2]),
         tracker.track(motion[index - 1]),
@@ -214,7 +239,7 @@ def _time_frame(tracker: StageTracker, motion: ObservedMotion, index: int, secon
 
 
 def _time_fit(motion: ObservedMotion, setting: Setting, index: int, pose: Array, seconds: float) -> Array:
-    """How long each fit to a frame took, from `pose` (27,), without the alignment of the whole hand before it."""
+    """Return the time (N,) of each fit from `pose` (27,), without rigid alignment, s."""
     synergies = setting.synergies(motion)
     space = FULL if synergies is None else PostureSubspace.of(synergies)
     options = replace(
@@ -231,12 +256,12 @@ def _time_fit(motion: ObservedMotion, setting: Setting, index: int, pose: Array,
 
 
 def _best_and_median(durations: list[Array]) -> tuple[float, float]:
-    """Seconds, averaged over the frames."""
+    """Return the best and the median time, averaged over the frames, s."""
     return float(np.mean([each.min() for each in durations])), float(np.mean([np.median(each) for each in durations]))
 
 
 def as_text(report: IkReport) -> str:
-    """The report as lines for people: the machine, a row a setting, and what is timed."""
+    """Return the report as text: the machine, one row per setting, and notes."""
     head = ("model", "residual", "DoF", "points", "ICP", "us/iteration", "ms/frame", "(median)", "frames/s", "error")
     lines = [
         (
@@ -256,14 +281,14 @@ def as_text(report: IkReport) -> str:
     return "\n".join(
         [
             report.machine.headline,
-            "one thread, best calls (median), a hand seen in 9,000 pixels:",
+            "one thread, best calls (median), hand of 9,000 pixels:",
             "",
             *aligned([head, *lines], left=2),
             "",
             "frame: scoring target, prediction, point cloud with normals, alignment, fit, energy and confidence",
             *(f"first row, median: {_stages(row)}" for row in report.rows[:1]),
-            "iteration: correspondences, and the Gauss-Newton steps on them; ICP: iterations x steps, at most",
-            "Schroeder et al. 2014, on eight threads: 25 frames a second with 26 DoF, 30 with 6+6",
+            "iteration: correspondences and Gauss-Newton steps; ICP: largest number of iterations x steps",
+            "Schroeder et al. 2014, on eight threads: 25 frames per second with 26 DoF, 30 with 6+6",
         ]
     )
 

@@ -1,4 +1,4 @@
-"""Work in a fresh process, item by item: a driver that crashes, hangs or claims the whole process harms nobody else."""
+"""Run a generator in its own process, so that drivers may crash, hang or change the process."""
 
 import multiprocessing
 from collections.abc import Callable, Generator, Iterable
@@ -11,16 +11,20 @@ Item = TypeVar("Item")
 
 
 class ProcessFailureError(DepthtrackError):
-    """What ran in a process of its own raised, died or fell silent; the message says which."""
+    """A function in its own process raised, ended the process, or yielded nothing in time."""
 
 
 def in_own_process(
-    function: Callable[..., Iterable[Item]], *arguments: object, patience: float
+    function: Callable[..., Iterable[Item]], *arguments: object, timeout: float
 ) -> Generator[Item, None, None]:
-    """What `function(*arguments)` yields, computed in a fresh (spawned) process as it is asked for.
+    """Yield the items of `function(*arguments)`, computed in a spawned process.
 
-    Function, arguments and items must be picklable. Raises the DepthtrackError that it raised, and ProcessFailureError
-    for other exceptions, a process that ends by itself, and one that gives nothing for `patience` seconds.
+    function, arguments: picklable, as are the items.
+    timeout: seconds to wait for each item.
+
+    Raises:
+        DepthtrackError: if the function raised it.
+        ProcessFailureError: if the function raised another error, its process ended, or an item came too late.
     """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
@@ -28,17 +32,17 @@ def in_own_process(
     process.start()
     theirs.close()
     try:
-        while ours.poll(patience):
+        while ours.poll(timeout):
             done, message = ours.recv()
             if isinstance(message, DepthtrackError):
                 raise message
             if done:
                 return
             yield message
-        raise ProcessFailureError(f"it gave nothing for {patience:g} s and was stopped")
+        raise ProcessFailureError(f"it was stopped after {timeout:g} s without a result")
     except EOFError:
-        process.join(patience)
-        raise ProcessFailureError(f"its process ended by itself (exit code {process.exitcode})") from None
+        process.join(timeout)
+        raise ProcessFailureError(f"its process ended (exit code {process.exitcode})") from None
     finally:
         ours.close()
         process.kill()
@@ -51,7 +55,7 @@ def _send_all(pipe: Connection, function: Callable[..., Iterable[Any]], argument
             pipe.send((False, item))
         pipe.send((True, None))
     except BrokenPipeError:
-        pass  # nobody listens any more
+        pass  # the other process has stopped reading
     except DepthtrackError as error:
         pipe.send((True, error))
     except Exception as error:

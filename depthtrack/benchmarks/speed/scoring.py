@@ -1,7 +1,7 @@
-"""`depthtrack bench score`: from poses to energies, in hypotheses a second, for every backend and every rival.
+"""`depthtrack bench score`: measure hypotheses per second of backends and baselines.
 
-Kinematics, rendering and the objective are all timed; setting an observation is not, as a tracker does it once a
-frame. Each contender runs in a process of its own, so that its first call tells what compiling or loading costs.
+The time includes kinematics, rendering and objective. It leaves out the setting of a target, which a tracker does once
+per frame. Each scorer runs in its own process, so that its first call includes compilation and loading.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,7 +14,7 @@ import numpy as np
 
 from depthtrack.benchmarks.speed.baselines import BASELINES
 from depthtrack.benchmarks.speed.isolation import in_own_process
-from depthtrack.benchmarks.speed.timing import time_calls
+from depthtrack.benchmarks.speed.timing import checked_seconds, time_calls
 from depthtrack.benchmarks.speed.workload import CHECKED, HYPOTHESES, ROIS, Roi, Workload, make_workloads
 from depthtrack.errors import DepthtrackError, InputError
 from depthtrack.hand.shape import HandShape
@@ -25,22 +25,27 @@ from depthtrack.text_table import aligned
 
 SCORERS = (*BACKENDS, *BASELINES)
 DEFAULT_SCORERS = tuple(name for name in SCORERS if name != "oracle")
-"""Who is measured unless told otherwise: all but the reference, which is slow by design."""
+"""Scorers to measure by default: all but the reference, which is slow by design."""
 
 _BASELINE_BATCH = HYPOTHESES // 4
-"""Rivals draw one hypothesis at a time and are slow: a quarter of each frame's swarm makes 64 as well."""
-_PATIENCE = 120.0
-"""Seconds that a contender may take for a row on top of its time: a cold compile on a slow machine."""
+"""Hypotheses per call of a baseline, which renders them one at a time; four frames give 64 as well."""
+_COMPILE_TIME = 120.0
+"""Extra seconds for a row, for compilation on a slow machine."""
 
 
 @dataclass(frozen=True)
 class ScoreRow:
-    """One contender at one resolution.
+    """Measurements of one scorer at one resolution.
 
-    `kind` tells ours from rivals; `threads` None when the library decides; `renderer` what OpenGL draws with.
-    `hypotheses_per_s` from the best call of each frame, `hypotheses_per_s_median` from the median one; `microseconds`
-    a hypothesis, best; `calls` timed, of `batch` hypotheses each; `first_call_s` from creating the scorer, or setting
-    its first observation of this size, to the first energies; `energy_error` largest difference from the oracle.
+    kind: "backend", or "peer" for a baseline.
+    threads: number of threads; None if the library decides.
+    renderer: renderer of OpenGL; None for others.
+    hypotheses_per_s, hypotheses_per_s_median: from the best and the median call of each frame.
+    microseconds: microseconds per hypothesis in the best call.
+    calls: number of timed calls.
+    batch: hypotheses per call.
+    first_call_s: seconds from the creation of the scorer, or from its first target of this size, to the first energies.
+    energy_error: largest difference from the energies of the oracle.
     """
 
     backend: str
@@ -61,7 +66,7 @@ class ScoreRow:
 
 @dataclass(frozen=True)
 class Absent:
-    """A contender that could not run, and why."""
+    """Scorer that does not run here, and the reason."""
 
     backend: str
     reason: str
@@ -69,7 +74,11 @@ class Absent:
 
 @dataclass(frozen=True)
 class ScoreReport:
-    """All that `bench score` measured; `machine` as it was before."""
+    """Report of `bench score`.
+
+    machine: the machine before the measurements.
+    absent: scorers that do not run here.
+    """
 
     benchmark: Literal["score"]
     machine: Machine
@@ -79,37 +88,48 @@ class ScoreReport:
 
 @dataclass(frozen=True)
 class ScorePlan:
-    """What to measure: `specs` by name, each at every one of `rois`, `seconds` a row."""
+    """Plan of a measurement.
 
-    specs: tuple[str, ...]
+    scorers: names of the scorers.
+    seconds: seconds per row.
+    rois: regions of interest.
+    """
+
+    scorers: tuple[str, ...]
     seconds: float
     rois: tuple[Roi, ...] = ROIS
 
     @property
     def row_count(self) -> int:
-        """How many rows come of it when every contender can run."""
-        return sum(len(_thread_counts(name)) for name in self.specs) * len(self.rois)
+        """Number of rows if all scorers run."""
+        return sum(len(_thread_counts(name)) for name in self.scorers) * len(self.rois)
 
 
-def plan(specs: Sequence[str] | None = None, seconds: float = 1.0) -> ScorePlan:
-    """A plan for these contenders, or the usual ones. Raises InputError for unknown names and unusable times."""
-    chosen = DEFAULT_SCORERS if specs is None else tuple(dict.fromkeys(specs))
+def plan(scorers: Sequence[str] | None = None, seconds: float = 1.0) -> ScorePlan:
+    """Return a plan for these scorers, or for the default ones.
+
+    Raises:
+        InputError: if a name is unknown or the time is out of range.
+    """
+    chosen = DEFAULT_SCORERS if scorers is None else tuple(dict.fromkeys(scorers))
     unknown = [name for name in chosen if name not in SCORERS]
     if unknown or not chosen:
         raise InputError(f"--backends takes {', '.join(SCORERS)}; found {', '.join(unknown) or 'none'}")
-    if not 0 < seconds <= 600:
-        raise InputError(f"--seconds must lie between 0 and 600 a row, found {seconds:g}")
-    return ScorePlan(chosen, seconds)
+    return ScorePlan(chosen, checked_seconds(seconds))
 
 
 def run(plan: ScorePlan, progress: Callable[[Iterator[ScoreRow]], Iterable[ScoreRow]] = iter) -> ScoreReport:
-    """Measure; `progress` may watch the rows go by."""
+    """Return the measurements of a plan.
+
+    progress: wraps the rows, as a progress bar does.
+    """
     machine, workloads, absent = describe_machine(), make_workloads(plan.rois), list[Absent]()
 
     def rows() -> Iterator[ScoreRow]:
-        for name in plan.specs:
+        timeout = _COMPILE_TIME + 2 * plan.seconds
+        for name in plan.scorers:
             try:
-                yield from in_own_process(measure, name, workloads, plan.seconds, patience=_PATIENCE + 2 * plan.seconds)
+                yield from in_own_process(measure, name, workloads, plan.seconds, timeout=timeout)
             except DepthtrackError as error:
                 absent.append(Absent(name, str(error)))
 
@@ -117,7 +137,11 @@ def run(plan: ScorePlan, progress: Callable[[Iterator[ScoreRow]], Iterable[Score
 
 
 def measure(name: str, workloads: Sequence[Workload], seconds: float) -> Iterator[ScoreRow]:
-    """Rows of one contender. Raises DepthtrackError when it cannot run here."""
+    """Yield the rows of one scorer.
+
+    Raises:
+        DepthtrackError: if it does not run here.
+    """
     for threads in _thread_counts(name):
         start = perf_counter()
         with _create(name, workloads[0].shape, threads) as scorer:
@@ -170,7 +194,7 @@ def _row(scorer: Scorer, threads: int | None, workload: Workload, seconds: float
 
 
 def as_text(report: ScoreReport) -> str:
-    """The report as lines for people: the machine, a row a contender and resolution, notes, and who is absent."""
+    """Return the report as text: the machine, one row per scorer and resolution, and notes."""
     head = ("backend", "ROI", "pixels", "threads", "best/s", "median/s", "us each", "first call", "energy off by")
     lines = [
         (
@@ -186,15 +210,15 @@ def as_text(report: ScoreReport) -> str:
         )
         for row in report.rows
     ]
-    notes = {row.backend: f"{row.backend} draws with {row.renderer}" for row in report.rows if row.renderer}
+    notes = {row.backend: f"{row.backend} renders with {row.renderer}" for row in report.rows if row.renderer}
     if any(row.kind == "peer" for row in report.rows):
-        notes["peer"] = "(in brackets): what one would use instead, on a mesh of the same hand"
+        notes["peer"] = "(in brackets): other libraries, on a mesh of the same hand"
     return "\n".join(
         [
             report.machine.headline,
-            "hypotheses a second, from pose to energy:",
+            "hypotheses per second, from pose to energy:",
             "",
-            *(aligned([head, *lines], left=3) if lines else ["nothing could run"]),
+            *(aligned([head, *lines], left=3) if lines else ["no scorer runs here"]),
             "",
             *notes.values(),
             *(f"{absent.backend}: {absent.reason}" for absent in report.absent),

@@ -1,7 +1,7 @@
-"""`depthtrack bench segment`: from an RGB-D frame to the hand's masks and depth, on one core.
+"""`depthtrack bench segment`: measure the segmentation of RGB-D frames on one core.
 
-A hand that was found in the frame before is followed; the search in the first frame is not timed. The point cloud with
-normals, which trackers ask for when they need it, is timed apart.
+The hand is followed from the frame before; its detection in the first frame is not timed. The point cloud with normals
+is timed separately, since not all trackers need it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,6 +14,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
+from depthtrack.benchmarks.speed.timing import checked_seconds
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import silhouette_iou
 from depthtrack.machine import Machine, describe_machine
@@ -26,20 +27,23 @@ from depthtrack.text_table import aligned
 from depthtrack.types import Array, Mask
 
 FRAMES = 12
-"""Consecutive frames that are gone through again and again."""
+"""Number of consecutive frames, which are segmented repeatedly."""
 
 MADE = tuple(
     Synthesis(sensor=sensor, background="room", model="skin", seed=22) for sensor in ("kinect1", "kinect2", "realsense")
 )
-"""A hand with forearm in a cluttered room, before every camera."""
+"""Synthetic recordings of each camera: a hand with forearm in a cluttered room."""
 
 FIRST = 200
-"""Frame of these at which to begin: the hand is open, then folds a finger."""
+"""First frame of the synthetic recordings, in which the hand is open and then bends a finger."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """Some frames of a recording; `truth` (h, w) of each, None where that is not known."""
+    """Frames of a recording.
+
+    truth: (h, w) true silhouette of each frame; None if unknown.
+    """
 
     name: str
     frames: Sequence[Frame]
@@ -48,11 +52,14 @@ class Shot:
 
 @dataclass(frozen=True)
 class SegmentRow:
-    """One recording, with colour or by depth alone.
+    """Measurements of one recording, with colour or with depth alone.
 
-    Milliseconds a frame: `segment_ms` the best of each frame, `segment_ms_median` of all; `cloud_ms` and
-    `cloud_ms_median` the point cloud's, of `points` on average. `iou` with the true silhouettes, None where those are
-    not known; `frames` timed, over and over, in `calls`.
+    segment_ms, segment_ms_median: milliseconds per frame of the segmentation, best calls and median call.
+    cloud_ms, cloud_ms_median: milliseconds per frame of the point cloud, best calls and median call.
+    points: mean number of points.
+    iou: mean IoU with the true silhouettes; None if they are unknown.
+    frames: number of timed frames.
+    calls: number of timed calls.
     """
 
     recording: str
@@ -71,7 +78,10 @@ class SegmentRow:
 
 @dataclass(frozen=True)
 class SegmentReport:
-    """All that `bench segment` measured; `machine` as it was before."""
+    """Report of `bench segment`.
+
+    machine: the machine before the measurements.
+    """
 
     benchmark: Literal["segment"]
     machine: Machine
@@ -80,25 +90,32 @@ class SegmentReport:
 
 @dataclass(frozen=True)
 class SegmentPlan:
-    """What to measure: `seconds` for each of `shots`, with colour where they have it and by depth alone."""
+    """Plan of a measurement: `seconds` for each shot with colour and with depth alone."""
 
     shots: Sequence[Shot]
     seconds: float
 
     @property
     def row_count(self) -> int:
+        """Number of rows."""
         return len(_cases(self.shots))
 
 
 def plan(recordings: Sequence[Path] = (), seconds: float = 1.0) -> SegmentPlan:
-    """A plan for these recordings, or synthetic ones. Raises InputError for an unusable time, or no hand to follow."""
-    if not 0 < seconds <= 600:
-        raise InputError(f"--seconds must lie between 0 and 600 a row, found {seconds:g}")
+    """Return a plan for these recordings, or for synthetic ones.
+
+    Raises:
+        InputError: if the time is out of range, or a recording is unusable or too short.
+    """
+    seconds = checked_seconds(seconds)
     return SegmentPlan([_recorded(path) for path in recordings] or [_synthetic(each) for each in MADE], seconds)
 
 
 def run(plan: SegmentPlan, progress: Callable[[Iterator[SegmentRow]], Iterable[SegmentRow]] = iter) -> SegmentReport:
-    """Measure; `progress` may watch the rows go by."""
+    """Return the measurements of a plan.
+
+    progress: wraps the rows, as a progress bar does.
+    """
     machine, threads = describe_machine(), cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -109,13 +126,18 @@ def run(plan: SegmentPlan, progress: Callable[[Iterator[SegmentRow]], Iterable[S
 
 
 def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
-    """The row of a recording. Raises InputError where no hand can be followed in it."""
+    """Return the row of a recording.
+
+    Raises:
+        InputError: if a frame shows no hand.
+    """
     segmenter = Segmenter(SkinColourModel.default() if use_colour else None)
     durations, overlaps, points = list[Array](), list[float](), list[int]()
-    for frame, truth in zip(shot.frames, shot.truth, strict=True):  # once for the compiler, and for what is found
+    # The first pass compiles the kernels and measures the overlap.
+    for frame, truth in zip(shot.frames, shot.truth, strict=True):
         observation = segmenter.segment(frame)
         if observation is None:
-            raise InputError(f"{shot.name}: no hand is seen in frame {frame.index}: give a recording that shows one")
+            raise InputError(f"{shot.name}: frame {frame.index} shows no hand: give a recording with a hand")
         points.append(len(observation.points))
         if truth is not None:
             overlaps.append(silhouette_iou(observation.whole_mask(frame.depth.shape), truth))
@@ -141,22 +163,22 @@ def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
 
 
 def _time_frames(segmenter: Segmenter, frames: Sequence[Frame]) -> Array:
-    """Milliseconds (N - 1, 2) for observation and point cloud of N frames but the first, where the hand is found."""
+    """Return milliseconds (N - 1, 2) of segmentation and point cloud, without the first frame."""
     segmenter.reset()
     segmenter.segment(frames[0])
     durations = []
     for frame in frames[1:]:
         begun = perf_counter()
         observation = segmenter.segment(frame)
-        seen = perf_counter()
+        segmented = perf_counter()
         if observation is not None:
-            observation.points  # noqa: B018 (made when asked for)
-        durations.append((seen - begun, perf_counter() - seen))
+            observation.points  # noqa: B018 (computes the point cloud)
+        durations.append((segmented - begun, perf_counter() - segmented))
     return 1e3 * np.array(durations)
 
 
 def _cases(shots: Sequence[Shot]) -> list[tuple[Shot, bool]]:
-    """Every shot with and, which all can do, without colour."""
+    """Return each shot with colour, if it has colour, and without."""
     return [
         (shot, colour)
         for shot, colour in product(shots, (True, False))
@@ -179,12 +201,12 @@ def _recorded(path: Path) -> Shot:
     sequence = open_sequence(path)
     frames = list(sequence.frames(range(min(FRAMES, len(sequence)))))
     if len(frames) < 2:
-        raise InputError(f"{path} must have two frames at least, to follow a hand in, found {len(frames)}")
+        raise InputError(f"{path} must have at least two frames, found {len(frames)}: give a longer recording")
     return Shot(sequence.name, frames, [sequence.hand_mask(frame.index) for frame in frames])
 
 
 def as_text(report: SegmentReport) -> str:
-    """The report as lines for people: the machine, a row a recording, and what is timed."""
+    """Return the report as text: the machine, two rows per recording, and notes."""
     head = ("recording", "pixels", "uses", "ms/frame", "(median)", "cloud", "(median)", "points", "IoU")
     lines = [
         (
@@ -203,10 +225,10 @@ def as_text(report: SegmentReport) -> str:
     return "\n".join(
         [
             report.machine.headline,
-            "one thread, milliseconds: the best of each frame (median of all calls)",
+            "one thread, milliseconds: best calls (median)",
             "",
             *aligned([head, *lines], left=3),
             "",
-            "frame: the hand's silhouette and depth; cloud: points and normals of all its pixels, made when asked for",
+            "frame: silhouette and depth of the hand; cloud: points and normals of all its pixels",
         ]
     )

@@ -1,4 +1,4 @@
-"""The 37 primitives as triangles, for renderers that know nothing else."""
+"""Tessellate the 37 primitives for renderers of triangles."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -12,9 +12,11 @@ from depthtrack.types import Array, Faces, Index
 
 @dataclass(frozen=True)
 class Tessellation:
-    """Triangles in the frames of the 16 bodies that carry them.
+    """Triangles in the frames of their bodies.
 
-    `vertices` (V, 3) metres, each in the frame of its body, `bodies` (V,), `faces` (F, 3).
+    vertices: (V, 3), m, in the frame of the body.
+    bodies: (V,) body of each vertex, 0 to 15.
+    faces: (F, 3) vertices of each triangle.
     """
 
     vertices: Array
@@ -23,25 +25,30 @@ class Tessellation:
 
     @classmethod
     def of(cls, primitives: Primitives, subdivisions: int = 2) -> Self:
-        """Spheres as icosahedra subdivided so many times (2: 320 triangles), cylinders with sides as fine.
+        """Return the triangles of primitives.
 
-        Corners lie on the true surface, so a facet of side e lies up to e^2 / 6 radii inside it. Cylinders are open:
-        the hand closes every end with a sphere or ellipsoid.
+        subdivisions: subdivisions of the icosahedra of spheres (2 gives 320 triangles); cylinders are equally fine.
+
+        Vertices are on the true surface, so a facet of side e is up to e^2 / 6 radii inside it. Cylinders are open,
+        since a sphere or ellipsoid closes each end in the hand.
         """
         units = {SPHERE: _unit_sphere(subdivisions)}
         vertices, bodies, faces, count = [], [], [], 0
         for kind, body, T in zip(primitives.kinds, primitives.bodies, primitives.T_body_unit, strict=True):
             unit, triangles = units.get(kind) or _unit_cylinder(6 * 2**subdivisions)
-            # Homogeneous, so that a cylinder's homography makes it a cone; straight lines stay straight.
-            placed = np.column_stack([unit, np.ones(len(unit))]) @ T.T
-            vertices.append(placed[:, :3] / placed[:, 3:])
+            # The homography of a cone transforms the cylinder in homogeneous coordinates; lines remain lines.
+            transformed = np.column_stack([unit, np.ones(len(unit))]) @ T.T
+            vertices.append(transformed[:, :3] / transformed[:, 3:])
             bodies.append(np.full(len(unit), body))
             faces.append(triangles + count)
             count += len(unit)
         return cls(np.concatenate(vertices), np.concatenate(bodies), np.concatenate(faces))
 
     def posed(self, transforms: Array) -> Array:
-        """Vertices (V, 3) in the camera frame for T_camera_body (16, 4, 4)."""
+        """Return the vertices (V, 3) in the camera frame, m.
+
+        transforms: (16, 4, 4) T_camera_body.
+        """
         T = transforms[self.bodies]
         return np.einsum("vij,vj->vi", T[:, :3, :3], self.vertices) + T[:, :3, 3]
 
@@ -52,7 +59,7 @@ def _unit_sphere(subdivisions: int) -> tuple[Array, Faces]:
 
 
 def _unit_cylinder(sides: int) -> tuple[Array, Faces]:
-    """ux^2 + uy^2 = 1 with 0 <= uz <= 1, its triangles counter-clockwise from outside."""
+    """Return x^2 + y^2 = 1 with 0 <= z <= 1; triangles are counter-clockwise from outside."""
     around = np.arange(sides)
     angle = 2 * np.pi * around / sides
     ring = np.column_stack([np.cos(angle), np.sin(angle)])

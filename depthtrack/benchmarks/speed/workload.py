@@ -1,4 +1,4 @@
-"""What every scorer is timed on: swarms of hypotheses around frames of the `everyday` motion, half a metre away."""
+"""Workload of the scorers: swarms of hypotheses around four frames of the `everyday` motion."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,26 +19,29 @@ from depthtrack.types import Array
 
 Roi = Literal["native", "96", "64"]
 ROIS: tuple[Roi, ...] = ("native", "96", "64")
-"""Regions of interest: the sensor's own pixels, or reduced to so many a side."""
+"""Regions of interest: pixels of the sensor, or reduced to this number of pixels per side."""
 
 HYPOTHESES = 64
+"""Hypotheses per frame."""
 FRAME_TIMES = (1.0, 4.5, 8.0, 11.0)
-"""Seconds into the motion: from the open hand to the closed one."""
+"""Times in the motion, s, from the open hand to the closed one."""
 DISTANCE = 0.5
+"""Camera-to-hand distance, m."""
 MARGIN = 1 / 7
-"""Of the hand's longer side in the image, added around it: room for it to move until the next frame."""
+"""Margin around the hand, relative to its longer side in the image."""
 CHECKED = 8
-"""Hypotheses of a frame that the oracle scores too."""
+"""Hypotheses per frame that the oracle also scores."""
 
-# Standard deviations of a swarm about half-way: metres, radians, radians.
+# Standard deviations of a swarm in the middle of its generations: m, rad, rad.
 _SPREAD = np.repeat([0.01, 0.1, 0.2], [3, 3, TANGENT_SIZE - 6])
 
 
 @dataclass(frozen=True)
 class Workload:
-    """Observations at one resolution, and for each the hypotheses to score against it.
+    """Targets at one resolution, and the hypotheses to score on each.
 
-    `poses` (frames, HYPOTHESES, 27) camera frame; `expected` (frames, CHECKED) the oracle's energies of the first.
+    poses: (frames, HYPOTHESES, 27), camera frame.
+    expected: (frames, CHECKED) energies of the oracle for the first hypotheses.
     """
 
     roi: Roi
@@ -49,7 +52,7 @@ class Workload:
 
 
 def make_workloads(rois: Iterable[Roi] = ROIS, seed: int = 0) -> list[Workload]:
-    """The benchmark's workloads: ideal observations of frames of the motion, seen by a Kinect; the same every time."""
+    """Return the workloads: ideal observations of a Kinect, the same for each seed."""
     shape, oracle = HandShape(), OracleScorer(HandShape())
     truth = Viewpoint(distance=DISTANCE).transform_poses(load_motion("everyday").poses(np.array(FRAME_TIMES), seed))
     random = np.random.Generator(np.random.Philox(key=seed))
@@ -69,7 +72,7 @@ def _workload(roi: Roi, shape: HandShape, oracle: OracleScorer, regions: list[Ta
 
 
 def _regions(oracle: OracleScorer, truth: Array) -> list[Target]:
-    """Square regions around the hand at full resolution, all of one size: the largest hand's, with a margin."""
+    """Return square regions of equal size around the hands at full resolution."""
     camera = PRESETS["kinect1"]
     oracle.set_target(Target.blank(camera))
     depths = [oracle.render(pose) for pose in truth]
