@@ -1,0 +1,47 @@
+"""Detection of the hand: nearest first, near its last position, and costs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from depthtrack.segmentation.hand_detection import HandDetector
+from depthtrack.segmentation.hand_size import AVERAGE_HAND
+from depthtrack.segmentation.options import SegmentationOptions
+from tests.support.arms import club
+
+OPTIONS = SegmentationOptions()
+DETECTOR = HandDetector(OPTIONS, AVERAGE_HAND)
+
+
+def test_the_hand_is_detected_at_its_palm() -> None:
+    grid, palm = club(0.0)
+    found = DETECTOR.detect(grid, grid)
+    assert found is not None
+    np.testing.assert_allclose(found, palm.centre, atol=0.02)
+
+
+def test_no_hand_is_detected_without_candidates() -> None:
+    grid, _ = club(0.0)
+    nothing = grid.within(np.zeros(grid.depth.shape, np.bool_))
+    assert DETECTOR.detect(grid, nothing) is None
+    assert DETECTOR.nearest_palm(grid, nothing, np.array([0.0, 0.0, 0.5])) is None
+
+
+def test_a_palm_is_followed_up_to_the_largest_step() -> None:
+    grid, palm = club(0.0)
+    step = OPTIONS.detection.largest_step
+    for distance, found in ((0.5 * step, True), (3.5 * step, False)):
+        last = palm.centre + np.array([0.0, 0.0, -distance])
+        assert (DETECTOR.nearest_palm(grid, grid, last) is not None) == found
+
+
+def test_costs_are_the_sum_of_their_terms() -> None:
+    """A weight of zero removes its term; the last position adds its distance."""
+    grid, palm = club(0.0)
+    cost = DETECTOR.start_cost(grid, grid, palm, None)
+    lost = palm.centre + np.array([0.0, 0.03, 0.04])
+    assert DETECTOR.start_cost(grid, grid, palm, lost) == pytest.approx(cost + 0.05)
+    without = HandDetector(replace(OPTIONS, detection=replace(OPTIONS.detection, distance_weight=0.0)), AVERAGE_HAND)
+    change = OPTIONS.detection.distance_weight * palm.centre[2]
+    assert without.start_cost(grid, grid, palm, None) == pytest.approx(cost - change)
