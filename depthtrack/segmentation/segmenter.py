@@ -24,6 +24,7 @@ class Segmenter:
     hand.
 
     skin_model: skin colours, used if frames have colour; None for depth alone.
+    options: `use_colour`, `skin_model` and the prior of skin colours are used by `from_options` only.
     """
 
     def __init__(self, skin_model: SkinColourModel | None = None, options: SegmentationOptions | None = None) -> None:
