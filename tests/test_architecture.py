@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = "depthtrack"
 
 LAYERS = (
-    ("errors", "types"),
+    ("closing", "errors", "types"),
     ("files", "options", "resources", "text_table", "selection"),
     ("machine",),
     ("geometry",),

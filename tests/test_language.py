@@ -16,6 +16,7 @@ REWRITTEN = (
     "depthtrack/api",
     "depthtrack/benchmarks",
     "depthtrack/cli",
+    "depthtrack/closing.py",
     "depthtrack/errors.py",
     "depthtrack/evaluation",
     "depthtrack/export",

@@ -1,12 +1,12 @@
 """Track frames that come from any source, one call per frame."""
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.api.choices import Hand, as_config, open_hand
+from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
@@ -23,7 +23,7 @@ from depthtrack.tracking.tracker import Estimate, Tracker
 from depthtrack.types import Array, Depth, Image
 
 
-class HandTracker:
+class HandTracker(Closing):
     """Tracks a hand in frames that come from any source: a sensor, a network, a program.
 
     Equal frames give equal bits. All frames of a recording give the poses that `depthtrack track` writes.
@@ -120,14 +120,6 @@ class HandTracker:
         if not self._closed:
             self._closed = True
             self._tracker.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _checked_time(timestamp: float, last: float | None) -> float:

@@ -10,11 +10,11 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
+from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines, read_text, write_atomic
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
@@ -49,7 +49,7 @@ class RunRow:
     pose: Array | None
 
 
-class RunWriter:
+class RunWriter(Closing):
     """Appends frames to a run folder; every row is complete on disk before the next is written."""
 
     def __init__(
@@ -95,14 +95,6 @@ class RunWriter:
         """Close the files."""
         self._poses.close()
         self._timings.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 @dataclass(frozen=True)

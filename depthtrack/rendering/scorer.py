@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.closing import Closing
 from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.target import Target
@@ -74,21 +75,13 @@ class Scorer(Protocol):
     ) -> None: ...
 
 
-class ScorerBase:
+class ScorerBase(Closing):
     """Base of the backends: the target, and closing by `with`."""
 
     _target: Target | None = None
 
     def close(self) -> None:
         """Do nothing; a backend with resources overrides it."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def terms(self, poses: ArrayLike) -> Terms:
         raise NotImplementedError

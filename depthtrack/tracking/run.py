@@ -5,9 +5,9 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunWriter
@@ -45,7 +45,7 @@ def configure(
     )
 
 
-class TrackingRun:
+class TrackingRun(Closing):
     """Tracks a recording as a configuration says; equal configurations give equal bits.
 
     threads: threads of the renderer; poses do not depend on it.
@@ -98,14 +98,6 @@ class TrackingRun:
     def close(self) -> None:
         """Free the tracker."""
         self.tracker.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def true_start(sequence: Sequence) -> Array:

@@ -16,6 +16,7 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.rendering.raster import RasterScorer
+from tests.support.runs import synthesise
 
 FRAMES = 14
 RESOLUTION = 64
@@ -24,9 +25,7 @@ _QUICK = ("--resolution", str(RESOLUTION), "--generations", "12", "--threads", "
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made") / "everyday"
-    assert main(["synth", "everyday", str(folder), "--frames", str(FRAMES)]) == 0
-    return folder
+    return synthesise(tmp_path_factory.mktemp("made") / "everyday", FRAMES)
 
 
 @pytest.fixture(scope="module")

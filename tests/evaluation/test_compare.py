@@ -29,6 +29,7 @@ from depthtrack.tracking.configuration import IkConfig, PsoConfig, TrackerConfig
 from depthtrack.tracking.registry import tracker_config
 from depthtrack.tracking.tracker import Estimate
 from tests.support.dask import dask_scheduler, dask_workers
+from tests.support.runs import synthesise
 from tests.support.workers import InThisProcess
 
 FRAMES = 8
@@ -40,9 +41,7 @@ pytestmark = pytest.mark.xdist_group("dask")
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made") / "everyday"
-    assert main(["synth", "everyday", str(folder), "--frames", str(FRAMES)]) == 0
-    return folder
+    return synthesise(tmp_path_factory.mktemp("made") / "everyday", FRAMES)
 
 
 @pytest.fixture(scope="module")

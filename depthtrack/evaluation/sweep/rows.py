@@ -3,9 +3,9 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 
 Cell = dict[str, Any]
@@ -15,7 +15,7 @@ Row = dict[str, Any]
 """A cell and its measured values: plain JSON values by name."""
 
 
-class Journal:
+class Journal(Closing):
     """Rows on disk. A row belongs to a cell if all values of the cell are equal."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
@@ -54,14 +54,6 @@ class Journal:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _key(self, row: Row) -> str:
         return json.dumps([row.get(name) for name in self._names])
