@@ -20,7 +20,7 @@ from depthtrack.tracking.configuration import TrackerConfig
 def compare(
     recordings: Sequence[Recording],
     out: Path | str,
-    trackers: Sequence[str] | Mapping[str, TrackerConfig] = ("pso", "ik"),
+    trackers: Sequence[str] | Mapping[str, TrackerConfig] = ("hybrid", "pso", "ik"),
     *,
     hand: Path | str | None = None,
     frames: int | None = None,
@@ -47,7 +47,7 @@ def compare(
         InputError: a recording or tracker cannot be used, or `out` holds another comparison.
 
     Example:
-        evaluations = depthtrack.compare(["my-hand"], "my-comparison", ["pso", "ik"])
+        evaluations = depthtrack.compare(["my-hand"], "my-comparison", ["hybrid", "ik"])
         print(depthtrack.comparison_table(evaluations))
     """
     folder, workers = Path(out), chosen_workers(jobs)

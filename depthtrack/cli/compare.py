@@ -25,8 +25,8 @@ class Command:
     """Recordings to track."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")]
     """Folder to write to."""
-    trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="pso,ik")] = ("pso,ik",)
-    """Trackers, each with options after a colon, as in  pso,ik,ik:icp_iterations=8,subsample=2 ; or a .toml file with a
+    trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="hybrid,pso,ik")] = ("hybrid,pso,ik",)
+    """Trackers, each with options after a colon, as in  hybrid,ik:subsample=2 ; or a .toml file with a
     table per tracker: [label], tracker = "ik", and its options."""
     repeats: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Runs per tracker and recording, each with another seed."""

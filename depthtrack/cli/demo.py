@@ -53,8 +53,8 @@ class Command:
         begun = perf_counter()
         workers = chosen_workers(self.jobs)
         sources = self._synthesised() if self.path is None else (self._own(self.path),)
-        print("tracking with pso and with ik; the first use compiles kernels, which takes half a minute", flush=True)
-        comparison = Comparison(sources, tuple(read_specs(["pso,ik"])))
+        print("tracking with hybrid, pso and ik; the first use compiles kernels, which takes half a minute", flush=True)
+        comparison = Comparison(sources, tuple(read_specs(["hybrid,pso,ik"])))
         compare_and_report(comparison, self.out, workers)
         print(f"finished in {perf_counter() - begun:.0f} s; open the report in a browser")
         if self.open:

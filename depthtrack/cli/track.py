@@ -35,7 +35,8 @@ class TrackCommand:
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
     """Run folder to write."""
     tracker: TrackerName
-    """Tracker: pso renders hypotheses, ik fits a surface to the point cloud, the others are those of the papers."""
+    """Tracker: ik fits a surface to the point cloud, pso renders hypotheses, hybrid does both; the others are those of
+    the papers."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="RUN.json")] = None
     """Configuration to repeat: the run.json of a run, or its folder."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)

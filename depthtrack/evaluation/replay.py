@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from depthtrack.errors import InputError
+from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import Run
@@ -18,11 +18,12 @@ from depthtrack.tracking.pipeline import replay_frames
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.tracker import Estimate
+from depthtrack.types import Array
 
 _SAME_TIME = 1e-6
 """Largest difference in the time of a frame between run and recording, s."""
-_LONGEST_PATH = 1024
-"""Largest number of characters in a path of `run.json`."""
+_SAMPLED_FRAMES = 5
+"""Number of frames that decide which surface a run fitted."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,6 @@ class Replay:
             InputError: if the recording is missing or is another one, or `run.json` is malformed.
         """
         configuration, where = RunConfiguration.of(run), str(run.folder / "run.json")
-        if configuration.segmentation.skin_model is not None:
-            _checked_path(configuration.segmentation.skin_model, "skin_model", where)
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(f"the recording {path} of the run {run.folder} is missing: give --sequence PATH")
@@ -72,10 +71,29 @@ class Replay:
     def surface(self) -> HandSurface:
         """Return the surface that the tracker fitted; the rig if the hand has one.
 
+        If the tracker chose between surfaces, it is the one that lies closest to the depth of some frames.
+
         Raises:
             InputError: if the sizes give no skin, or the file of the rig is missing or changed.
         """
-        return HandSurface.of(self.hand, skin=self.configuration.surface == "skin" or self.hand.rig is not None)
+        names = dict.fromkeys(name == "skin" or self.hand.rig is not None for name in self.configuration.surfaces)
+        surfaces = [HandSurface.of(self.hand, skin=skin) for skin in names]
+        return surfaces[0] if len(surfaces) == 1 else min(surfaces, key=self._distance)
+
+    def _distance(self, surface: HandSurface) -> float:
+        """Return the median distance, metres, between a drawn surface and the depth of some frames."""
+        rows = np.flatnonzero([status.is_trusted for status in self.run.status])
+        apart: list[Array] = [np.zeros(0)]
+        for row in rows[np.linspace(0, len(rows) - 1, min(len(rows), _SAMPLED_FRAMES)).astype(int)]:
+            try:
+                frame = self.at(int(row)).frame
+            except DamagedFrameError:
+                continue
+            drawn = surface.render(self.run.poses[row], frame.camera).depth
+            both = (drawn > 0) & (frame.depth > 0)
+            apart.append(np.abs(drawn - frame.depth)[both].astype(np.float64))
+        distances = np.concatenate(apart)
+        return float(np.median(distances)) if len(distances) else 0.0
 
     def __len__(self) -> int:
         """Return the number of frames of the run."""
@@ -126,16 +144,9 @@ def recorded_path(run: Run) -> Path:
     """Return the path of the recording when it was tracked.
 
     Raises:
-        InputError: if `run.json` is malformed, or its entry is no path.
+        InputError: if `run.json` is malformed.
     """
-    return _checked_path(RunConfiguration.of(run).sequence, "sequence", str(run.folder / "run.json"))
-
-
-def _checked_path(text: str, entry: str, where: str) -> Path:
-    """Return the path in an entry of `run.json`, which may come from anyone."""
-    if len(text) > _LONGEST_PATH or "\0" in text:
-        raise InputError(f"{where}: expected a path as {entry}, found {text[:80]!r}")
-    return Path(text)
+    return Path(RunConfiguration.of(run).sequence)
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

@@ -75,13 +75,9 @@ def matched_model(description: Mapping[str, Any], results: Sequence[TrackerResul
     rendered = _rendered_model(description)
     if not rendered:
         return ()
-    labels = dict.fromkeys(result.label for result in results)
-    favoured = tuple(
-        label
-        for label in labels
-        if all(_fitted_model(result) == rendered for result in results if result.label == label)
-    )
-    return favoured if len(favoured) < len(labels) else ()
+    fits = {result.label: rendered in _fitted_models(result) for result in results}
+    favoured = tuple(label for label in fits if fits[label])
+    return favoured if len(favoured) < len(fits) else ()
 
 
 def _rendered_model(description: Mapping[str, Any]) -> str:
@@ -92,13 +88,12 @@ def _rendered_model(description: Mapping[str, Any]) -> str:
     return str(model) if model in ("skin", "primitives") else ""
 
 
-def _fitted_model(result: TrackerResult) -> str:
-    """Return the model that the result's tracker fits; see `_rendered_model`."""
+def _fitted_models(result: TrackerResult) -> set[str]:
+    """Return the models that the result's tracker fits; see `_rendered_model`."""
     configuration = result.evaluations[0].configuration
     rig = configuration.hand.get("rig")
-    if configuration.surface == "cylinders":
-        return "primitives"
-    return str(rig.get("sha256")) if isinstance(rig, dict) else "skin"
+    skin = str(rig.get("sha256")) if isinstance(rig, dict) else "skin"
+    return {skin if surface == "skin" else surface for surface in configuration.surfaces}
 
 
 def _together(values: Sequence[Any]) -> str:

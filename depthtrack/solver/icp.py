@@ -81,6 +81,16 @@ class IcpFitter:
                 self.solution = Solution.of(pose, outcome, trace)
         return pose
 
+    def residual(self, pose: Array, scale: float) -> float:
+        """Return the mean robust cost of a pose (27,), 0 to 1: Geman-McClure of the distances, with scale (m).
+
+        Every n-th point counts, as in the rigid motion; a point without a correspondence costs 1.
+        """
+        self._match(pose, self._coarse, self._coarse_matches, 1.0)
+        found = self._coarse_matches.body >= 0
+        square = np.sum((self._coarse_matches.x[found] - self._coarse.points[found]) ** 2, axis=1)
+        return float(1 - np.sum(1 / (1 + square / scale**2)) / max(len(found), 1))
+
     def _match(self, pose: Array, cloud: PointCloud, correspondences: Correspondences, progress: float) -> None:
         """Find the correspondences of a pose (27,), and accumulate their residuals."""
         kernel_scale, min_normal_cosine = self.options.annealed(progress)

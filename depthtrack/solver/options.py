@@ -14,8 +14,12 @@ Residual = Literal["point", "plane", "symmetric"]
 registration of multiple range images", 1992). `symmetric`: along the mean of both normals, which vanishes on curved
 surfaces too (Rusinkiewicz, "A symmetric objective function for ICP", 2019).
 """
-SurfaceName = Literal["skin", "cylinders"]
-"""Surface of the hand that points are matched to."""
+SurfaceName = Literal["skin", "cylinders", "primitives"]
+"""Surface of the hand that points are matched to.
+
+`skin`: the mesh. `cylinders`: tapered cylinders with round ends, fitted to the skin. `primitives`: the 37 spheres and
+cylinders that hypotheses are rendered with.
+"""
 
 _SCHROEDER = "Schroeder et al. 2014"
 
@@ -86,7 +90,9 @@ PAPER_ICP = IcpOptions(
 class SurfaceFitOptions:
     """How one stage fits the hand's surface to the point cloud."""
 
-    surface: SurfaceName = option("skin", "Surface to fit: the skin mesh, or tapered cylinders with round ends")
+    surface: SurfaceName = option(
+        "skin", "Surface to fit: the skin mesh, tapered cylinders with round ends, or the 37 rendered primitives"
+    )
     subsample: int = option(3, "Use every n-th point of the cloud", source=f"{_SCHROEDER}, Sec. VI-B")
     icp: IcpOptions = option(IcpOptions(), "Iterative closest points")
 

@@ -15,10 +15,26 @@ from depthtrack.types import Array
 
 
 class Optimum(NamedTuple):
-    """The best position (D,) of a swarm, and its energy."""
+    """The best position of each particle of a swarm.
 
-    position: Array
-    energy: float
+    positions: (N, D) best position of each particle.
+    energies: (N,) their energies.
+    best: row of the best particle.
+    """
+
+    positions: Array
+    energies: Array
+    best: int
+
+    @property
+    def position(self) -> Array:
+        """Best position (D,) of the swarm."""
+        return self.positions[self.best]
+
+    @property
+    def energy(self) -> float:
+        """Energy of the best position."""
+        return float(self.energies[self.best])
 
 
 def minimise(
@@ -50,7 +66,7 @@ def minimise(
         better = energy < own_energy
         own_best[better], own_energy[better] = position[better], energy[better]
         best = int(np.argmin(own_energy))
-    return Optimum(own_best[best].copy(), float(own_energy[best]))
+    return Optimum(own_best, own_energy, best)
 
 
 @numba.njit(cache=True)

@@ -9,7 +9,10 @@ from typing import ClassVar, Literal
 from depthtrack.errors import InputError
 from depthtrack.options import option
 from depthtrack.rendering.options import ScoringOptions
-from depthtrack.solver.options import PAPER_ICP, IcpOptions, SurfaceFitOptions, SwarmOptions
+from depthtrack.solver.options import PAPER_ICP, IcpOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
+
+Spread = tuple[float, float, float]
+"""Standard deviations of position, rotation and angles."""
 
 
 def _swarm(particles: int, generations: int) -> SwarmOptions:
@@ -143,9 +146,6 @@ class SynergyOptions:
                 raise InputError(f"{name} needs synergies: choose a set with --synergies")
 
 
-Spread = tuple[float, float, float]
-
-
 @dataclass(frozen=True)
 class PsoConfig:
     """PSO tracker: a swarm of rendered hypotheses per frame (after Oikonomidis et al. 2011)."""
@@ -183,6 +183,79 @@ class IkConfig:
     )
     retry_energy: float = option(0.05, "Added to that multiple", unit="clamp", advanced=True)
     synergies: SynergyOptions = option(SynergyOptions(), "Hand synergies")
+    search: GlobalSearchOptions = option(
+        GlobalSearchOptions(proposals=3000, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1),
+        "Global search",
+        advanced=True,
+    )
+    fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    recovery: RecoveryOptions = option(
+        RecoveryOptions(
+            good_energy=0.3,
+            proposals=3000,
+            min_angle=0.0,
+            accept_local=0.9,
+            doubt_confidence=0.5,
+            doubt_energy=0.4,
+        ),
+        "Local re-initialisation",
+        advanced=True,
+    )
+    local_search: FitSearchOptions = option(
+        FitSearchOptions((FitRound(48, None, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12))),
+        "Surface fits of a local search",
+        advanced=True,
+    )
+    fingers: FingerOptions = option(
+        FingerOptions(resolution=96, stop_early=False), "Search of single fingers", advanced=True
+    )
+    thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers")
+
+
+@dataclass(frozen=True)
+class SurfaceChoiceOptions:
+    """Which surface the fits of a frame use."""
+
+    surfaces: tuple[SurfaceName, ...] = option(
+        ("skin", "primitives"), "Surfaces to choose from, the preferred one first"
+    )
+    good_residual: float = option(0.02, "Residual below which no other surface is tried; robust cost, 0 to 1")
+    iterations: int = option(2, "Rounds of correspondences of each brief fit")
+    scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
+    accept: float = option(0.8, "Residual ratio below which another surface than the preferred one is used")
+
+
+@dataclass(frozen=True)
+class SwarmProposalOptions:
+    """A small swarm whose best particles are fitted to the surface."""
+
+    swarm: SwarmOptions = option(_swarm(32, 8), "Swarm of each frame")
+    spread: Spread = option(
+        (0.006, 0.06, 0.15),
+        "Standard deviation of the first generation: position, rotation, angles",
+        unit="m, rad, rad",
+    )
+    keep: int = option(2, "Particles that are fitted")
+    accept: float = option(0.97, "Energy ratio below which a fitted particle is accepted")
+    skip_ratio: float = option(1.1, "Skip the swarm in frames whose energy is lower than this multiple of the last one")
+
+
+@dataclass(frozen=True)
+class HybridConfig:
+    """Hybrid tracker: surface fits, a small swarm whose best particles are fitted too, verified by rendering."""
+
+    name: ClassVar[str] = "hybrid"
+
+    surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
+    retry_ratio: float = option(
+        1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
+    )
+    retry_energy: float = option(0.05, "Added to that multiple", unit="clamp", advanced=True)
+    proposals: SwarmProposalOptions = option(SwarmProposalOptions(), "Swarm of each frame")
     search: GlobalSearchOptions = option(
         GlobalSearchOptions(proposals=3000, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1),
         "Global search",
@@ -258,11 +331,12 @@ class Schroeder2014Config:
     seed: int = option(0, "Seed of the random numbers")
 
 
-DEFAULT_TRACKER = "pso"
+DEFAULT_TRACKER = "hybrid"
 
-TrackerConfig = PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config
-TrackerName = Literal["pso", "ik", "oikonomidis2011", "schroeder2014"]
+TrackerConfig = HybridConfig | PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config
+TrackerName = Literal["hybrid", "pso", "ik", "oikonomidis2011", "schroeder2014"]
 CONFIGURATIONS: dict[str, type[TrackerConfig]] = {
+    "hybrid": HybridConfig,
     "pso": PsoConfig,
     "ik": IkConfig,
     "oikonomidis2011": Oikonomidis2011Config,

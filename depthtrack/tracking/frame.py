@@ -1,6 +1,6 @@
 """The frame that a tracker works on, and the renderers and fitters that its stages share."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from depthtrack.rendering.options import ScoringOptions
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
-from depthtrack.solver.options import SurfaceFitOptions
+from depthtrack.solver.options import SurfaceFitOptions, SurfaceName
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.state import TrackState
@@ -79,6 +79,7 @@ class FrameContext:
     start_pose: (27,) pose given by the user, or None.
     predictions: candidates that `Predict` made, best first.
     restarted: whether a search replaced the track, so that the status becomes `started`.
+    surface: surface that all fits of the frame use, None for that of their options.
     """
 
     observation: Observation
@@ -88,6 +89,7 @@ class FrameContext:
     start_pose: Array | None = None
     predictions: list[Candidate] = field(default_factory=list)
     restarted: bool = False
+    surface: SurfaceName | None = None
 
     def __post_init__(self) -> None:
         self.random = self.new_random()
@@ -111,4 +113,5 @@ class FrameContext:
         Raises:
             InputError: no skin fits the sizes of the hand.
         """
-        return self.tools.fitter(options, self.observation)
+        chosen = options if self.surface is None else replace(options, surface=self.surface)
+        return self.tools.fitter(chosen, self.observation)

@@ -13,6 +13,7 @@ from depthtrack.tracking.stage_tracker import StageTracker
 
 _TRACKERS = "depthtrack.tracking.trackers"
 BUILDERS = {
+    "hybrid": f"{_TRACKERS}.hybrid",
     "pso": f"{_TRACKERS}.pso",
     "ik": f"{_TRACKERS}.ik",
     "oikonomidis2011": f"{_TRACKERS}.papers",

@@ -16,11 +16,21 @@ from depthtrack.options import from_data, to_data
 from depthtrack.recording.run_folder import Run, read_configuration
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.solver.options import SurfaceName
+from depthtrack.tracking.configuration import (
+    CONFIGURATIONS,
+    HybridConfig,
+    Oikonomidis2011Config,
+    PsoConfig,
+    TrackerConfig,
+)
 from depthtrack.tracking.earlier_runs import upgraded
 
 FORMAT = 2
 """Version of the layout of `run.json`; runs without it were written before the options were nested."""
+
+LONGEST_PATH = 1024
+"""Characters."""
 
 Start = Literal["auto", "truth"]
 
@@ -50,12 +60,17 @@ class RunConfiguration:
         _check_choices({"start": self.start, "frames": self.frames, "on_damage": self.on_damage}, "the run")
 
     @property
-    def surface(self) -> Literal["skin", "cylinders"]:
-        """Surface whose distance to the observation the tracker minimises; spheres and cylinders for a swarm."""
+    def surfaces(self) -> tuple[SurfaceName, ...]:
+        """Surfaces that the tracker minimises the distance to, the preferred one first.
+
+        A swarm that is not refined minimises the distance to the rendered primitives.
+        """
         options = self.tracker
-        if options.name in ("pso", "oikonomidis2011"):
-            return "skin" if getattr(options, "refine", False) else "cylinders"
-        return getattr(options, "fit").surface  # noqa: B009 (each other tracker has a fit)
+        if isinstance(options, HybridConfig):
+            return options.surface_choice.surfaces
+        if isinstance(options, PsoConfig):
+            return (options.final_fit.surface,) if options.refine else ("primitives",)
+        return ("primitives",) if isinstance(options, Oikonomidis2011Config) else (options.fit.surface,)
 
     def to_fields(self) -> dict[str, Any]:
         """Return the contents of `run.json`.
@@ -99,6 +114,10 @@ class RunConfiguration:
         known = {entry: rest.pop(entry) for entry in ("sequence", "camera", "hand")}
         known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage") if entry in rest}
         _check_choices(known, where)
+        paths = {"sequence": known["sequence"], "skin_model": dict(fields.get("segmentation") or {}).get("skin_model")}
+        for entry, path in paths.items():
+            if isinstance(path, str) and (len(path) > LONGEST_PATH or "\0" in path):
+                raise InputError(f"{where}: expected a path as {entry}, found {path[:80]!r}")
         return cls(
             **known,
             tracker=from_data(CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),

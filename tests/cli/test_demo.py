@@ -25,7 +25,7 @@ def test_the_demo_makes_a_report_on_synthetic_recordings(tmp_path: Path, capsys:
     assert str(out / "report.html") in capsys.readouterr().out
     rows = json.loads((out / "results.json").read_text())
     assert {(row["recording"], row["tracker"]) for row in rows} == {
-        (recording, tracker) for recording in ("skin-hand", "primitive-hand") for tracker in ("pso", "ik")
+        (recording, tracker) for recording in ("skin-hand", "primitive-hand") for tracker in ("hybrid", "pso", "ik")
     }
     assert all(0 < row["endpoint_error_mm"]["mean"] < 30 for row in rows)
     # The surface of each tracker occurs in one recording, and the page warns of it.
@@ -52,7 +52,7 @@ def own(tmp_path: Path) -> Path:
 def test_a_users_recording_needs_no_ground_truth(own: Path, tmp_path: Path) -> None:
     assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1", "--no-calibrate"]) == 0
     rows = json.loads((tmp_path / "demo" / "results.json").read_text())
-    assert [row["recording"] for row in rows] == ["own", "own"]
+    assert [row["recording"] for row in rows] == ["own"] * 3
     assert all("endpoint_error_mm" not in row and row["e3d_mm"]["median"] < 6 for row in rows)
     assert "E3D" in (tmp_path / "demo" / "report.html").read_text()
 

@@ -20,7 +20,18 @@ from tests.support.runs import synthesise
 
 FRAMES = 14
 RESOLUTION = 64
-_QUICK = ("--resolution", str(RESOLUTION), "--generations", "12", "--threads", "1", "--start", "truth")
+_QUICK = (
+    "--tracker",
+    "pso",
+    "--resolution",
+    str(RESOLUTION),
+    "--generations",
+    "12",
+    "--threads",
+    "1",
+    "--start",
+    "truth",
+)
 
 
 @pytest.fixture(scope="module")

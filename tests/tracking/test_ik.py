@@ -139,7 +139,7 @@ def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) ->
 def test_trackers_are_made_by_name(made: Synthesiser) -> None:
     assert create_tracker(tracker_config("ik", subsample=5), made.options.hand).name == "ik"
     assert create_tracker(tracker_config("pso", particles=8), made.options.hand).name == "pso"
-    with pytest.raises(InputError, match="choose one of pso, ik"):
+    with pytest.raises(InputError, match="choose one of hybrid, pso, ik"):
         tracker_config("magic")
     with pytest.raises(InputError, match="'point', 'plane' or 'symmetric'"):
         tracker_config("ik", residual="magic")

@@ -56,7 +56,7 @@ def _other(parameter: Parameter) -> Any:
     if isinstance(value, tuple) and value and isinstance(value[0], float):
         return tuple(0.9 * part + 0.001 for part in value)
     assert isinstance(value, tuple), parameter
-    return [to_data(part) for part in value[1:]]
+    return [part if isinstance(part, str) else to_data(part) for part in value[1:]]
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
@@ -132,7 +132,7 @@ def test_runs_of_earlier_versions_are_read() -> None:
         "label": "PSO",
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
-    assert found.surface == "skin"
+    assert found.surfaces == ("skin",)
     assert found.tracker == with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True})
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}

@@ -11,7 +11,7 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.options import SwarmOptions
 from depthtrack.solver.swarm import minimise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
-from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.visible_centroid import visible_centroid
 from depthtrack.types import Array
@@ -22,20 +22,19 @@ Spread = tuple[float, float, float]
 
 def run_swarm(
     scorer: Scorer, space: SwarmSpace, particles: Array, generator: np.random.Generator, options: SwarmOptions
-) -> Candidate:
-    """Return the best pose that a swarm meets, from particles (N, D) in the coordinates of `space`."""
-    confidence, least = 0.0, np.inf
+) -> list[Candidate]:
+    """Return the best pose of each particle, best first, from particles (N, D) in the coordinates of `space`."""
+    least, confidence = np.full(len(particles), np.inf), np.zeros(len(particles))
 
     def score(coordinates: Array) -> Array:
-        nonlocal confidence, least
         scores = scorer.evaluate(space.poses(coordinates))
-        best = int(np.argmin(scores.energy))
-        if scores.energy[best] < least:
-            least, confidence = float(scores.energy[best]), float(scores.agreement[best])
+        better = scores.energy < least
+        least[better], confidence[better] = scores.energy[better], scores.agreement[better]
         return scores.energy
 
     found = minimise(score, particles, space.lower, space.upper, space.fingers, generator, options)
-    return Candidate(space.poses(found.position[None])[0], found.energy, confidence)
+    rows = zip(space.poses(found.positions), found.energies.tolist(), confidence.tolist(), strict=True)
+    return by_energy(Candidate(*row) for row in rows)
 
 
 def swarm_around(
@@ -45,7 +44,7 @@ def swarm_around(
     space = TangentSpace(pose)
     particles = generator.standard_normal((options.particles, 26)) * np.repeat(spread, [3, 3, 20])
     particles[0] = 0
-    return run_swarm(scorer, space, particles, generator, options)
+    return run_swarm(scorer, space, particles, generator, options)[0]
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ class Swarm:
         make_space: Callable[[Array], SwarmSpace] = ParameterSpace if self.space == "parameters" else TangentSpace
         space = make_space(last)
         particles = space.coordinates(first(frame, last))
-        return [run_swarm(frame.tools.scorer, space, particles, frame.random, self.options)]
+        return run_swarm(frame.tools.scorer, space, particles, frame.random, self.options)
 
     def _first_generation_of_paper(self, frame: FrameContext, last: Array) -> Array:
         """Return perturbations (N, 27) of the last pose."""

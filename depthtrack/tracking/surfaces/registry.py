@@ -5,7 +5,9 @@ from depthtrack.rendering.backends import create_scorer
 from depthtrack.solver.correspondences import Surface
 from depthtrack.solver.options import SurfaceName
 from depthtrack.tracking.surfaces.capsules import CapsuleSurface
-from depthtrack.tracking.surfaces.skin import MeshSurface
+from depthtrack.tracking.surfaces.points import PointSurface
+from depthtrack.tracking.surfaces.primitives import primitive_points
+from depthtrack.tracking.surfaces.skin import skin_points
 
 
 def make_surface(name: SurfaceName, hand: HandShape, renderer: str = "raster") -> Surface:
@@ -16,4 +18,6 @@ def make_surface(name: SurfaceName, hand: HandShape, renderer: str = "raster") -
     Raises:
         InputError: no skin fits the sizes of the hand.
     """
-    return MeshSurface(hand) if name == "skin" else CapsuleSurface(hand, create_scorer(renderer, hand))
+    if name == "cylinders":
+        return CapsuleSurface(hand, create_scorer(renderer, hand))
+    return PointSurface(skin_points(hand) if name == "skin" else primitive_points(hand))

@@ -12,19 +12,20 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver import closest_points as closest
 from depthtrack.solver.correspondences import Correspondences, PointCloud
-from depthtrack.tracking.surfaces import skin as mesh
-from depthtrack.tracking.surfaces.skin import Cells, MeshModel, Posed, Seen
+from depthtrack.tracking.surfaces import points as surface
+from depthtrack.tracking.surfaces.points import Cells, Posed, SurfacePoints, Visible
+from depthtrack.tracking.surfaces.skin import mesh_points
 from tests.support.hands import random_pose
 
 SHAPE = HandShape()
 SKIN = Skin.of(SHAPE)
-MODEL = MeshModel.of(SKIN, 0.004)
+MODEL = mesh_points(SKIN, 0.004)
 TOLERANCE = 0.008
 
 
-def posed_hand(pose: np.ndarray, model: MeshModel = MODEL) -> Posed:
+def posed_hand(pose: np.ndarray, model: SurfacePoints = MODEL) -> Posed:
     posed = Posed(np.empty_like(model.rest), np.empty_like(model.rest))
-    mesh.skin_vertices(model, BodyPoses.at(Chain.of(SHAPE), pose), posed)
+    surface.pose_points(model, BodyPoses.at(Chain.of(SHAPE), pose), posed)
     return posed
 
 
@@ -56,13 +57,13 @@ def test_vertices_and_normals_are_blended_as_skinning_says(seed: int) -> None:
 
 def test_four_bodies_a_vertex_are_as_good_as_all() -> None:
     pose = random_pose(np.random.default_rng(1))
-    posed = posed_hand(pose, MeshModel.of(SKIN))
+    posed = posed_hand(pose, mesh_points(SKIN))
     assert np.abs(posed.x - SKIN.at(pose)).max() < 2e-4
 
 
 def test_spread_points_are_apart_and_leave_no_gaps() -> None:
     points = np.random.default_rng(0).uniform(size=(400, 3))
-    picked = mesh.spread(points, 0.2)
+    picked = surface.subsample_evenly(points, 0.2)
     distance = np.linalg.norm(points[:, None] - points[picked], axis=-1)
     between = distance[picked] + np.eye(len(picked))
     assert between.min() > 0.2
@@ -86,8 +87,8 @@ def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
 def test_seen_vertices_are_sorted_by_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
-    cells = mesh.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
-    seen = mesh.sort_seen(MODEL, posed, cells, TOLERANCE)
+    cells = surface.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
+    seen = surface.sort_visible(MODEL, posed, cells, TOLERANCE)
     predicted_pose = _seen_slowly(posed, cells)
     assert seen.first[-1] == len(seen.vertex) == sum(map(len, predicted_pose.values()))
     for cell in range(cells.rows * cells.columns):
@@ -102,8 +103,8 @@ def test_what_another_finger_hides_is_not_seen() -> None:
     """A flat hand seen from its side: its outer fingers hide the middle one."""
     flat = make_pose([0, 0, 0.5], [np.sqrt(0.5), 0, np.sqrt(0.5), 0], np.zeros(20))
     posed = posed_hand(flat)
-    cells = mesh.cells_over(posed.x, 0.004, 0.01)
-    seen = mesh.sort_seen(MODEL, posed, cells, TOLERANCE)
+    cells = surface.cells_over(posed.x, 0.004, 0.01)
+    seen = surface.sort_visible(MODEL, posed, cells, TOLERANCE)
     facing = np.einsum("vi,vi->v", posed.x, posed.n) < 0
     middle = np.isin(MODEL.bodies[:, 0], [7, 8, 9])
     assert middle[seen.vertex].sum() < 0.5 * (facing & middle).sum()
@@ -122,11 +123,14 @@ def test_matches_are_the_closest_seen_vertices_that_agree(
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
     cloud = cloud_near(posed, rng, spread=0.5 * max_distance)
-    cells = mesh.cells_over(cloud.points, cell, max_distance)
-    seen, correspondences = mesh.sort_seen(MODEL, posed, cells, TOLERANCE), Correspondences.allocate(len(cloud.points))
+    cells = surface.cells_over(cloud.points, cell, max_distance)
+    seen, correspondences = (
+        surface.sort_visible(MODEL, posed, cells, TOLERANCE),
+        Correspondences.allocate(len(cloud.points)),
+    )
     closest.closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, correspondences.body)
     found, vertex = correspondences.body >= 0, seen.vertex[correspondences.body]
-    mesh.resolve_bodies(MODEL, posed, seen, correspondences)
+    surface.resolve_bodies(MODEL, posed, seen, correspondences)
     np.testing.assert_array_equal(correspondences.body >= 0, found)
     np.testing.assert_array_equal(correspondences.body[found], MODEL.bodies[vertex[found], 0])
     np.testing.assert_array_equal(correspondences.x[found], posed.x[vertex[found]])
@@ -144,7 +148,7 @@ def test_matches_are_the_closest_seen_vertices_that_agree(
     assert np.all(same[found, at[found]] >= min_normal_cosine - 1e-6)
 
 
-def _index(seen: Seen, vertex: np.ndarray) -> np.ndarray:
+def _index(seen: Visible, vertex: np.ndarray) -> np.ndarray:
     """Where vertices stand among the seen ones; anywhere for others."""
     return np.asarray(np.argmax(seen.vertex == vertex[:, None], axis=1))
 
@@ -152,7 +156,7 @@ def _index(seen: Seen, vertex: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("depth", [0.2, 0.5, 2.5])
 def test_cells_cover_the_cloud_and_its_surroundings(depth: float) -> None:
     points = np.random.default_rng(0).uniform([-0.1, -0.1, depth], [0.1, 0.1, depth + 0.05], (50, 3))
-    cells = mesh.cells_over(points, 0.004, 0.04)
+    cells = surface.cells_over(points, 0.004, 0.04)
     uv = points[:, :2] / points[:, 2:]
     margin = 0.04 / points[:, 2].mean()
     assert np.all(uv.min(axis=0) - margin >= np.array([cells.u, cells.v]) - 1e-12)

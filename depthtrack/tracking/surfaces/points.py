@@ -1,0 +1,213 @@
+"""Correspondences with a surface that is given by points with normals, among those that the camera can see.
+
+The posed points that face the camera, and that no nearer one hides, are sorted into cells of the image. The search for
+an observed point visits the cells around its own until no other can hold a closer point.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from scipy.spatial import cKDTree
+
+from depthtrack.hand.compiled_kinematics import BodyPoses
+from depthtrack.segmentation.observation import Observation
+from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
+from depthtrack.solver.correspondences import Correspondences, PointCloud
+from depthtrack.types import Array, Array32, Index
+
+_CELL = 0.004
+"""Side of a cell at the hand's distance, metres: a little more than the distance between neighbouring points."""
+_HIDDEN = 0.008
+"""Distance behind the nearest point of its cell from which a point counts as hidden, metres."""
+
+
+class SurfacePoints(NamedTuple):
+    """Points of a hand's surface at rest.
+
+    rest, normals: (V, 3) points and outward unit normals, metres, rest frame.
+    bodies, weights: (V, 4) bodies that move each point and their weights, largest first.
+    T_body_rest: (16, 3, 4) rest frame to body frames.
+    """
+
+    rest: Array
+    normals: Array
+    bodies: Index
+    weights: Array
+    T_body_rest: Array
+
+
+def subsample_evenly(points: Array, spacing: float) -> Index:
+    """Return rows of points (N, 3), in order, no two of which are closer than `spacing` (m)."""
+    tree, free, picked = cKDTree(points), np.ones(len(points), np.bool_), []
+    for i in range(len(points)):
+        if free[i]:
+            picked.append(i)
+            free[tree.query_ball_point(points[i], spacing)] = False
+    return np.array(picked)
+
+
+class Posed(NamedTuple):
+    """Posed points `x` (V, 3), metres, and their outward unit normals `n` (V, 3), camera frame."""
+
+    x: Array
+    n: Array
+
+
+class Visible(NamedTuple):
+    """The points that the camera sees, sorted by cell.
+
+    first: (C + 1,) cell c holds the rows from first[c] up to first[c + 1].
+    vertex: (S,) rows of the posed points.
+    table: (6, S + LANES) their coordinates, relative to `origin`, and normals; LANES far points end it.
+    origin: (3,) metres, camera frame.
+    """
+
+    first: Index
+    vertex: Index
+    table: Array32
+    origin: Array
+
+
+class Cells(NamedTuple):
+    """Cells of the image plane z = 1: (rows, columns) of side `size` from corner (`u`, `v`)."""
+
+    u: float
+    v: float
+    size: float
+    rows: int
+    columns: int
+
+
+class PointSurface:
+    """A surface given by points: see `correspondences.Surface`."""
+
+    def __init__(self, points: SurfacePoints) -> None:
+        self._model = points
+        self._posed = Posed(np.empty_like(points.rest), np.empty_like(points.rest))
+
+    def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
+        self._reach = max_distance
+        self._cells = cells_over(cloud.points, _CELL, max_distance)
+
+    def match(
+        self,
+        pose: Array,
+        bodies: BodyPoses,
+        cloud: PointCloud,
+        min_normal_cosine: float,
+        correspondences: Correspondences,
+    ) -> None:
+        pose_points(self._model, bodies, self._posed)
+        visible = sort_visible(self._model, self._posed, self._cells, _HIDDEN)
+        closest_vertices(cloud, visible, self._cells, self._reach, min_normal_cosine, correspondences.body)
+        resolve_bodies(self._model, self._posed, visible, correspondences)
+
+
+@numba.njit(cache=True, nogil=True)
+def pose_points(model: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
+    """Pose points and normals by linear blend skinning."""
+    A = np.empty((16, 12))
+    for b in range(16):
+        T, R = bodies.T[b], model.T_body_rest[b]
+        for i in range(3):
+            for j in range(4):
+                A[b, 4 * i + j] = T[i, 0] * R[0, j] + T[i, 1] * R[1, j] + T[i, 2] * R[2, j]
+            A[b, 4 * i + 3] += T[i, 3]
+    m = np.empty(12)
+    for v in range(model.rest.shape[0]):
+        w, b = model.weights[v, 0], model.bodies[v, 0]
+        for j in range(12):
+            m[j] = w * A[b, j]
+        for k in range(1, 4):
+            w, b = model.weights[v, k], model.bodies[v, k]
+            if w == 0.0:
+                break
+            for j in range(12):
+                m[j] += w * A[b, j]
+        x, y, z = model.rest[v, 0], model.rest[v, 1], model.rest[v, 2]
+        nx, ny, nz = model.normals[v, 0], model.normals[v, 1], model.normals[v, 2]
+        length = 0.0
+        for i in range(3):
+            posed.x[v, i] = m[4 * i] * x + m[4 * i + 1] * y + m[4 * i + 2] * z + m[4 * i + 3]
+            n = m[4 * i] * nx + m[4 * i + 1] * ny + m[4 * i + 2] * nz
+            posed.n[v, i] = n
+            length += n * n
+        length = 1.0 / math.sqrt(max(length, 1e-30))
+        for i in range(3):
+            posed.n[v, i] *= length
+
+
+@numba.njit(cache=True, nogil=True)
+def cells_over(points: Array, size: float, margin: float) -> Cells:
+    """Cells over the image of points (N, 3) and `margin` (m) around it; `size` is a cell's side in metres at the
+    points' mean depth."""
+    if points.shape[0] == 0:
+        return Cells(0.0, 0.0, 1.0, 1, 1)
+    low_u = low_v = 1e9
+    high_u = high_v = -1e9
+    depth = 0.0
+    for i in range(points.shape[0]):
+        z = points[i, 2]
+        u, v = points[i, 0] / z, points[i, 1] / z
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+        depth += z
+    depth /= points.shape[0]
+    side, around = size / depth, margin / depth
+    columns = min(int((high_u - low_u + 2 * around) / side) + 1, 512)
+    rows = min(int((high_v - low_v + 2 * around) / side) + 1, 512)
+    return Cells(low_u - around, low_v - around, side, rows, columns)
+
+
+@numba.njit(cache=True, nogil=True)
+def sort_visible(model: SurfacePoints, posed: Posed, cells: Cells, tolerance: float) -> Visible:
+    """Find the vertices that the camera sees, and sort them by cell.
+
+    A vertex is hidden when it lies more than `tolerance` (m) behind the nearest one of its cell, or faces away.
+    """
+    count = posed.x.shape[0]
+    cell = np.empty(count, np.int64)
+    nearest = np.full(cells.rows * cells.columns, 1e9)
+    for v in range(count):
+        x, y, z = posed.x[v, 0], posed.x[v, 1], posed.x[v, 2]
+        cell[v] = -1
+        facing = posed.n[v, 0] * x + posed.n[v, 1] * y + posed.n[v, 2] * z
+        if z <= 1e-3 or facing >= 0.0:
+            continue
+        column, row = math.floor((x / z - cells.u) / cells.size), math.floor((y / z - cells.v) / cells.size)
+        if 0 <= column < cells.columns and 0 <= row < cells.rows:
+            cell[v] = row * cells.columns + column
+            nearest[cell[v]] = min(nearest[cell[v]], z)
+    first = np.zeros(cells.rows * cells.columns + 1, np.int64)
+    for v in range(count):
+        if cell[v] >= 0 and posed.x[v, 2] > nearest[cell[v]] + tolerance:
+            cell[v] = -1
+        if cell[v] >= 0:
+            first[cell[v] + 1] += 1
+    for c in range(1, first.shape[0]):
+        first[c] += first[c - 1]
+    total = first[-1]
+    visible = Visible(first, np.empty(total, np.int64), np.full((6, total + LANES), FAR), posed.x[0].copy())
+    forward_kinematics = first[:-1].copy()
+    for v in range(count):
+        if cell[v] < 0:
+            continue
+        k = forward_kinematics[cell[v]]
+        forward_kinematics[cell[v]] += 1
+        visible.vertex[k] = v
+        for j in range(3):
+            visible.table[j, k], visible.table[3 + j, k] = posed.x[v, j] - visible.origin[j], posed.n[v, j]
+    return visible
+
+
+@numba.njit(cache=True, nogil=True)
+def resolve_bodies(model: SurfacePoints, posed: Posed, visible: Visible, correspondences: Correspondences) -> None:
+    """Complete the matches, whose `body` tells a visible vertex as yet: it counts as fixed to the body that moves it
+    most."""
+    for i in range(correspondences.body.shape[0]):
+        if correspondences.body[i] >= 0:
+            v = visible.vertex[correspondences.body[i]]
+            correspondences.body[i] = model.bodies[v, 0]
+            for j in range(3):
+                correspondences.x[i, j], correspondences.n[i, j] = posed.x[v, j], posed.n[v, j]

@@ -1,0 +1,82 @@
+"""The 37 spheres and cylinders that hypotheses are rendered with, as a surface to fit."""
+
+import numpy as np
+
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.primitives import SPHERE, Primitives
+from depthtrack.hand.shape import HandShape
+from depthtrack.tracking.surfaces.points import SurfacePoints, subsample_evenly
+from depthtrack.types import Array, Index, Mask
+
+SPACING = 0.026
+"""Least distance between the points, in lengths of the palm, as on the skin."""
+SAMPLES = 1600
+"""Points of each primitive before subsampling."""
+INSIDE = 0.98
+"""Scale of the unit primitives within which a point counts as inside one."""
+
+
+def primitive_points(shape: HandShape) -> SurfacePoints:
+    """Return points on the primitives, without those inside another primitive in every typical posture."""
+    primitives, model = Primitives.of(shape), HandModel(shape)
+    parts = [sample_primitive(int(kind), T) for kind, T in zip(primitives.kinds, primitives.T_body_unit, strict=True)]
+    local, normals = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    owner = np.repeat(np.arange(len(parts)), [len(points) for points, _ in parts])
+    hidden = np.ones(len(local), np.bool_)
+    for angles in POSTURES.values():
+        T = model.transforms(make_pose(np.zeros(3), (1, 0, 0, 0), angles))
+        hidden &= inside_others(primitives, T, local, owner)
+    local, normals, bodies = local[~hidden], normals[~hidden], primitives.bodies[owner[~hidden]]
+    T_rest_body = model.transforms(make_pose(np.zeros(3), (1, 0, 0, 0), POSTURES["open"]))
+    R, t = T_rest_body[bodies, :3, :3], T_rest_body[bodies, :3, 3]
+    rest = np.einsum("nij,nj->ni", R, local) + t
+    pick = subsample_evenly(rest, SPACING * shape.palm_length * shape.scale)
+    return SurfacePoints(
+        np.ascontiguousarray(rest[pick]),
+        np.ascontiguousarray(np.einsum("nij,nj->ni", R, normals)[pick]),
+        np.ascontiguousarray(np.column_stack([bodies[pick], np.zeros((len(pick), 3), np.int64)])),
+        np.ascontiguousarray(np.tile([1.0, 0.0, 0.0, 0.0], (len(pick), 1))),
+        np.ascontiguousarray(np.linalg.inv(T_rest_body)[:, :3]),
+    )
+
+
+def sample_primitive(kind: int, T: Array) -> tuple[Array, Array]:
+    """Return points and outward unit normals (N, 3) of a unit primitive under T (4, 4), which may be projective.
+
+    A quadric u^T Q u = 0 maps to x^T T^-T Q T^-1 x = 0, whose gradient is the normal.
+    """
+    golden, n = np.pi * (3 - np.sqrt(5)), np.arange(SAMPLES)
+    share = (n + 0.5) / SAMPLES
+    if kind == SPHERE:
+        z = 1 - 2 * share
+        unit = np.column_stack([np.sqrt(1 - z * z) * np.cos(golden * n), np.sqrt(1 - z * z) * np.sin(golden * n), z])
+        Q = np.diag([1.0, 1.0, 1.0, -1.0])
+    else:
+        unit = np.column_stack([np.cos(golden * n), np.sin(golden * n), share])
+        Q = np.diag([1.0, 1.0, 0.0, -1.0])
+    x = np.column_stack([unit, np.ones(SAMPLES)]) @ T.T
+    x /= x[:, 3:]
+    inverse = np.linalg.inv(T)
+    gradient = (x @ (inverse.T @ Q @ inverse))[:, :3]
+    return x[:, :3], gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+
+
+def inside_others(primitives: Primitives, T: Array, local: Array, owner: Index) -> Mask:
+    """Return which points (N, 3) of the primitives `owner` (N,) lie inside another one.
+
+    T: (16, 4, 4) frames of the bodies. local: points in the frames of their bodies, metres.
+    """
+    homogeneous = np.column_stack([local, np.ones(len(local))])
+    points = np.einsum("nij,nj->ni", T[primitives.bodies[owner]], homogeneous)
+    inside = np.zeros(len(local), np.bool_)
+    for number, placed in enumerate(primitives.transforms(T)):
+        unit = points @ np.linalg.inv(placed).T
+        unit = unit[:, :3] / unit[:, 3:]
+        if primitives.kinds[number] == SPHERE:
+            within = np.linalg.norm(unit, axis=1) < INSIDE
+        else:
+            within = (np.hypot(unit[:, 0], unit[:, 1]) < INSIDE) & (unit[:, 2] > 0) & (unit[:, 2] < 1)
+        inside |= within & (owner != number)
+    return inside

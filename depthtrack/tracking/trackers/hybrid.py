@@ -1,0 +1,40 @@
+"""The hybrid tracker: surface fits, and a small swarm whose best particles are fitted too, verified by rendering."""
+
+from dataclasses import replace
+
+from depthtrack.tracking.configuration import HybridConfig
+from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.predict import GivenPose, Predict
+from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
+from depthtrack.tracking.stages.searches import FitSearch
+from depthtrack.tracking.stages.stage import Stage
+from depthtrack.tracking.stages.surface_choice import ChooseSurface
+from depthtrack.tracking.stages.surface_fit import RetryPredictions, SurfaceFit
+from depthtrack.tracking.stages.swarm_proposals import SwarmProposals
+
+
+def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
+    """Return the stages of the hybrid tracker.
+
+    The surface that the observed points lie on is chosen in each frame. The best prediction is fitted to it, then the
+    best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches.
+    """
+    fit = SurfaceFit(config.fit)
+    surface = ChooseSurface(config.surface_choice, config.fit)
+    search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
+    fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
+    start: list[Stage] = [SearchGlobally(search, config.search), surface, fit, fingers]
+    return Stages(
+        follow=[
+            Predict(config.predictions),
+            surface,
+            fit,
+            RetryPredictions(fit, config.retry_ratio, config.retry_energy),
+            SwarmProposals(config.proposals, fit),
+            RecoverLocally(near, config.recovery, elsewhere=start),
+            fingers,
+        ],
+        start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
+        refine=[GivenPose(), surface, replace(fit, hold_last=False, effort=2)],
+    )
