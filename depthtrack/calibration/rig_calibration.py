@@ -21,8 +21,7 @@ from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import IcpOptions
-from depthtrack.tracking.surfaces.points import PointSurface
-from depthtrack.tracking.surfaces.skin import skin_points
+from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.types import Array
 
 _REACH = 0.15
@@ -134,7 +133,7 @@ class _ScaleFit:
     def at(self, scale: float) -> tuple[Array, float]:
         """Return the fitted poses (V, 27) at a scale, and their mean disagreement."""
         shape = self._rig.with_(scale=scale)
-        fitter = IcpFitter(shape, PointSurface(skin_points(shape)), IcpOptions(icp_iterations=8))
+        fitter = IcpFitter(shape, make_surface("skin", shape), IcpOptions(icp_iterations=8))
         surface = HandSurface.of(shape, skin=True)
         poses, costs = [], []
         for observation, pose in zip(self.observations, self._poses, strict=True):

@@ -87,6 +87,27 @@ PAPER_ICP = IcpOptions(
 
 
 @dataclass(frozen=True)
+class SurfaceOptions:
+    """How a surface is sampled, and which of its points are visible."""
+
+    spacing: float = option(
+        0.026,
+        "Least distance between points of the skin or the primitives: 2.4 mm on an average hand",
+        unit="palm lengths",
+    )
+    cell: float = option(
+        0.004, "Side of an image cell at the hand's distance, a little more than the spacing", unit="m"
+    )
+    hidden_depth: float = option(
+        0.008, "Depth behind the nearest point of its cell at which a point is hidden", unit="m"
+    )
+    cylinder_hidden_depth: float = option(
+        0.006, "Depth behind the rendered hand at which cylinders are hidden", unit="m"
+    )
+    cylinder_resolution: int = option(96, "Longest side of that rendering", unit="px")
+
+
+@dataclass(frozen=True)
 class SurfaceFitOptions:
     """How one stage fits the hand's surface to the point cloud."""
 
@@ -95,6 +116,7 @@ class SurfaceFitOptions:
     )
     subsample: int = option(3, "Use every n-th point of the cloud", source=f"{_SCHROEDER}, Sec. VI-B")
     icp: IcpOptions = option(IcpOptions(), "Iterative closest points")
+    sampling: SurfaceOptions = option(SurfaceOptions(), "Points of the surface", advanced=True)
 
     def __post_init__(self) -> None:
         if not 1 <= self.subsample <= 1000:

@@ -97,7 +97,16 @@ class GlobalSearchOptions:
     proposals: int = option(4000, "Poses scored first")
     min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
     synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies")
+    position_spread: Spread = option(
+        (0.025, 0.025, 0.012),
+        "Standard deviation of the palm about the observed centre, along the camera's axes",
+        unit="m",
+    )
+    angle_spread: float = option(0.15, "Standard deviation of the angles about typical postures", unit="rad")
     follow_arm: bool = option(True, "Prefer orientations that the observed forearm allows")
+    least_along_arm: float = option(
+        0.17, "Cosine of the largest bend of a wrist, 80 degrees", source="Greene and Heckman 1994"
+    )
     good_energy: float = option(0.2, "An energy that ends the search", unit="clamp")
     attempts: int = option(3, "Repetitions, at most")
     min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
@@ -113,6 +122,10 @@ class RecoveryOptions:
     good_energy: float = option(0.2, "Frames with a lower energy are left alone", unit="clamp")
     every: int = option(5, "Search locally in every n-th frame; 0 only in doubtful frames", unit="frames")
     proposals: int = option(4000, "Poses near the last one that a local search scores")
+    position_spread: float = option(0.02, "Standard deviation of their position", unit="m")
+    rotation_spread: float = option(0.3, "Standard deviation of their rotation", unit="rad")
+    angle_spread: float = option(0.15, "Standard deviation of their angles about typical postures", unit="rad")
+    keep_angles_every: int = option(4, "Every n-th of them keeps the finger angles")
     min_angle: float = option(0.1, "Least angle between the orientations that continue; 0 for any", unit="rad")
     accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
     accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")

@@ -58,7 +58,7 @@ class Toolkit:
             InputError: no skin fits the sizes of the hand.
         """
         if options not in self._fitters:
-            surface = make_surface(options.surface, self.hand, self.scoring.renderer)
+            surface = make_surface(options.surface, self.hand, self.scoring.renderer, options.sampling)
             self._fitters[options] = IcpFitter(self.hand, surface, options.icp)
         fitter = self._fitters[options]
         if self._targets.get(options) is not observation:

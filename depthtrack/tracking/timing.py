@@ -1,18 +1,18 @@
-"""The time that each stage of a tracker takes."""
+"""The time of each stage of a tracker."""
 
 import time
 from collections.abc import Iterable
 
 
 class StageClock:
-    """`milliseconds` of each of some stages, which end one after the other; 0 for those that did not take place."""
+    """Accumulates the `milliseconds` of stages that follow each other; 0 for stages that did not run."""
 
     def __init__(self, stages: Iterable[str]) -> None:
         self.milliseconds = dict.fromkeys(stages, 0.0)
         self._last = time.perf_counter()
 
     def lap(self, stage: str) -> None:
-        """All time since the last lap was this stage's."""
+        """Add the time since the last lap to a stage."""
         now = time.perf_counter()
         self.milliseconds[stage] += 1e3 * (now - self._last)
         self._last = now

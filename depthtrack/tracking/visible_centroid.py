@@ -1,4 +1,4 @@
-"""Where a depth map's visible surface is, on average."""
+"""The centroid of the surface that a depth map shows."""
 
 import numba
 import numpy as np
@@ -8,9 +8,10 @@ from depthtrack.types import Array, Depth
 
 @numba.njit(cache=True)
 def visible_centroid(depth: Depth, intrinsics: tuple[float, float, float, float]) -> Array:
-    """Mean point (3,), metres, camera frame, of a depth map (h, w) with 0 for no reading; NaN without any reading.
+    """Return the mean point (3,), m, camera frame, of a depth map; NaN without any reading.
 
-    `intrinsics` are fx, fy, cx, cy.
+    depth: (h, w) metres, 0 for no reading.
+    intrinsics: fx, fy, cx, cy in pixels.
     """
     fx, fy, cx, cy = intrinsics
     count, x, y, z = 0, 0.0, 0.0, 0.0

@@ -19,7 +19,13 @@ from depthtrack.rendering.scorer import Scores
 from depthtrack.solver.options import SwarmOptions
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.candidate import evaluate
-from depthtrack.tracking.configuration import FingerOptions, PsoConfig, SwarmSearchOptions, TrackingThresholds
+from depthtrack.tracking.configuration import (
+    FingerOptions,
+    PsoConfig,
+    RecoveryOptions,
+    SwarmSearchOptions,
+    TrackingThresholds,
+)
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
 from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
 from depthtrack.tracking.proposals.local import local_proposals
@@ -56,14 +62,14 @@ def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
         swarm = SwarmOptions(64, 25, inertia=0.6, near_best=0.5)
         stayed = swarm_around(scorer, wrong, PsoConfig().spread, swarm, np.random.default_rng(5)).pose
         generator = np.random.default_rng(5)
-        starts = evaluate(scorer, local_proposals(wrong, generator, 4000))
+        starts = evaluate(scorer, local_proposals(wrong, generator, RecoveryOptions()))
         found = swarm_search(scorer, starts, generator, SwarmSearchOptions(), 0.1)[0].pose
     errors = endpoint_error(MODEL, np.stack([stayed, found]), MODEL, made.poses[[frame, frame]]).values
     assert errors[1] < 0.7 * errors[0]
 
 
 def test_poses_close_by_are_possible_and_close(made: Synthesiser) -> None:
-    poses = local_proposals(made.poses[20], np.random.default_rng(1), 500)
+    poses = local_proposals(made.poses[20], np.random.default_rng(1), RecoveryOptions(proposals=500))
     angles = poses[:, ANGLES]
     assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
     assert np.linalg.norm(poses[:, POSITION] - made.poses[20, POSITION], axis=1).max() < 0.12

@@ -8,18 +8,18 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.synergies import Synergies
+from depthtrack.tracking.configuration import GlobalSearchOptions
 from depthtrack.types import Array
 
-POSITION_SPREAD = (0.025, 0.025, 0.012)
-"""Standard deviation of the palm about the observed centre along the camera's axes, metres."""
-ANGLE_SPREAD = 0.15
-"""Standard deviation of angles about those of typical postures, radians."""
-LEAST_ALONG_ARM = 0.17
-"""Cosine of the 80 degrees that a wrist bends at most (Greene and Heckman 1994), either way."""
+DEFAULTS = GlobalSearchOptions()
 
 
 def orientation_proposals(
-    centre: Array, angles: Array, generator: np.random.Generator, arm: Array | None = None
+    centre: Array,
+    angles: Array,
+    generator: np.random.Generator,
+    arm: Array | None = None,
+    options: GlobalSearchOptions = DEFAULTS,
 ) -> Array:
     """Return poses (N, 27) with random orientations; those that the forearm allows come first.
 
@@ -32,16 +32,16 @@ def orientation_proposals(
     rotations = Rotation.random(count if arm is None else 4 * count, rng=generator)
     if arm is not None:
         towards_wrist = rotations.apply([0.0, -1.0, 0.0])
-        rotations = rotations[np.argsort(towards_wrist @ arm < LEAST_ALONG_ARM, kind="stable")[:count]]
+        rotations = rotations[np.argsort(towards_wrist @ arm < options.least_along_arm, kind="stable")[:count]]
     quaternions = rotations.as_quat()[:, [3, 0, 1, 2]]
-    positions = centre + generator.standard_normal((count, 3)) * POSITION_SPREAD
+    positions = centre + generator.standard_normal((count, 3)) * options.position_spread
     return within_limits(make_pose(positions, quaternions, angles))
 
 
-def typical_angles(generator: np.random.Generator, count: int) -> Array:
-    """Return finger angles (count, 20) of typical postures, perturbed."""
+def typical_angles(generator: np.random.Generator, count: int, spread: float = DEFAULTS.angle_spread) -> Array:
+    """Return finger angles (count, 20) of typical postures, perturbed by `spread` (rad)."""
     typical = np.stack(list(POSTURES.values()))
-    return typical[generator.integers(0, len(typical), count)] + ANGLE_SPREAD * generator.standard_normal((count, 20))
+    return typical[generator.integers(0, len(typical), count)] + spread * generator.standard_normal((count, 20))
 
 
 def synergy_angles(synergies: Synergies, generator: np.random.Generator, count: int) -> Array:
@@ -50,15 +50,17 @@ def synergy_angles(synergies: Synergies, generator: np.random.Generator, count: 
     return synergies.angles(np.clip(coefficients, synergies.lower, synergies.upper))
 
 
-def mixed_angles(synergies: Synergies, share: float, generator: np.random.Generator, count: int) -> Array:
-    """Return angles (count, 20), this share of them drawn from the synergies, the others typical postures.
+def mixed_angles(synergies: Synergies, generator: np.random.Generator, options: GlobalSearchOptions) -> Array:
+    """Return angles (N, 20) of all proposals: a share drawn from the synergies, the others typical postures.
 
     Typical postures matter because some are rare in the recordings that synergies are computed from.
     """
+    count, share = options.proposals, options.synergy_share
     if share <= 0:
-        return typical_angles(generator, count)
+        return typical_angles(generator, count, options.angle_spread)
     drawn = (np.arange(count) * share % 1 < share)[:, None]
-    return np.where(drawn, synergy_angles(synergies, generator, count), typical_angles(generator, count))
+    from_synergies = synergy_angles(synergies, generator, count)
+    return np.where(drawn, from_synergies, typical_angles(generator, count, options.angle_spread))
 
 
 def distinct_orientations(poses: Array, angle: float, count: int) -> list[int]:

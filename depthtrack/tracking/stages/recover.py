@@ -91,7 +91,7 @@ class RecoverLocally:
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
         if best.energy <= options.good_energy * frame.clamp or not (due or doubtful):
             return candidates
-        proposals = local_proposals(best.pose, self.search.random(frame), options.proposals)
+        proposals = local_proposals(best.pose, self.search.random(frame), options)
         near = self.search.improve(frame, proposals, options.min_angle)[0]
         if near.energy < (1 if doubtful else options.accept_local) * best.energy:
             best = near
@@ -120,6 +120,6 @@ class ReinitialiseNearLast:
             return candidates
         pose = last.copy()
         pose[POSITION] = frame.observation.centre
-        proposals = local_proposals(pose, self.search.random(frame), self.options.proposals)
+        proposals = local_proposals(pose, self.search.random(frame), self.options)
         near = self.fingers(frame, self.search.improve(frame, proposals, self.options.min_angle)[:1])
         return candidates if candidates[0].energy < self.options.accept_global * near[0].energy else near

@@ -116,9 +116,9 @@ def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOp
     best: Candidate | None = None
     generator, observation = search.random(frame), frame.observation
     for _ in range(options.attempts):
-        angles = mixed_angles(frame.tools.synergies, options.synergy_share, generator, options.proposals)
+        angles = mixed_angles(frame.tools.synergies, generator, options)
         arm = observation.arm_direction if options.follow_arm else None
-        poses = orientation_proposals(observation.centre, angles, generator, arm)
+        poses = orientation_proposals(observation.centre, angles, generator, arm, options)
         found = search.improve(frame, poses, options.min_angle)[0]
         before = np.inf if best is None else best.energy
         best = found if best is None or found.energy < best.energy else best

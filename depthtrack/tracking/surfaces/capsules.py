@@ -17,13 +17,9 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud
+from depthtrack.solver.options import SurfaceOptions
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
 from depthtrack.types import Array, Array32, Depth
-
-_HIDDEN = 0.006
-"""Metres behind the rendered hand at which a point counts as hidden: pixels are coarse, and surfaces slanted."""
-_RESOLUTION = 96
-"""Longest side of that rendering, pixels."""
 
 
 class Placed(NamedTuple):
@@ -48,22 +44,27 @@ class Distances(NamedTuple):
 
 
 class View(NamedTuple):
-    """The hand as rendered: `depth` (h, w) metres, 0 for none, and the lens (fx, fy, cx, cy)."""
+    """The hand as rendered.
+
+    depth: (h, w) metres, 0 for none. lens: fx, fy, cx, cy. hidden_depth: depth behind it at which a point is hidden, m.
+    """
 
     depth: Depth
     lens: tuple[float, float, float, float]
+    hidden_depth: float
 
 
 class CapsuleSurface:
     """See the module, and `matching.Surface`."""
 
-    def __init__(self, shape: HandShape, scorer: Scorer) -> None:
+    def __init__(self, shape: HandShape, scorer: Scorer, options: SurfaceOptions) -> None:
+        self._options = options
         self._capsules = fitted_capsules(shape)
         self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
         self._scorer = scorer
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        target = observation.reduced(_RESOLUTION)
+        target = observation.reduced(self._options.cylinder_resolution)
         self._scorer.set_target(target)
         c = target.camera
         self._lens = (c.fx, c.fy, c.cx, c.cy)
@@ -78,7 +79,7 @@ class CapsuleSurface:
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        view = View(self._scorer.render(pose), self._lens)
+        view = View(self._scorer.render(pose), self._lens, self._options.cylinder_hidden_depth)
         place_capsules(self._capsules, bodies, self._placed)
         measure(cloud.points, self._capsules, self._placed, self._distances)
         limits = (self._reach, min_normal_cosine)
@@ -200,5 +201,5 @@ def _hidden(x: Array, i: int, view: View) -> bool:
     u, v = round(x[i, 0] / z * fx + cx), round(x[i, 1] / z * fy + cy)
     if 0 <= u < view.depth.shape[1] and 0 <= v < view.depth.shape[0]:
         front = view.depth[v, u]
-        return front > 0 and z > front + _HIDDEN
+        return front > 0 and z > front + view.hidden_depth
     return False

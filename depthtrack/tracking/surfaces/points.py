@@ -15,12 +15,8 @@ from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
 from depthtrack.solver.correspondences import Correspondences, PointCloud
+from depthtrack.solver.options import SurfaceOptions
 from depthtrack.types import Array, Array32, Index
-
-_CELL = 0.004
-"""Side of a cell at the hand's distance, metres: a little more than the distance between neighbouring points."""
-_HIDDEN = 0.008
-"""Distance behind the nearest point of its cell from which a point counts as hidden, metres."""
 
 
 class SurfacePoints(NamedTuple):
@@ -83,13 +79,13 @@ class Cells(NamedTuple):
 class PointSurface:
     """A surface given by points: see `correspondences.Surface`."""
 
-    def __init__(self, points: SurfacePoints) -> None:
-        self._model = points
+    def __init__(self, points: SurfacePoints, options: SurfaceOptions) -> None:
+        self._model, self._options = points, options
         self._posed = Posed(np.empty_like(points.rest), np.empty_like(points.rest))
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         self._reach = max_distance
-        self._cells = cells_over(cloud.points, _CELL, max_distance)
+        self._cells = cells_over(cloud.points, self._options.cell, max_distance)
 
     def match(
         self,
@@ -100,7 +96,7 @@ class PointSurface:
         correspondences: Correspondences,
     ) -> None:
         pose_points(self._model, bodies, self._posed)
-        visible = sort_visible(self._model, self._posed, self._cells, _HIDDEN)
+        visible = sort_visible(self._model, self._posed, self._cells, self._options.hidden_depth)
         closest_vertices(cloud, visible, self._cells, self._reach, min_normal_cosine, correspondences.body)
         resolve_bodies(self._model, self._posed, visible, correspondences)
 
@@ -189,12 +185,12 @@ def sort_visible(model: SurfacePoints, posed: Posed, cells: Cells, tolerance: fl
         first[c] += first[c - 1]
     total = first[-1]
     visible = Visible(first, np.empty(total, np.int64), np.full((6, total + LANES), FAR), posed.x[0].copy())
-    forward_kinematics = first[:-1].copy()
+    slots = first[:-1].copy()
     for v in range(count):
         if cell[v] < 0:
             continue
-        k = forward_kinematics[cell[v]]
-        forward_kinematics[cell[v]] += 1
+        k = slots[cell[v]]
+        slots[cell[v]] += 1
         visible.vertex[k] = v
         for j in range(3):
             visible.table[j, k], visible.table[3 + j, k] = posed.x[v, j] - visible.origin[j], posed.n[v, j]

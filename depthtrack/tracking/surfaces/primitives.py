@@ -10,16 +10,17 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.tracking.surfaces.points import SurfacePoints, subsample_evenly
 from depthtrack.types import Array, Index, Mask
 
-SPACING = 0.026
-"""Least distance between the points, in lengths of the palm, as on the skin."""
 SAMPLES = 1600
 """Points of each primitive before subsampling."""
 INSIDE = 0.98
 """Scale of the unit primitives within which a point counts as inside one."""
 
 
-def primitive_points(shape: HandShape) -> SurfacePoints:
-    """Return points on the primitives, without those inside another primitive in every typical posture."""
+def primitive_points(shape: HandShape, spacing: float) -> SurfacePoints:
+    """Return points on the primitives at least `spacing` palm lengths apart.
+
+    Points inside another primitive in every typical posture are left out.
+    """
     primitives, model = Primitives.of(shape), HandModel(shape)
     parts = [sample_primitive(int(kind), T) for kind, T in zip(primitives.kinds, primitives.T_body_unit, strict=True)]
     local, normals = (np.concatenate([part[i] for part in parts]) for i in range(2))
@@ -32,7 +33,7 @@ def primitive_points(shape: HandShape) -> SurfacePoints:
     T_rest_body = model.transforms(make_pose(np.zeros(3), (1, 0, 0, 0), POSTURES["open"]))
     R, t = T_rest_body[bodies, :3, :3], T_rest_body[bodies, :3, 3]
     rest = np.einsum("nij,nj->ni", R, local) + t
-    pick = subsample_evenly(rest, SPACING * shape.palm_length * shape.scale)
+    pick = subsample_evenly(rest, spacing * shape.palm_length * shape.scale)
     return SurfacePoints(
         np.ascontiguousarray(rest[pick]),
         np.ascontiguousarray(np.einsum("nij,nj->ni", R, normals)[pick]),

@@ -18,7 +18,7 @@ from tests.support.hands import random_pose
 SHAPE = HandShape()
 FITTED = fitted_capsules(SHAPE)
 SEEDS = st.integers(0, 2**32 - 1)
-OPEN_VIEW = View(np.zeros((1, 1), np.float32), (1.0, 1.0, 0.0, 0.0))
+OPEN_VIEW = View(np.zeros((1, 1), np.float32), (1.0, 1.0, 0.0, 0.0), 0.006)
 """Nothing in front of anything."""
 
 
@@ -114,7 +114,7 @@ def test_what_the_rendered_hand_hides_is_passed_over() -> None:
     capsule = Capsules(np.arange(2), np.zeros((2, 3)), np.zeros((2, 3)), 0.05 * one, 0.01 * one, 0 * one)
     placed = Placed(np.array([[-0.02, 0, 0.40], [-0.02, 0, 0.43]]), np.array([[1.0, 0, 0], [1, 0, 0]]))
     cloud = PointCloud(np.array([[0.0, 0, 0.419]]), np.array([[0.0, 0, -1]]))
-    wall = View(np.full((3, 3), 0.39, np.float32), (1.0, 1.0, 1.0, 1.0))
+    wall = View(np.full((3, 3), 0.39, np.float32), (1.0, 1.0, 1.0, 1.0), 0.006)
     for view, body in ((OPEN_VIEW, 1), (wall, 0)):
         correspondences = Correspondences.allocate(1)
         capsules.choose(

@@ -48,7 +48,7 @@ def posed(points: SurfacePoints, shape: HandShape, pose: np.ndarray) -> Posed:
 def test_visible_points_lie_where_the_ray_caster_draws_the_hand(name: str, posture: str) -> None:
     shape, camera = SHAPES[name], Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
     pose = make_pose([0.01, 0.02, 0.45], [0.9, 0.2, 0.3, 0.1], POSTURES[posture])
-    found, primitives = posed(primitive_points(shape), shape, pose), Primitives.of(shape)
+    found, primitives = posed(primitive_points(shape, 0.026), shape, pose), Primitives.of(shape)
     T = primitives.transforms(HandModel(shape).transforms(pose))
     depth = raycast(camera, primitives.kinds, T, primitives.bodies).depth
     u, v = np.rint(camera.project(found.x)).astype(int).T
