@@ -12,7 +12,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
-from depthtrack.tracking.configuration import GlobalSearchOptions, SwarmSearchOptions
+from depthtrack.tracking.options import GlobalSearchOptions, SwarmSearchOptions
 from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.stages.searches import swarm_search

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.candidate import Candidate
-from depthtrack.tracking.configuration import TrackingThresholds
 from depthtrack.tracking.frame import FrameContext, Toolkit
+from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.state import TrackState

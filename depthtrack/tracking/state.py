@@ -7,7 +7,7 @@ import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.recording.status import Status
-from depthtrack.tracking.configuration import TrackingThresholds
+from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 

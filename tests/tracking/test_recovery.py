@@ -19,13 +19,8 @@ from depthtrack.rendering.scorer import Scores
 from depthtrack.solver.options import SwarmOptions
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.candidate import evaluate
-from depthtrack.tracking.configuration import (
-    FingerOptions,
-    PsoConfig,
-    RecoveryOptions,
-    SwarmSearchOptions,
-    TrackingThresholds,
-)
+from depthtrack.tracking.configuration import PsoConfig
+from depthtrack.tracking.options import FingerOptions, RecoveryOptions, SwarmSearchOptions, TrackingThresholds
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
 from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
 from depthtrack.tracking.proposals.local import local_proposals

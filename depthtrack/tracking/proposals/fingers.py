@@ -11,7 +11,7 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.tracking.candidate import Candidate, evaluate, poses_of
-from depthtrack.tracking.configuration import FingerOptions
+from depthtrack.tracking.options import FingerOptions
 from depthtrack.types import Array
 
 _HOOKED = np.radians([[0, 20, 40, 60], *([0, 10, 95, 60] for _ in range(4))])

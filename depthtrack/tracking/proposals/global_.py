@@ -8,7 +8,7 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.synergies import Synergies
-from depthtrack.tracking.configuration import GlobalSearchOptions
+from depthtrack.tracking.options import GlobalSearchOptions
 from depthtrack.types import Array
 
 DEFAULTS = GlobalSearchOptions()

@@ -5,7 +5,7 @@ import numpy as np
 from depthtrack.geometry.rotations import quaternion_exp, quaternion_product
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
-from depthtrack.tracking.configuration import RecoveryOptions
+from depthtrack.tracking.options import RecoveryOptions
 from depthtrack.tracking.proposals.fingers import FINGER_POSTURES
 from depthtrack.types import Array
 

@@ -20,8 +20,8 @@ from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.candidate import Candidate, evaluate, poses_of
-from depthtrack.tracking.configuration import FitRound
 from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.options import FitRound
 from depthtrack.tracking.proposals.global_ import synergy_angles
 from depthtrack.tracking.random import frame_generator
 from depthtrack.types import Array

@@ -10,8 +10,8 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.tracking.candidate import Candidate
-from depthtrack.tracking.configuration import FingerOptions, GlobalSearchOptions, RecoveryOptions
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.options import FingerOptions, GlobalSearchOptions, RecoveryOptions
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.stages.searches import Search, search_globally

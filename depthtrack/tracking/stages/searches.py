@@ -10,8 +10,8 @@ from depthtrack.errors import InputError
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
-from depthtrack.tracking.configuration import FitSearchOptions, GlobalSearchOptions, SwarmSearchOptions
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.options import FitSearchOptions, GlobalSearchOptions, SwarmSearchOptions
 from depthtrack.tracking.proposals.global_ import distinct_orientations, mixed_angles, orientation_proposals
 from depthtrack.tracking.stages.coarse_to_fine import run_rounds
 from depthtrack.tracking.stages.swarm import swarm_around

@@ -8,8 +8,8 @@ from depthtrack.errors import InputError
 from depthtrack.solver.options import SurfaceFitOptions, SurfaceName
 from depthtrack.solver.subspace import FULL
 from depthtrack.tracking.candidate import Candidate
-from depthtrack.tracking.configuration import SurfaceChoiceOptions
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.options import SurfaceChoiceOptions
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 from depthtrack.hand.pose import retract
 from depthtrack.solver.swarm_space import TangentSpace
 from depthtrack.tracking.candidate import Candidate, by_energy
-from depthtrack.tracking.configuration import SwarmProposalOptions
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.options import SwarmProposalOptions
 from depthtrack.tracking.stages.surface_fit import SurfaceFit
 from depthtrack.tracking.stages.swarm import run_swarm
 

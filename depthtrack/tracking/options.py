@@ -1,0 +1,185 @@
+"""Options of the stages of a tracker; needs no numpy, so that `--help` stays fast.
+
+Energies are multiples of `Objective.clamp`, the energy of a pixel that disagrees completely.
+"""
+
+from dataclasses import dataclass
+
+from depthtrack.errors import InputError
+from depthtrack.options import option
+from depthtrack.solver.options import IcpOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
+
+Spread = tuple[float, float, float]
+"""Standard deviations of position, rotation and angles."""
+
+
+def damped_swarm(particles: int, generations: int) -> SwarmOptions:
+    """Return a swarm with more damping than Eq. (3) and half of the randomised angles near the best.
+
+    Both were measured to help.
+    """
+    return SwarmOptions(particles, generations, inertia=0.6, near_best=0.5)
+
+
+@dataclass(frozen=True)
+class TrackingThresholds:
+    """When a pose is trusted, and when it may guide the segmentation.
+
+    The median term adapts to hands whose shape differs from the model: their energy is high in every frame.
+    """
+
+    confidence: float = option(0.5, "A track with a lower confidence is lost")
+    energy: float = option(
+        0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
+    )
+    lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
+    guide_confidence: float = option(0.6, "Least confidence of a pose that guides the segmentation")
+    guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
+    median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
+    memory_frames: int = option(15, "Frames after a loss in which the hand is searched near its last pose")
+
+
+@dataclass(frozen=True)
+class SwarmRound:
+    """One round of a search by swarms: the best `starts` poses continue, each as a swarm."""
+
+    starts: int = option(48, "Poses that continue")
+    swarm: SwarmOptions = option(damped_swarm(32, 12), "Swarm around each pose")
+    spread: tuple[float, float, float] = option(
+        (0.015, 0.3, 0.3), "Standard deviation of the first generation: position, rotation, angles", unit="m, rad, rad"
+    )
+
+
+@dataclass(frozen=True)
+class SwarmSearchOptions:
+    """A search by ever fewer and finer swarms (Oikonomidis et al. 2011, Sec. 3)."""
+
+    rounds: tuple[SwarmRound, ...] = option(
+        (
+            SwarmRound(),
+            SwarmRound(6, damped_swarm(64, 20), (0.010, 0.15, 0.2)),
+            SwarmRound(1, damped_swarm(64, 40), (0.005, 0.08, 0.1)),
+        ),
+        "Rounds of the search",
+    )
+    refined: int = option(16, "Poses that the surface fit refines after each round")
+    refine: bool = option(True, "Fit surfaces between the rounds")
+    fit: SurfaceFitOptions = option(
+        SurfaceFitOptions(subsample=6, icp=IcpOptions(icp_iterations=8)), "Surface fit between the rounds"
+    )
+
+
+@dataclass(frozen=True)
+class FitRound:
+    """One round of a coarse-to-fine fit: the best `keep` poses are fitted in `synergies` dimensions."""
+
+    keep: int = option(48, "Poses that continue")
+    synergies: int | None = option(8, "Synergies that are solved for; all angles if absent")
+    icp_iterations: int = option(3, "Rounds of correspondences")
+    coarse: bool = option(False, "Use a quarter of the points")
+
+
+@dataclass(frozen=True)
+class FitSearchOptions:
+    """A search by surface fits of ever fewer poses (after Schroeder et al. 2014, Sec. V-B)."""
+
+    rounds: tuple[FitRound, ...] = option(
+        (FitRound(48, 8, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12)), "Rounds"
+    )
+
+
+@dataclass(frozen=True)
+class GlobalSearchOptions:
+    """Where a search starts if no pose is known: any orientation that the forearm allows."""
+
+    proposals: int = option(4000, "Poses scored first")
+    min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
+    synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies")
+    position_spread: Spread = option(
+        (0.025, 0.025, 0.012),
+        "Standard deviation of the palm about the observed centre, along the camera's axes",
+        unit="m",
+    )
+    angle_spread: float = option(0.15, "Standard deviation of the angles about typical postures", unit="rad")
+    follow_arm: bool = option(True, "Prefer orientations that the observed forearm allows")
+    least_along_arm: float = option(
+        0.17, "Cosine of the largest bend of a wrist, 80 degrees", source="Greene and Heckman 1994"
+    )
+    good_energy: float = option(0.2, "An energy that ends the search", unit="clamp")
+    attempts: int = option(3, "Repetitions, at most")
+    min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
+
+
+@dataclass(frozen=True)
+class RecoveryOptions:
+    """When other poses are tried for a frame that fits poorly, and which of them are accepted.
+
+    Ratios compare the energy of the new pose with that of the old one.
+    """
+
+    good_energy: float = option(0.2, "Frames with a lower energy are left alone", unit="clamp")
+    every: int = option(5, "Search locally in every n-th frame; 0 only in doubtful frames", unit="frames")
+    proposals: int = option(4000, "Poses near the last one that a local search scores")
+    position_spread: float = option(0.02, "Standard deviation of their position", unit="m")
+    rotation_spread: float = option(0.3, "Standard deviation of their rotation", unit="rad")
+    angle_spread: float = option(0.15, "Standard deviation of their angles about typical postures", unit="rad")
+    keep_angles_every: int = option(4, "Every n-th of them keeps the finger angles")
+    min_angle: float = option(0.1, "Least angle between the orientations that continue; 0 for any", unit="rad")
+    accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
+    accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
+    accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
+    doubt_confidence: float = option(0.6, "A lower confidence triggers a local search")
+    doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
+
+
+@dataclass(frozen=True)
+class FingerOptions:
+    """How the posture of a single finger is searched."""
+
+    proposals: int = option(96, "Postures of one finger that are scored together")
+    kept: int = option(8, "Postures that lead to the next ones")
+    spreads: tuple[float, ...] = option((0.2, 0.1), "Standard deviations of the following postures", unit="rad")
+    resolution: int | None = option(None, "Longest side at which they are rendered; that of the scorer if absent")
+    stop_early: bool = option(True, "Stop as soon as the energy is good")
+
+
+@dataclass(frozen=True)
+class SynergyOptions:
+    """Hand synergies that a fit uses (Schroeder et al. 2014, Sec. V)."""
+
+    synergies: str | None = option(None, "Set of synergies: leap, leap-grasps, or a file of `depthtrack synergies fit`")
+    components: int | None = option(None, "Use only the first n synergies")
+    synergy_prior: bool = option(False, "Solve for all angles with the synergies as a prior instead of a subspace")
+
+    def __post_init__(self) -> None:
+        for name in ("components", "synergy_prior"):
+            if getattr(self, name) and self.synergies is None:
+                raise InputError(f"{name} needs synergies: choose a set with --synergies")
+
+
+@dataclass(frozen=True)
+class SurfaceChoiceOptions:
+    """Which surface the fits of a frame use."""
+
+    surfaces: tuple[SurfaceName, ...] = option(
+        ("skin", "primitives"), "Surfaces to choose from, the preferred one first"
+    )
+    good_residual: float = option(0.02, "Residual below which no other surface is tried; robust cost, 0 to 1")
+    iterations: int = option(2, "Rounds of correspondences of each brief fit")
+    scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
+    accept: float = option(0.8, "Residual ratio below which another surface than the preferred one is used")
+
+
+@dataclass(frozen=True)
+class SwarmProposalOptions:
+    """A small swarm whose best particles are fitted to the surface."""
+
+    swarm: SwarmOptions = option(damped_swarm(32, 8), "Swarm of each frame")
+    spread: Spread = option(
+        (0.006, 0.06, 0.15),
+        "Standard deviation of the first generation: position, rotation, angles",
+        unit="m, rad, rad",
+    )
+    keep: int = option(2, "Particles that are fitted")
+    accept: float = option(0.97, "Energy ratio below which a fitted particle is accepted")
+    skip_ratio: float = option(1.1, "Skip the swarm in frames whose energy is lower than this multiple of the last one")
