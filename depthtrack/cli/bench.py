@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import DepthtrackError
 from depthtrack.files import write_atomic
 
@@ -52,7 +53,7 @@ class Score(_Benchmark):
     embree run on a mesh of the same hand.
     """
 
-    backends: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="NAME ...")] = None
+    backends: Annotated[tuple[str, ...] | None, stated_default(metavar="NAME ...")] = None
     """Backends to measure: raster, egl, osmesa, oracle, pyrender, open3d, embree (default: all but the oracle)."""
 
     def run(self) -> None:
@@ -81,7 +82,7 @@ class Segment(_Benchmark):
     The recordings are synthetic, one per camera, or your own. Each is measured with colour and with depth alone.
     """
 
-    recordings: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FOLDER ...")] = ()
+    recordings: Annotated[tuple[Path, ...], stated_default(metavar="FOLDER ...")] = ()
     """Recordings that show a hand in their first frames (default: synthetic ones)."""
 
     def run(self) -> None:

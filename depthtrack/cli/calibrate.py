@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.measuring import calibrate_rig_on_sequence, calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
 
@@ -37,13 +38,13 @@ class Command:
     """Side of the hand; `auto` tries both."""
     hand: Annotated[Path | None, tyro.conf.arg(metavar="RIG.glb")] = None
     """Rigged mesh (.glb, .gltf), or hand file that refers to one, to scale to the recording."""
-    picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    picture: Annotated[Path | None, stated_default(metavar="FILE.png")] = None
     """Picture of the hand before and after calibration to write (default: beside the hand file)."""
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     seed: int = 0
     """Seed of the random numbers. The same seed gives the same hand."""
-    threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    threads: Annotated[int | None, stated_default(metavar="N")] = None
     """Number of threads (default: one per core). The result does not depend on it."""
     json: bool = False
     """Print JSON instead of text."""

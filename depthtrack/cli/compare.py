@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from depthtrack.cli.source_options import SourceOptions
+from depthtrack.cli.stated_default import stated_default
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.comparison import Comparison
@@ -38,7 +39,7 @@ class Command:
 
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
 
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers track instead (extra: sweep). Each worker

@@ -9,6 +9,7 @@ import tyro
 from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.cli.progress import bar
 from depthtrack.cli.source_options import SourceOptions
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
 
@@ -33,7 +34,7 @@ class Command:
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
     """Folder to write to. The same folder continues an interrupted demo."""
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     calibrate: bool = True
     """Measure the hand of your recording first if --hand is absent. This takes one to two minutes on two cores."""

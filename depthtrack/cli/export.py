@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.export.registry import EXPORTERS, export_joints, suffixes
 
 
@@ -20,7 +21,7 @@ class Command:
     """Run folder from `depthtrack track`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
     """File to write: a table, numpy arrays, or a benchmark's text (u v d of each joint in pixels and millimetres)."""
-    format: Annotated[str | None, tyro.conf.arg(metavar="|".join(EXPORTERS))] = None
+    format: Annotated[str | None, stated_default(metavar="|".join(EXPORTERS))] = None
     """Format of the file (default: by its suffix). A .txt file needs the benchmark whose joints and camera it uses."""
 
     def run(self) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
+from depthtrack.cli.stated_default import stated_default
 
 if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 class HandOptions:
     """Sizes and surface of the tracker's hand."""
 
-    hand: Annotated[str | None, tyro.conf.arg(metavar="HAND.json|RIG.glb|truth")] = None
+    hand: Annotated[str | None, stated_default(metavar="HAND.json|RIG.glb|truth")] = None
     """A hand file, a rigged mesh, or the recording's own sizes (default: the average adult's hand)."""
-    side: Annotated[Literal["right", "left"] | None, tyro.conf.arg(metavar="{right,left}")] = None
+    side: Annotated[Literal["right", "left"] | None, stated_default(metavar="{right,left}")] = None
     """Side of the average hand (default: right), or of the hand to read from a rig with both."""
 
     def chosen(self, sequence: "Sequence") -> "HandShape":

@@ -7,6 +7,7 @@ import tyro
 
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ class Command:
     """Summarise a recording: frames, rate, camera, depth, ground truth, damage."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sample: Annotated[int | None, tyro.conf.arg(metavar="FRAMES")] = None
+    sample: Annotated[int | None, stated_default(metavar="FRAMES")] = None
     """Number of evenly spaced frames to read (default: all)."""
     json: bool = False
     """Print JSON, in SI units and radians, instead of text."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 # Written out, because reading them from depthtrack.geometry.camera would make `--help` wait for numpy.
 PresetName = Literal["kinect1", "kinect2", "realsense", "tum"]
-Pixels = Annotated[float | None, tyro.conf.arg(metavar="PIXELS")]
+Pixels = Annotated[float | None, stated_default(metavar="PIXELS")]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,16 +36,16 @@ class Command:
     """Trackers of this program, or those of the papers."""
     renderer: Literal["raster", "egl", "osmesa"] = "raster"
     """Renderer of the swarm's hypotheses."""
-    repetitions: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    repetitions: Annotated[int | None, stated_default(metavar="N")] = None
     """Measurements of the swarm per cell, each with another seed (default: as many as in the paper)."""
-    resolution: Annotated[int | None, tyro.conf.arg(metavar="PIXELS")] = None
+    resolution: Annotated[int | None, stated_default(metavar="PIXELS")] = None
     """Longest side of the rendered hypotheses of the swarm (default: the resolution of the sensor)."""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Use only the first N frames of the motion."""
     synergies: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH")] = None
     """Synergies in place of those of each figure: the name of a set, as leap, or of a motion, as signs; a .json from
     `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""

@@ -12,6 +12,7 @@ from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
 from depthtrack.segmentation.options import SegmentationOptions
@@ -35,7 +36,7 @@ class SegmentCommand:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="FOLDER")] = None
+    out: Annotated[Path | None, stated_default(aliases=("-o",), metavar="FOLDER")] = None
     """Folder to write to (default: NAME-segmented in the current folder)."""
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.segmentation.options import SegmentationOptions
 
@@ -19,11 +20,11 @@ PREFIX = "segmentation."
 class SegmentationShortcuts:
     """Short forms of frequent options of the segmentation."""
 
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     depth_only: bool = False
     """Ignore colour."""
-    wrist_margin: Annotated[float | None, tyro.conf.arg(metavar="MM")] = None
+    wrist_margin: Annotated[float | None, stated_default(metavar="MM")] = None
     """Length of the forearm to keep beyond the wrist (default: 0), for comparison with silhouettes that include it."""
 
     def applied(self, options: SegmentationOptions) -> SegmentationOptions:

@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.recording_options import PresetName
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ class SourceOptions:
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Track only the first N frames of each recording."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
-    skin_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Camera of recordings without one."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,13 +27,13 @@ class Fit:
     """Files or folders of postures."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE.json")]
     """File to write."""
-    tracks: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ()
+    tracks: Annotated[tuple[str, ...], stated_default(metavar="NAME ...")] = ()
     """Names of the tracks to use, for files with named tracks (default: all)."""
-    components: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
+    components: Annotated[int | None, stated_default(metavar="COUNT")] = None
     """Number of first components to keep (default: all 20)."""
     within_limits: bool = False
     """Clip angles to the joint limits before the fit."""
-    source: str = ""
+    source: Annotated[str, stated_default()] = ""
     """Origin and licence of the postures (default: the names of the files)."""
 
     def run(self) -> None:
@@ -79,7 +80,7 @@ class Info:
     """Picture to write: the hand from -2 to +2 standard deviations along each of the first components."""
     components: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 4
     """Number of components in the picture."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
+    hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Hand of the picture (default: the average adult's)."""
     json: bool = False
     """Print JSON, in radians, instead of a table."""

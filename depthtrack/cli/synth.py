@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,21 +36,21 @@ class Command:
     forearm: Literal["auto", "on", "off"] = "auto"
     """Draw the bare forearm, which a tracker must cut off. With auto it is drawn before a wall and in a room."""
 
-    distance: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
+    distance: Annotated[float | None, stated_default(metavar="METRES")] = None
     """Camera-to-hand distance (default: 0.5, or 0.65 for kinect2, whose minimum range is 0.5)."""
     viewpoint: Annotated[int, tyro.conf.arg(metavar="0..7")] = 0
     """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
     to 7 are 75 degrees to the right, above, left."""
-    frames: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
+    frames: Annotated[int | None, stated_default(metavar="COUNT")] = None
     """Number of frames (default: the whole motion, or 360 of the random motion)."""
     fps: Annotated[float, tyro.conf.arg(metavar="HZ")] = 30.0
     """Frames per second."""
 
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="HAND.json")] = None
+    hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of the hand (default: the average adult's)."""
     scale: float = 1.0
     """Factor on all sizes of the hand."""
-    side: Annotated[Literal["right", "left"] | None, tyro.conf.arg(metavar="{right,left}")] = None
+    side: Annotated[Literal["right", "left"] | None, stated_default(metavar="{right,left}")] = None
     """Side of the hand (default: that of --hand or --model, or right), or of the hand to read from a rigged mesh."""
 
     depth_noise: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0

@@ -12,6 +12,7 @@ from depthtrack.cli.config_options import chosen_config, options_type
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.cli.tracker_options import requested_run, requested_tracker
 from depthtrack.errors import InputError
 from depthtrack.segmentation.options import SegmentationOptions
@@ -46,7 +47,7 @@ class TrackCommand:
     """Track only the first N frames."""
     resume: bool = False
     """Continue the run that the folder holds."""
-    threads: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    threads: Annotated[int | None, stated_default(metavar="N")] = None
     """Threads of the renderer (default: one per core). Poses do not depend on it."""
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts

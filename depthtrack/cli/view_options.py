@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from depthtrack.cli.recording_options import RecordingOptions
+from depthtrack.cli.stated_default import stated_default
 
 
 @dataclass(frozen=True)
@@ -24,11 +25,11 @@ class ViewOptions:
     """File of the interactive viewer to write (rerun FILE.rrd opens it)."""
     web: bool = False
     """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
-    frames: Annotated[tuple[int, ...], tyro.conf.arg(metavar="INDEX...")] = ()
+    frames: Annotated[tuple[int, ...], stated_default(metavar="INDEX...")] = ()
     """Indices of the frames on sheet and strip (default: evenly spaced frames)."""
-    count: Annotated[int | None, tyro.conf.arg(metavar="COUNT")] = None
+    count: Annotated[int | None, stated_default(metavar="COUNT")] = None
     """Number of evenly spaced frames (default: 12 on a sheet, 7 on a strip)."""
-    depth_range: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="NEAR FAR")] = None
+    depth_range: Annotated[tuple[float, float] | None, stated_default(metavar="NEAR FAR")] = None
     """Metres at the ends of the depth colours (default: the range of the recording)."""
     estimate: bool = True
     """Show the segmented hand in another colour if the recording has no true masks."""
