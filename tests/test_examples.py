@@ -1,4 +1,4 @@
-"""The examples run, and their results are as stated."""
+"""The examples run and give the stated results."""
 
 import re
 from importlib.util import module_from_spec, spec_from_file_location
@@ -66,7 +66,7 @@ def test_02_pushed_frames_are_tracked(recording: str) -> None:
 def test_03_a_measured_hand_is_tracked(
     recording: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The measurement itself takes a minute, and is tested in tests/calibration."""
+    """The measurement takes a minute. Its tests are in tests/calibration."""
     hand, nothing = dt.HandShape(scale=1.05), np.zeros((0, 27))
     calibration = dt.Calibration(hand, {"palm width": Measured(82.0, 1.5, 0.9)}, None, 3.0, 2.0, (), nothing, nothing)
     monkeypatch.setattr("depthtrack.api.measuring.calibrate_views", lambda *_: calibration)

@@ -1,4 +1,4 @@
-"""Calibration of a hand from a recording: side and scale first, then the size of each finger and of the palm.
+"""Calibration of a hand from a recording: side, scale, and sizes of fingers and palm.
 
 Poses are searched in a few views with hands of several scales, and the best scale is kept. From there poses and all
 sizes are optimised jointly. The poses are then searched again with the hand that was found, since some of the first
@@ -59,7 +59,7 @@ class Calibration:
         return self.side_margin is None or self.side_margin >= self.sure_margin
 
     def to_json(self) -> str:
-        """Return the text of `hand.json` with size, standard deviation and confidence of each parameter added."""
+        """Return the text of `hand.json`, with the measured sizes and their uncertainty."""
         measured = {
             name: {"mm": round(m.mm, 2), "sigma_mm": round(m.sigma_mm, 2), "confidence": round(m.confidence, 2)}
             for name, m in self.measured.items()
@@ -76,11 +76,14 @@ def calibrate(
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
 ) -> Calibration:
-    """Return the calibration of the hand in `observations`, of which the first show it most open.
+    """Return the calibration of the hand in observations.
 
-    observations: see `views.choose_views`; scorer: makes the scorer of a hand; side: both are tried by default;
-    progress: called with a description of the current stage, and the share of the whole that is done. Equal
-    observations, seed and energies give an equal hand.
+    observations: most open hands first, see `views.choose_views`.
+    scorer: makes the scorer of a hand.
+    side: both are tried by default.
+    progress: called with a description of the current stage, and the completed share.
+
+    Equal observations, seed and energies give an equal hand.
 
     Raises:
         InputError: if the observations do not resemble a hand.
@@ -162,7 +165,10 @@ def _refined(searcher: PoseSearcher, poses: Array, values: Array, side: Side) ->
 
 
 def with_usual_proportions(values: Array) -> Array:
-    """Return the sizes (35,) of the same hand with the median factor of fingers and palm moved into its scale."""
+    """Return sizes (35,) of the same hand with usual proportions.
+
+    The median factor of fingers and palm moves into the scale.
+    """
     parts = np.append(values[LENGTHS].reshape(5, 3).mean(axis=1), values[PALM][:2])
     common = float(np.median(parts))
     out = values.copy()

@@ -1,9 +1,9 @@
-"""Joint optimisation of sizes and poses: Gauss-Newton on several views of one hand, which share its sizes.
+"""Joint optimisation of sizes and poses: Gauss-Newton on several views of one hand.
 
 Every pose concerns one view only. The poses are eliminated first (Schur complement); what remains is the information
 of all views about the sizes. Shared sizes over several views follow Taylor et al., "User-specific hand modeling from
-monocular depth sequences", CVPR 2014. Sizes that one view does not determine are held by the other views and by the
-prior, as in Tan et al., "Fits like a glove", CVPR 2016.
+monocular depth sequences", CVPR 2014. The other views and the prior determine sizes that one view leaves open, as in
+Tan et al., "Fits like a glove", CVPR 2016.
 """
 
 from collections.abc import Sequence
@@ -73,7 +73,10 @@ def fit_jointly(
 
 
 def _eliminate(view: CalibrationView, evidence: Evidence, pose: Array, options: JointFitOptions) -> EliminatedPose:
-    """Return the normal equations of the sizes for one view, scaled to its independent measurements."""
+    """Return the normal equations of the sizes for one view.
+
+    They are scaled to its number of independent measurements.
+    """
     noise = max(options.noise, options.misfit * evidence.distance) ** 2
     scale = min(view.patches / max(evidence.count, 1), 1.0) / noise
     damping = 1 / np.repeat(options.step_spread, [3, 3, 20]) ** 2

@@ -53,10 +53,12 @@ def shape_from_keypoints(keypoints: ArrayLike, side: Side, source: str = "measur
 
 
 def side_of(keypoints: ArrayLike) -> Side:
-    """Return the side of the hands (N, 21, 3), metres: the one with the smaller residual of a pose fit.
+    """Return the side of hands with the smaller residual of a pose fit.
+
+    keypoints: (N, 21, 3) metres.
 
     Raises:
-        InputError: see `shape_from_keypoints`.
+        InputError: if `shape_from_keypoints` rejects the keypoints.
     """
     points = _checked(keypoints)
     sample = points[:: -(-len(points) // _SAMPLE)]
@@ -68,7 +70,7 @@ def side_of(keypoints: ArrayLike) -> Side:
 
 
 def _checked(keypoints: ArrayLike) -> Array:
-    """Return the hands with at least three points of the palm; missing points are NaN in all coordinates."""
+    """Return the hands with at least three palm points; missing points are NaN."""
     points = np.array(keypoints, dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES), 3)
     known = is_known(points)
     points[~known] = np.nan
@@ -79,7 +81,10 @@ def _checked(keypoints: ArrayLike) -> Array:
 
 
 def _palm(points: Array, default: HandModel, ratio: float) -> tuple[Array, bool]:
-    """Return wrist and base joints (6, 3), palm frame, from points (N, 6, 3), and whether the wrist is known."""
+    """Return wrist and base joints (6, 3), palm frame, and whether the wrist is known.
+
+    points: (N, 6, 3) metres.
+    """
     known = is_known(points)
     filled = np.where(known[..., None], points, 0)
     palm = reference = np.concatenate([default.shape.wrist[None], default.base_transforms[:, :3, 3]]) * ratio
@@ -94,8 +99,10 @@ def _palm(points: Array, default: HandModel, ratio: float) -> tuple[Array, bool]
 
 
 def _turn(points: Array, palm: Array, side: Side) -> Array:
-    """Return the rotation (3, 3) about the normal of the palm, to apply from the right, that points the middle finger
-    forward."""
+    """Return the rotation (3, 3) about the palm normal that points the middle finger forward.
+
+    It is applied from the right.
+    """
     known = is_known(points[:, IN_PALM])
     R, _ = rigid_alignment(palm, np.where(known[..., None], points[:, IN_PALM], 0), known)
     middle = KEYPOINT_NAMES.index("middle_mcp")

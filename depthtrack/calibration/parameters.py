@@ -75,9 +75,12 @@ def prior_covariance() -> Array:
 
 
 def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Array:
-    """Return the derivative (N, 3, 35) by the sizes of `model` of points (N, 3) on the skin, metres, camera frame.
+    """Return the derivative (N, 3, 35) of points on the skin by the sizes of `model`.
 
-    bodies: (N,) body of each point. The skin stretches along its bone with the length, across it with the width, and
+    bodies: (N,) body of each point.
+    points: (N, 3) metres, camera frame.
+
+    The skin stretches along its bone with the length, across it with the width, and
     moves with the bones before it. That is exact for bones and scale, and an approximation for flesh.
     """
     T, shape = model.transforms(pose), model.shape
@@ -112,7 +115,7 @@ def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Ar
 
 
 def measures(values: Array) -> dict[str, tuple[float, Array]]:
-    """Return each length and width (m) by name, and the gradient (35,) of its logarithm by the sizes.
+    """Return each length and width (m), and the gradient (35,) of its logarithm, by name.
 
     The hand length is from the wrist to the tip of the middle finger, a finger length from base joint to tip. A width
     is the diameter of the middle joint, or of the last joint of the thumb.

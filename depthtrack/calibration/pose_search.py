@@ -42,16 +42,20 @@ class Found:
         return np.argsort(self.energies, kind="stable")[: max(2, round(share * len(self.energies)))]
 
     def check_hand(self, least: float) -> None:
-        """Raise InputError if the median agreement of the silhouettes is below `least`."""
+        """Check that the median agreement of the silhouettes is at least `least`.
+
+        Raises:
+            InputError: if it is lower.
+        """
         if np.median(self.agreements) < least:
             raise InputError(
-                f"what was found in {len(self.poses)} frames does not look like a hand (silhouettes agree to "
+                f"the object found in {len(self.poses)} frames does not resemble a hand (silhouettes agree to "
                 f"{np.median(self.agreements):.0%}): calibrate on a recording of one bare hand, best with open fingers"
             )
 
 
 class PoseSearcher:
-    """Searches the pose of a hand in each view, without a start."""
+    """Search for the pose of a hand in each view, without an initial pose."""
 
     def __init__(
         self, observations: list[Observation], scorer: ScorerFactory, seed: int, options: CalibrationOptions

@@ -75,17 +75,22 @@ class PosedSkin:
         return rasterise(view.observation.camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
 
     def is_hand(self, pose: Array, points: Array) -> Mask:
-        """Return whether points (N, 3), metres, camera frame, lie on the side of the wrist with the fingers."""
+        """Return whether points lie on the finger side of the wrist.
+
+        points: (N, 3) metres, camera frame.
+        """
         T = self.model.transforms(pose)[0]
         return np.asarray((points - T[:3, 3]) @ T[:3, 1] > self.wrist)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Normal equations of a view, from residuals e (m) with gradients a by pose and sizes (26 + 35).
+    """Normal equations of a view, for pose and sizes (26 + 35).
 
-    H: (61, 61) weighted sum of a a^T; g: (61,) of a e; count: number of residuals; distance: m, median of the observed
-    points to the skin, infinite if there are none.
+    H: (61, 61) weighted sum of a a^T, with gradients a (61,).
+    g: (61,) weighted sum of a e, with residuals e (m).
+    count: number of residuals.
+    distance: median distance of the observed points to the skin, m, infinite if there are none.
     """
 
     H: Array
@@ -137,7 +142,7 @@ def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale:
 
 
 def _stretches(shape: HandShape, average: HandShape) -> Array:
-    """Return the stretches (16, 4, 4), body frames, from the flesh of the average hand to these sizes."""
+    """Return the stretches (16, 4, 4), body frames, from the average hand to these sizes."""
     S = np.tile(np.eye(4), (BODY_COUNT, 1, 1))
     sizes = ("palm_breadth", "palm_length", "palm_thickness")
     S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(average, size) for size in sizes]
@@ -153,7 +158,7 @@ def _stretches(shape: HandShape, average: HandShape) -> Array:
 def _surface_residuals(
     view: CalibrationView, skin: PosedSkin, pose: Array, bodies: Index, x: Array, normals: Array
 ) -> _Residuals:
-    """Return the residuals from the nearest visible skin to each point, along the mean of both normals."""
+    """Return the symmetric residuals of points and the nearest visible skin."""
     distance, nearest = map(np.asarray, cKDTree(x).query(view.points, distance_upper_bound=_REACH))
     found = np.flatnonzero(np.isfinite(distance))
     found = found[skin.is_hand(pose, view.points[found])]

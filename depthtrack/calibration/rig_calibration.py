@@ -29,9 +29,9 @@ _REACH = 0.15
 _TOLERANCE = 0.002
 """Tolerance of the logarithm of the scale."""
 _SUBSAMPLE = 3
-"""Every n-th point is fitted."""
+"""Step between the fitted points."""
 _CLIPPED = 0.04
-"""Depth difference, metres, from which on a pixel counts in full: d_M of Oikonomidis et al. 2011, Eq. 2."""
+"""Depth difference, metres, at which the cost of a pixel is clipped: d_M of Oikonomidis et al. 2011, Eq. 2."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def calibrate_rig(
     """
     if rig.rig is None:
         raise InputError("the hand to scale must be a rigged mesh (.glb, .gltf) or a hand file of one")
-    show = progress or (lambda what, share: None)
+    show = progress or (lambda stage, share: None)
     options = options or CalibrationOptions()
     searcher = PoseSearcher(list(observations), scorer, seed, options)
     energies = {}
@@ -144,7 +144,7 @@ class _ScaleFit:
 
 
 def depth_disagreement(surface: HandSurface, observation: Observation, pose: Array) -> float:
-    """Return the mean disagreement, 0 to 1, over the pixels that the hand covers in the view or in the rendering.
+    """Return the mean disagreement, 0 to 1, over the pixels of the hand in view or rendering.
 
     A pixel of only one of them counts 1. One of both counts the depth difference, clipped at 40 mm and relative to it,
     and nothing without a reading. Pixels below the wrist do not count: a rig and a segmentation end at different

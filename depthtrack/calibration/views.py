@@ -1,4 +1,4 @@
-"""Choice of the views for calibration: frames that show open fingers, and some of every other posture."""
+"""Choice of the views for calibration: frames with open fingers, and frames over time."""
 
 from collections.abc import Callable
 
@@ -20,7 +20,9 @@ def choose_views(
     options: ViewChoiceOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Observation]:
-    """Return the observations to calibrate on, the most open hands first: half for their fingers, half over time.
+    """Return the observations to calibrate on, the most open hands first.
+
+    One half shows the most open fingers. The other is evenly spaced in time.
 
     progress: called with the number of inspected frames, and of all frames to inspect.
 
@@ -56,7 +58,7 @@ def choose_views(
 
 
 def finger_area(observation: Observation, half_breadth: float = ViewChoiceOptions.finger_half_breadth) -> float:
-    """Return the area, m^2, of the parts of the silhouette that are narrower than two `half_breadth` (m): fingers."""
+    """Return the area of fingers, m^2: silhouette parts narrower than two `half_breadth` (m)."""
     pixel = float(observation.centre[2]) / observation.camera.fx
     silhouette = observation.silhouette.astype(np.uint8)
     palm = cv2.morphologyEx(silhouette, cv2.MORPH_OPEN, disc(max(1, round(half_breadth / pixel))))

@@ -1,1 +1,1 @@
-"""Optimisation of a posed hand: residual blocks, priors, subspaces, one Gauss-Newton, and particle swarms."""
+"""Optimisation of a posed hand: residuals, priors, subspaces, Gauss-Newton and swarms."""

@@ -1,4 +1,4 @@
-"""Search for the visible vertex closest to each observed point, sixteen vertices at a time."""
+"""Search for the visible point closest to each observed point, sixteen at a time."""
 
 import math
 
@@ -10,7 +10,7 @@ from depthtrack.types import Array32
 
 LANES = F32X16.lanes
 FAR = np.float32(1e6)
-"""Metres: coordinate of padding, beyond any vertex."""
+"""Metres: coordinate of padding, beyond any point."""
 _LANE: Array32 = np.arange(LANES, dtype=np.float32)
 
 _load = loader(F32X16)
@@ -18,21 +18,26 @@ _fill = filler(F32X16)
 
 
 @kernel_part
-def closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, closest):
-    """Write the index among `seen` of the vertex closest to each point of the cloud (N) to `closest` (N,), -1 for none.
+def closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, closest):
+    """Write the row of the visible point closest to each observed point to `closest`.
 
-    max_distance: m, largest distance; min_normal_cosine: smallest cosine between the normals. Cells are searched in
-    growing squares around the cell of the point, until no vertex beyond can be closer. Neighbouring cells of a row are
-    contiguous in memory; a load of sixteen vertices may reach into further cells, which does no harm.
+    cloud: N observed points and normals, camera frame.
+    visible: visible points sorted by cell, see `surfaces.points.Visible`.
+    max_distance: largest distance, m.
+    min_normal_cosine: smallest cosine between the normals.
+    closest: (N,) rows of `visible`, -1 for none.
+
+    Cells are searched in growing squares around the cell of the point, until no point beyond can be closer. The cells
+    of a row are contiguous in memory. A load of sixteen points may include further cells, whose points are valid too.
     """
-    points, normals, origin, first = cloud.points, cloud.normals, seen.origin, seen.first
+    points, normals, origin, first = cloud.points, cloud.normals, visible.origin, visible.first
     sx, sy, sz, nx, ny, nz = (
-        seen.table[0],
-        seen.table[1],
-        seen.table[2],
-        seen.table[3],
-        seen.table[4],
-        seen.table[5],
+        visible.table[0],
+        visible.table[1],
+        visible.table[2],
+        visible.table[3],
+        visible.table[4],
+        visible.table[5],
     )
     # Rays through image points that are d apart pass a point at depth z no closer than d z / |(u, v, 1)|.
     u = max(abs(cells.u), abs(cells.u + cells.columns * cells.size))
@@ -57,7 +62,7 @@ def closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, closes
             for r in range(max(row - ring, 0), min(row + ring, cells.rows - 1) + 1):
                 base = r * cells.columns
                 whole = ring == 1 or r == row - ring or r == row + ring
-                # Of a square's middle rows, only both ends are new.
+                # Only both ends of the middle rows of a square are new.
                 for end in range(1 if whole else 2):
                     low = left if whole or end == 0 else right
                     high = right if whole or end == 1 else left

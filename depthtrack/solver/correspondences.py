@@ -1,4 +1,4 @@
-"""Correspondences: the closest visible point of the surface of the hand for each observed point."""
+"""Correspondences: the closest visible point of the hand for each observed point."""
 
 from typing import NamedTuple, Protocol
 
@@ -20,7 +20,10 @@ class PointCloud(NamedTuple):
 
     @staticmethod
     def of(observation: Observation, every: int) -> "PointCloud":
-        """Return every n-th point of an observation: uniform subsampling (Schroeder et al. 2014, Sec. VI-B)."""
+        """Return the points of an observation after uniform subsampling.
+
+        every: step between the kept points (Schroeder et al. 2014, Sec. VI-B).
+        """
         pick = slice(every // 2, None, every)
         return PointCloud(
             np.ascontiguousarray(observation.points[pick]), np.ascontiguousarray(observation.normals[pick])
@@ -48,7 +51,10 @@ class Surface(Protocol):
     """A surface of the hand that correspondences are searched on."""
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        """Prepare searches for points of this cloud; correspondences are at most `max_distance` (m) long."""
+        """Prepare searches for the points of a cloud.
+
+        max_distance: largest distance of a correspondence, m.
+        """
         ...
 
     def match(

@@ -1,4 +1,4 @@
-"""Residual block of known correspondences: points fixed to bodies of the hand, each with a target and a weight.
+"""Residual block of known correspondences: points fixed to bodies, with targets and weights.
 
 Keypoints and optical markers are such points. Their residuals are exact in any pose; those of found correspondences
 are carried along to first order (see `normal_equations`).
@@ -15,7 +15,7 @@ from depthtrack.types import Array, Index
 
 
 class FixedPoints(NamedTuple):
-    """Points fixed to bodies, and what is measured of them.
+    """Points fixed to bodies, with their measured positions.
 
     body: (N,) body that moves the point; local: (N, 3) metres, frame of that body; target: (N, 3) metres, camera frame;
     direction: (N, 3) unit, camera frame: the residual counts along it, or in all three coordinates if it is zero;

@@ -1,4 +1,4 @@
-"""One projected, damped Gauss-Newton with step halving for every `Problem` of a posed hand, compiled.
+"""Compiled Gauss-Newton for problems of a posed hand: projected, damped, with step halving.
 
 The step is that of Schroeder et al. 2014, Eq. (4). A parameter at a limit takes no part in a step that would push it
 beyond (Bertsekas, "Projected Newton methods", SIAM J. Control and Optimization 20(2), 1982). A step is halved until it
@@ -26,7 +26,7 @@ from depthtrack.types import Array
 
 
 def minimise(problem: Problem, options: SolverOptions, start: Array) -> Solution:
-    """Return the solution reached from the pose `start` (27,); correspondences of the problem stay as they are."""
+    """Return the solution reached from the pose `start` (27,), with fixed correspondences."""
     state, trace = SolverState.at(start, problem.space), np.empty(options.iterations + 1)
     outcome = solve(problem, options, BodyPoses.empty(), state, trace)
     return Solution.of(state.pose, outcome, trace)
@@ -34,9 +34,10 @@ def minimise(problem: Problem, options: SolverOptions, start: Array) -> Solution
 
 @numba.njit(cache=True, nogil=True)
 def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: SolverState, trace: Array) -> Outcome:
-    """Move `state` to a minimum of the energy; write the energies to `trace` (at least iterations + 1,).
+    """Move `state` to a minimum of the energy.
 
-    `bodies` are left where the final pose places them.
+    bodies: receive the transforms of the final pose.
+    trace: at least (iterations + 1,), receives the energies, m^2.
     """
     chain, space, prior = problem.chain, problem.space, problem.prior
     pose, coordinates, slope = state.pose, state.coordinates, state.slope
@@ -105,7 +106,7 @@ def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: So
 def solve_each(
     problem: Problem, options: SolverOptions, targets: Array, weights: Array, poses: Array, energies: Array
 ) -> None:
-    """Fit the points of the problem to each row of targets, from each pose; poses change in place.
+    """Fit the points of the problem to each row of targets; `poses` change in place.
 
     targets: (B, N, 3) metres, camera frame; weights: (B, N); poses: (B, 27) within the limits; energies: (B,) m^2, out.
     """
@@ -128,7 +129,7 @@ def solve_each(
 
 @numba.njit(cache=True, nogil=True)
 def _damp(A: Array, coordinates: Array, slope: Array, space: PostureSubspace, options: SolverOptions) -> None:
-    """Add the damping to the diagonal of A, and keep the slope of the joint limit function for the next step."""
+    """Add the damping to the diagonal of A, and store the slopes of the joint limit function."""
     for i in range(3):
         A[i, i] += options.pose_damping
         A[3 + i, 3 + i] += options.pose_damping * 1e-2

@@ -1,4 +1,7 @@
-"""ICP fit of the hand to an observation: correspondences and Gauss-Newton by turns (Schroeder et al. 2014, IV-C)."""
+"""ICP fit of the hand to an observation (Schroeder et al. 2014, Sec. IV-C).
+
+It alternates the search for correspondences and Gauss-Newton.
+"""
 
 import numpy as np
 
@@ -45,29 +48,32 @@ class IcpFitter:
     def fit(
         self,
         pose: Array,
-        space: PostureSubspace = FULL,
+        subspace: PostureSubspace = FULL,
         iterations: int | None = None,
         prior: Prior | None = None,
         coarse: bool = False,
         align: bool = True,
     ) -> Array:
-        """Return the pose (27,) that fits the observation, reached from `pose` (27,) by the parameters of `space`.
+        """Return the pose (27,) that fits the observation best.
 
-        iterations: instead of `IcpOptions.icp_iterations`; coarse: use the subset of the points that the rigid motion
-        uses; align: move the whole hand first.
+        pose: (27,) to start from.
+        subspace: the parameters that change.
+        iterations: replaces `IcpOptions.icp_iterations`.
+        coarse: use only the points of the rigid alignment.
+        align: align the whole hand first.
         """
         options = self.options
         cloud, correspondences = (self._coarse, self._coarse_matches) if coarse else (self._cloud, self._matches)
         share = len(cloud.points) / options.reference_count
         pull = (prior or Prior.none()).scaled(share)
         pose = pose.copy()
-        coordinates = space.project(pose[ANGLES])
-        pose[ANGLES] = space.angles(coordinates)
+        coordinates = subspace.project(pose[ANGLES])
+        pose[ANGLES] = subspace.angles(coordinates)
         for _ in range(options.rigid_iterations if align else 0):
             self._align(pose)
-        slope = np.array([limit_gradient(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
+        slope = np.array([limit_gradient(*c) for c in zip(coordinates, subspace.lower, subspace.upper, strict=True)])
         state = SolverState(pose, coordinates, slope)
-        problem = Problem(self._chain, self._equations, self._points, pull, space)
+        problem = Problem(self._chain, self._equations, self._points, pull, subspace)
         solver = SolverOptions(
             options.gn_iterations, options.damping * share, options.pose_damping, options.avoid_limits
         )
@@ -82,9 +88,11 @@ class IcpFitter:
         return pose
 
     def residual(self, pose: Array, scale: float) -> float:
-        """Return the mean robust cost of a pose (27,), 0 to 1: Geman-McClure of the distances, with scale (m).
+        """Return the mean Geman-McClure cost of a pose (27,), 0 to 1.
 
-        Every n-th point counts, as in the rigid motion; a point without a correspondence costs 1.
+        scale: of the kernel, m.
+
+        The points are those of the rigid alignment. A point without a correspondence costs 1.
         """
         self._match(pose, self._coarse, self._coarse_matches, 1.0)
         found = self._coarse_matches.body >= 0

@@ -1,4 +1,6 @@
-"""Fit of the hand to 21 keypoints: inverse kinematics with known correspondences (Schroeder et al. 2014, Sec. IV-A).
+"""Fit of the hand to 21 keypoints: inverse kinematics with known correspondences.
+
+Source: Schroeder et al. 2014, Sec. IV-A.
 
 Keypoints are those of `kinematics.KEYPOINT_NAMES`, the wrist first; a missing one is NaN.
 """
@@ -47,7 +49,9 @@ class FittedPoses:
 
 
 def fit_poses(model: HandModel, keypoints: ArrayLike, options: KeypointFitOptions | None = None) -> FittedPoses:
-    """Return the poses whose keypoints are closest to `keypoints` (N, 21, 3), metres, camera frame.
+    """Return the poses with keypoints closest to the given ones.
+
+    keypoints: (N, 21, 3) metres, camera frame.
 
     Each fit starts at a relaxed hand, aligned rigidly. Hands with missing finger joints are fitted from a fist too,
     and the better pose is kept.
@@ -78,7 +82,7 @@ def fit_poses(model: HandModel, keypoints: ArrayLike, options: KeypointFitOption
 
 
 def local_keypoints(model: HandModel) -> Array:
-    """Return the 21 keypoints (21, 3), metres, each in the frame of its body of `KEYPOINT_BODIES`."""
+    """Return the keypoints (21, 3), metres, in the frames of the bodies of `KEYPOINT_BODIES`."""
     pose = make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20))
     T = model.transforms(pose)[KEYPOINT_BODIES]
     return np.asarray(np.einsum("nji,nj->ni", T[:, :3, :3], model.keypoints(pose) - T[:, :3, 3]))

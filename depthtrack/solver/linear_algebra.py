@@ -8,9 +8,12 @@ from depthtrack.types import Array
 
 @numba.njit(cache=True, nogil=True)
 def hold_parameter(A: Array, b: Array, i: int) -> None:
-    """Take parameter i out of the system A x = b in place: its step becomes zero, and the others ignore it.
+    """Remove parameter i from the system A x = b in place.
 
-    A: (n, n); b: (n,).
+    Its step becomes zero, and the steps of the others do not depend on it.
+
+    A: (n, n).
+    b: (n,).
     """
     for j in range(b.shape[0]):
         A[i, j] = A[j, i] = 0.0

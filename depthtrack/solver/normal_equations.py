@@ -22,10 +22,14 @@ ROW = 8
 
 
 class NormalEquations(NamedTuple):
-    """Sums over the residuals e of found correspondences, with gradients a (6,) by the twist of their body.
+    """Sums over the residuals e of found correspondences.
 
-    sums: (16, 6, ROW): in each row of a body, six elements of a a^T and one of a e; e: (16,) sums of e^2, m^2;
-    T: (16, 3, 4) T_camera_body when the correspondences were found; centre: (3,) m, the point that twists refer to.
+    The gradient a (6,) of a residual is by the twist of its body.
+
+    sums: (16, 6, ROW) in each row of a body, six elements of a a^T and one of a e.
+    e: (16,) sums of e^2, m^2.
+    T: (16, 3, 4) T_camera_body at the search for correspondences.
+    centre: (3,) reference point of twists, metres, camera frame.
     """
 
     sums: Array
@@ -50,7 +54,10 @@ def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> None:
-    """Write the twist (6,) of body b since the residuals were added to `out`, to first order in its turn."""
+    """Write the twist of body b since the residuals were added to `out` (6,).
+
+    It is exact to first order in the rotation.
+    """
     now, was, c = bodies.T[b], equations.T[b], equations.centre
     R = np.empty((3, 3))
     for i in range(3):
@@ -66,7 +73,7 @@ def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> 
 
 @numba.njit(cache=True, nogil=True)
 def energy(equations: NormalEquations, points: FixedPoints, bodies: BodyPoses) -> float:
-    """Return half the weighted sum of squared residuals, m^2, with the bodies where they are now."""
+    """Return half the weighted sum of squared residuals, m^2, for the current bodies."""
     total, s = 0.0, np.empty(6)
     for b in range(equations.e.shape[0]):
         twist(equations, bodies, b, s)
@@ -82,10 +89,13 @@ def energy(equations: NormalEquations, points: FixedPoints, bodies: BodyPoses) -
 def normal_equations(
     equations: NormalEquations, points: FixedPoints, bodies: BodyPoses, H: Array, gradient: Array
 ) -> float:
-    """Write J^T J to `H` (26, 26) and J^T e to `gradient` (26,) for the current bodies; returns `energy`.
+    """Write the normal equations for the current bodies; return the energy, m^2.
 
-    A joint moves all bodies beyond it alike, so the sums of bodies are added up from the fingertips inward. Each joint
-    uses them once: Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
+    H: (26, 26) receives J^T J.
+    gradient: (26,) receives J^T e.
+
+    A joint moves all bodies beyond it by the same twist, so sums are accumulated from the fingertips to the palm. Each
+    joint uses them once: Featherstone's composite-rigid-body algorithm ("Rigid Body Dynamics Algorithms", 2008).
     """
     total = 0.0
     n = equations.e.shape[0]
@@ -147,7 +157,10 @@ def normal_equations(
 
 @numba.njit(cache=True, nogil=True)
 def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
-    """Refer the sums of a body to the centre, from the point (dx, dy, dz) away from it: v there is v + w x d."""
+    """Move the reference point of the sums of a body to the centre.
+
+    d: (dx, dy, dz) reference point relative to the centre. The velocity there is v + w x d.
+    """
     for i in range(6):
         x, y, z = M[i, 0], M[i, 1], M[i, 2]
         M[i, 3] += dy * z - dz * y

@@ -129,7 +129,7 @@ def constriction(cognitive: float, social: float) -> float:
     w = 2 / |2 - psi - sqrt(psi^2 - 4 psi)| with psi = c1 + c2.
 
     Raises:
-        InputError: psi does not exceed 4.
+        InputError: if psi does not exceed 4.
     """
     psi = cognitive + social
     if psi <= 4:

@@ -1,4 +1,4 @@
-"""Fit of the hand to points with known correspondences: keypoints, or optical markers on its bodies.
+"""Fit of the hand to points with known correspondences, such as optical markers.
 
 points = dict(bodies=[0, 0, 3, 6], local_points=offsets, targets=measured)       # NaN: a missing marker
 solution = fit_points(Chain.of(shape), **points, start=last_pose, prior=Prior.towards(last_pose[ANGLES], 1e-6))
@@ -67,11 +67,15 @@ def fit_points(
     subspace: PostureSubspace = FULL,
     options: PointFitOptions | None = None,
 ) -> Solution:
-    """Return the pose within the limits whose points are closest to their targets, from the pose `start` (27,).
+    """Return the pose within the limits with points closest to their targets.
 
-    bodies: (N,) body of each point; local_points: (N, 3) metres, frame of the body; targets: (N, 3) metres, camera
-    frame, NaN if missing; weights: (N,), 1 by default; directions: (N, 3) unit, camera frame: the distance counts along
-    it, in all three coordinates by default or if zero; prior: on the angles, beside the unscaled sum over the points.
+    bodies: (N,) body of each point.
+    local_points: (N, 3) metres, frame of the body.
+    targets: (N, 3) metres, camera frame, NaN if missing.
+    start: (27,) pose to start from.
+    weights: (N,), 1 by default.
+    directions: (N, 3) unit, camera frame. The distance counts along them; in all coordinates by default or if zero.
+    prior: on the angles, added to the unscaled sum over the points.
 
     Raises:
         ValueError: if a body is not one of the 16, or if the arrays differ in length.
@@ -92,10 +96,13 @@ def fit_points_each(
     starts: Array,
     options: PointFitOptions | None = None,
 ) -> tuple[Array, Array]:
-    """Return the poses (B, 27) of `fit_points` for each of B hands, and their energies (B,), m^2.
+    """Return the poses (B, 27) of `fit_points` for B hands, and their energies (B,), m^2.
 
-    bodies: (N,); local_points: (N, 3) metres, body frames; targets: (B, N, 3) metres, camera frame, finite; weights:
-    (B, N), 0 for a missing point; starts: (B, 27) within the limits.
+    bodies: (N,) body of each point.
+    local_points: (N, 3) metres, body frames.
+    targets: (B, N, 3) metres, camera frame, finite.
+    weights: (B, N), 0 for a missing point.
+    starts: (B, 27) within the limits.
     """
     count = len(np.asarray(bodies))
     points = FixedPoints.of(bodies, local_points, np.zeros((count, 3)))
@@ -108,9 +115,11 @@ def fit_points_each(
 
 
 def aligned_poses(angles: Array, points: Array, targets: Array, weights: Array) -> Array:
-    """Return poses (..., 27) with fixed angles (20,) whose points are closest to their targets (Horn 1987).
+    """Return poses (..., 27) of fixed angles with points closest to targets (Horn 1987).
 
-    points: (N, 3) metres, palm frame, of the hand with these angles; targets: (..., N, 3) metres, camera frame, finite;
+    angles: (20,) rad.
+    points: (N, 3) metres, palm frame, of the hand with these angles.
+    targets: (..., N, 3) metres, camera frame, finite.
     weights: (..., N), some of them positive.
     """
     R, t = rigid_alignment(points, targets, weights)

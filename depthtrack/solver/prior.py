@@ -1,4 +1,4 @@
-"""Quadratic priors on the finger angles: towards angles of a moment ago, or towards likely postures."""
+"""Quadratic priors on the finger angles: towards given angles, or towards likely postures."""
 
 from typing import NamedTuple
 
@@ -11,10 +11,12 @@ from depthtrack.types import Array
 
 
 class Prior(NamedTuple):
-    """A quadratic prior: half of (x - mean)^T precision (x - mean) is added to the energy at finger angles x.
+    """Quadratic prior on finger angles x: half of (x - mean)^T precision (x - mean).
 
-    precision: (20, 20) m^2/rad^2, beside half the sum of squared residuals; mean: (20,) rad. Trackers state the
-    precision beside a sum over 3000 points, and scale it by their number.
+    precision: (20, 20) m^2/rad^2, relative to half the sum of squared residuals.
+    mean: (20,) rad.
+
+    Trackers state the precision for 3000 points, and scale it by the number of points.
     """
 
     precision: Array
@@ -37,8 +39,8 @@ class Prior(NamedTuple):
         The synergies are probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along
         each, and a small variance in all other directions.
 
-        strength: m^2, variance of a residual for which the minimum is the likeliest pose; residual_spread: rad,
-        standard deviation of an angle from its reconstruction by a few synergies.
+        strength: variance of a residual for which the minimum is the likeliest pose, m^2.
+        residual_spread: standard deviation of an angle from its reconstruction by a few synergies, rad.
         """
         C = synergies.components
         along = C * (1 / (synergies.variances + residual_spread**2)) @ C.T
@@ -66,7 +68,7 @@ def reduced_precision(prior: Prior, space: PostureSubspace) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def prior_energy(pose: Array, prior: Prior) -> float:
-    """Return half the squared distance, by the precision, of the angles from the mean of the prior."""
+    """Return the energy of the prior at a pose (27,), m^2."""
     total = 0.0
     for i in range(20):
         row = 0.0
@@ -78,7 +80,10 @@ def prior_energy(pose: Array, prior: Prior) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def add_prior(pose: Array, prior: Prior, space: PostureSubspace, pull: Array, A: Array, b: Array) -> float:
-    """Add the prior to the normal equations; `pull` is its `reduced_precision`. Returns its energy."""
+    """Add the prior to the normal equations; return its energy, m^2.
+
+    pull: `reduced_precision` of the prior.
+    """
     count = pull.shape[0]
     for i in range(count):
         for j in range(20):

@@ -1,4 +1,4 @@
-"""Problems of a posed hand and what solving them returns: residual blocks, prior, subspace, options, status, trace.
+"""Problems of a posed hand, and their solutions.
 
 The energy is half the weighted sum of squared residuals (m^2), plus half a quadratic prior on the finger angles. The
 residuals come from found correspondences, accumulated in `NormalEquations`, and from `FixedPoints`. The parameters are
@@ -36,7 +36,7 @@ class SolverStatus(IntEnum):
 
 
 class Problem(NamedTuple):
-    """A hand, its residuals, a prior on its angles, and the parameters that may move, with their limits."""
+    """Hand, residuals, prior on the angles, and free parameters with their limits."""
 
     chain: Chain
     equations: NormalEquations
@@ -67,9 +67,11 @@ class SolverOptions(NamedTuple):
 
 
 class SolverState(NamedTuple):
-    """The iterate: a pose and its coordinates in the subspace; the solver changes the arrays in place.
+    """Iterate of the solver, changed in place.
 
-    pose: (27,); coordinates: (l,) of its angles; slope: (l,) |dH/dx| of the joint limit function at the step before.
+    pose: (27,).
+    coordinates: (l,) of its angles in the subspace.
+    slope: (l,) |dH/dx| of the joint limit function at the previous step.
     """
 
     pose: Array
@@ -87,7 +89,7 @@ class SolverState(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What the compiled solver returns: why it stopped, the steps it took, and the final energy, m^2."""
+    """Result of the compiled solver: status, number of steps, and final energy, m^2."""
 
     status: SolverStatus
     iterations: int
@@ -122,6 +124,9 @@ class Solution:
 
 @numba.njit(cache=True, nogil=True)
 def limit_gradient(x: float, low: float, high: float) -> float:
-    """Return |dH/dx| of the joint limit function H = (high - low)^2 / ((high - x) (x - low)) of Sec. IV-B."""
+    """Return |dH/dx| of the joint limit function (Schroeder et al. 2014, Sec. IV-B).
+
+    H = (high - low)^2 / ((high - x) (x - low)).
+    """
     room = max((high - x) * (x - low), 1e-9)
     return (high - low) ** 2 * abs(2 * x - high - low) / (room * room)

@@ -1,4 +1,4 @@
-"""Residuals of correspondences, with robust weights: point to point, point to plane, or symmetric."""
+"""Robust residuals of correspondences: point to point, point to plane, or symmetric."""
 
 from depthtrack.simd.functions import eight
 from depthtrack.simd.vectors import F64X8, kernel_part, loader, store

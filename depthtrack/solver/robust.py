@@ -7,19 +7,22 @@ from depthtrack.types import Array
 
 
 def geman_mcclure(square: Array, kernel_scale: float) -> Array:
-    """Return the weight of residuals by the Geman-McClure kernel: 1 at zero, 1/4 at a distance of `kernel_scale`.
+    """Return the Geman-McClure weight of residuals: 1 at zero, 1/4 at the kernel scale.
 
-    square: squared distances, m^2; kernel_scale: m, positive (Geman and McClure, "Statistical methods for tomographic
-    image reconstruction", 1987).
+    square: squared distances, m^2.
+    kernel_scale: m, positive.
+
+    Source: Geman and McClure, "Statistical methods for tomographic image reconstruction", 1987.
     """
     share = 1.0 / (1.0 + square / (kernel_scale * kernel_scale))
     return share * share
 
 
 def symmetric_direction(nx: Array, ny: Array, nz: Array, mx: Array, my: Array, mz: Array) -> tuple[Array, Array, Array]:
-    """Return the unit mean of two unit normals, along which a symmetric point-to-plane residual counts.
+    """Return the unit mean of two unit normals: the direction of a symmetric residual.
 
-    It vanishes on curved surfaces too (Rusinkiewicz, "A symmetric objective function for ICP", 2019).
+    The symmetric point-to-plane residual vanishes on curved surfaces too
+    (Rusinkiewicz, "A symmetric objective function for ICP", 2019).
     """
     x, y, z = nx + mx, ny + my, nz + mz
     scale = 1.0 / np.sqrt(np.maximum(x * x + y * y + z * z, 1e-12))

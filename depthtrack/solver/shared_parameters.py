@@ -1,4 +1,4 @@
-"""Elimination of a pose from normal equations that it shares with other parameters, such as sizes of the hand.
+"""Elimination of poses from normal equations with shared parameters, such as hand sizes.
 
 Each view has a pose of its own, and all views share the other parameters. The Schur complement removes the pose of a
 view; what is left is what the view contributes to the shared parameters.
@@ -29,10 +29,14 @@ class EliminatedPose:
 
 
 def eliminate_pose(H: Array, g: Array, angles: Array, damping: Array) -> EliminatedPose:
-    """Eliminate the pose from the normal equations of one view; an angle pushed beyond its limit is held.
+    """Eliminate the pose from the normal equations of one view.
 
-    H: (26 + m, 26 + m) J^T J, the pose first; g: (26 + m,) J^T e; angles: (20,) rad, within the limits; damping: (26,)
-    added to the diagonal.
+    An angle is held if its step would exceed a limit.
+
+    H: (26 + m, 26 + m) J^T J, the pose first.
+    g: (26 + m,) J^T e.
+    angles: (20,) rad, within the limits.
+    damping: (26,) added to the diagonal.
     """
     n = TANGENT_SIZE
     A, b, C = H[:n, :n] + np.diag(damping), g[:n].copy(), H[:n, n:].copy()
@@ -46,7 +50,7 @@ def eliminate_pose(H: Array, g: Array, angles: Array, damping: Array) -> Elimina
 
 
 def solve_free(A: Array, b: Array, held: Mask) -> Array:
-    """Return x (n,) with A x = b for the parameters that are not `held` (n,), and zero for those that are."""
+    """Return x (n,) with A x = b for free parameters, and zero for `held` (n,) ones."""
     A, b = A.copy(), b.copy()
     for i in np.flatnonzero(held):
         hold_parameter(A, b, int(i))

@@ -1,4 +1,7 @@
-"""Parameters of the solver: all 26, or the global pose and a few synergies (Schroeder et al. 2014, Sec. V-A)."""
+"""Parameters of the solver: all 26, or the global pose and a few synergies.
+
+Source: Schroeder et al. 2014, Sec. V-A.
+"""
 
 from typing import NamedTuple
 
@@ -11,10 +14,14 @@ from depthtrack.types import Array
 
 
 class PostureSubspace(NamedTuple):
-    """Finger angles as mean + basis @ coordinates: Eq. (6) and (7), without the global pose, which stays free.
+    """Subspace of finger angles: mean + basis @ coordinates, Eq. (6) and (7).
 
-    basis: (20, l) orthonormal; mean: (20,) rad; lower, upper: (l,) limits of the coordinates; full: whether the
-    coordinates are the plain angles (the basis is I).
+    The global pose stays free.
+
+    basis: (20, l) orthonormal.
+    mean: (20,) rad.
+    lower, upper: (l,) limits of the coordinates.
+    full: whether the coordinates are the plain angles (the basis is I).
     """
 
     basis: Array
@@ -36,7 +43,7 @@ class PostureSubspace(NamedTuple):
         )
 
     def project(self, angles: Array) -> Array:
-        """Return the coordinates (l,), within the limits, of the angles of the subspace nearest to `angles` (20,)."""
+        """Return the coordinates (l,) of angles (20,), projected to the subspace and its limits."""
         return np.clip((angles - self.mean) @ self.basis, self.lower, self.upper)
 
     def angles(self, coordinates: Array) -> Array:
@@ -63,7 +70,7 @@ def write_angle_step(space: PostureSubspace, pose: Array, coordinates: Array, ta
 
 @numba.njit(cache=True, nogil=True)
 def reduce_to_subspace(H: Array, gradient: Array, space: PostureSubspace, A: Array, b: Array) -> None:
-    """Write the normal equations of the parameters of the subspace to A and b: J_PC = J M, Eq. (8)."""
+    """Write the normal equations of the subspace to A and b: J_PC = J M, Eq. (8)."""
     B, count, size = space.basis, space.basis.shape[1], b.shape[0]
     for i in range(size):
         kept = space.full or i < 6

@@ -46,10 +46,14 @@ def minimise(
     generator: np.random.Generator,
     options: SwarmOptions,
 ) -> Optimum:
-    """Return the optimum of a swarm that evolves from `particles` (N, D) within the box `lower`, `upper` (D,).
+    """Return the optimum of a swarm within a box.
 
-    score: returns energies (N,) of positions (N, D); fingers: dimensions that may be randomised. The number of
-    evaluations is N times `options.generations`. Equal generator states give equal bits.
+    score: returns energies (N,) of positions (N, D).
+    particles: (N, D) positions of the first generation.
+    lower, upper: (D,) bounds of the box.
+    fingers: dimensions that may be randomised.
+
+    The number of evaluations is N times `options.generations`. Equal generator states give equal bits.
     """
     position = np.clip(particles, lower, upper)
     velocity = np.zeros_like(position)
@@ -82,9 +86,13 @@ def advance(
     social: float,
     inertia: float,
 ) -> None:
-    """Advance all particles by Eq. (3) and (4), in place; one that would leave the box stops at its nearest point.
+    """Advance all particles by Eq. (3) and (4), in place.
 
-    `position`, `velocity`, `own_best` (N, D); `best` (D,); `draws` (2, N, D) uniform in 0..1: r1 and r2.
+    A particle that would leave the box stops at its nearest point.
+
+    position, velocity, own_best: (N, D).
+    best: (D,).
+    draws: (2, N, D) uniform in 0..1, r1 and r2.
     """
     for n in range(position.shape[0]):
         for d in range(position.shape[1]):
@@ -103,12 +111,12 @@ def randomise(
     generator: np.random.Generator,
     options: SwarmOptions,
 ) -> None:
-    """Draw one random finger dimension of a share of the particles anew (Sec. 2.4), in place."""
+    """Replace one random finger dimension of a share of the particles, in place (Sec. 2.4)."""
     count = round(options.randomise * len(position))
-    who = generator.permutation(len(position))[:count]
+    rows = generator.permutation(len(position))[:count]
     dimension = generator.integers(fingers.start, fingers.stop, count)
     value = generator.uniform(lower[dimension], upper[dimension])
     if options.near_best > 0:
         near = best[dimension] + options.near_spread * generator.standard_normal(count)
         value = np.where(generator.random(count) < options.near_best, near, value)
-    position[who, dimension] = np.clip(value, lower[dimension], upper[dimension])
+    position[rows, dimension] = np.clip(value, lower[dimension], upper[dimension])

@@ -1,4 +1,4 @@
-"""Search spaces of a swarm: the 27 pose parameters of the paper, or the 26-dimensional tangent space of a pose."""
+"""Search spaces of a swarm: the 27 pose parameters, or the tangent space of a pose."""
 
 from typing import Protocol
 
@@ -31,7 +31,7 @@ class SwarmSpace(Protocol):
 
 
 class ParameterSpace:
-    """The pose vector itself (Oikonomidis et al. 2011, Sec. 2.4): 27 dimensions, the quaternion redundant."""
+    """The 27 pose parameters with a redundant quaternion (Oikonomidis et al. 2011, Sec. 2.4)."""
 
     fingers = ANGLES
 

@@ -1,1 +1,1 @@
-"""From observations to poses: the tracker protocol, the loop over a recording, and the trackers."""
+"""Trackers: poses from observations, and the loop over a recording."""

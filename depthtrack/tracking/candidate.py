@@ -1,4 +1,4 @@
-"""What flows through a tracker: poses with their energy and confidence."""
+"""Candidates of a tracker: poses with their energy and confidence."""
 
 from collections.abc import Iterable
 from typing import NamedTuple

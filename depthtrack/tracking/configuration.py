@@ -96,7 +96,7 @@ class IkConfig:
 
 @dataclass(frozen=True)
 class HybridConfig:
-    """Hybrid tracker: surface fits, a small swarm whose best particles are fitted too, verified by rendering."""
+    """Hybrid tracker: surface fits, and a small swarm with fits of its best particles."""
 
     name: ClassVar[str] = "hybrid"
 

@@ -1,4 +1,7 @@
-"""Run folders written before `run.json` had a format version: flat options of the trackers pso and ik."""
+"""Run folders from before `run.json` had a format version.
+
+They hold flat options of the trackers pso and ik.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -33,7 +36,7 @@ def upgraded(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
     Options that could be set from Python only were not stored; they are assumed to be the defaults.
 
     Raises:
-        InputError: the tracker is none that those versions had.
+        InputError: if those versions had no such tracker.
     """
     tracker = fields.get("tracker")
     if tracker not in _PAPERS:

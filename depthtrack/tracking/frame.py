@@ -21,7 +21,7 @@ from depthtrack.types import Array
 
 
 class Toolkit:
-    """Scorers, fitters and synergies of one hand, made when a stage first asks for them and kept."""
+    """Scorers, fitters and synergies of one hand, created on first use and then kept."""
 
     def __init__(
         self, hand: HandShape, scoring: ScoringOptions, threads: int = 1, synergies: Synergies | None = None
@@ -40,7 +40,10 @@ class Toolkit:
         self.scorer.set_target(observation if resolution is None else observation.reduced(resolution))
 
     def scorer_at(self, resolution: int | None, observation: Observation) -> Scorer:
-        """Return a scorer of `observation` whose longest side has `resolution` pixels; None for the main one."""
+        """Return a scorer of `observation` at a resolution.
+
+        resolution: longest side in pixels; None selects the main scorer.
+        """
         if resolution is None:
             return self.scorer
         if resolution not in self._coarse:
@@ -55,7 +58,7 @@ class Toolkit:
         """Return a surface fitter with these options for `observation`.
 
         Raises:
-            InputError: no skin fits the sizes of the hand.
+            InputError: if no skin fits the sizes of the hand.
         """
         if options not in self._fitters:
             surface = make_surface(options.surface, self.hand, self.scoring.renderer, options.sampling)
@@ -111,7 +114,7 @@ class FrameContext:
         """Return a surface fitter for this frame.
 
         Raises:
-            InputError: no skin fits the sizes of the hand.
+            InputError: if no skin fits the sizes of the hand.
         """
         chosen = options if self.surface is None else replace(options, surface=self.surface)
         return self.tools.fitter(chosen, self.observation)

@@ -1,4 +1,6 @@
-"""The pipeline: segment each frame, track the hand in it, and feed the prediction back as the ROI prior.
+"""The pipeline: segment each frame and track the hand in it.
+
+The prediction of the tracker is the ROI prior of the next frame.
 
 Runs, replay, segmentation figures, comparison, examples and live use all consume `track_frames` or `Pipeline.step`.
 """
@@ -79,7 +81,7 @@ class Pipeline:
 
 
 class NoTracker:
-    """Stands for a tracker where the segmentation alone is wanted: it never predicts and finds nothing."""
+    """Tracker without poses or predictions, for segmentation alone."""
 
     name = "none"
     stages: tuple[str, ...] = ()
@@ -111,7 +113,10 @@ def track_frames(frames: Iterable[Frame], pipeline: Pipeline, known: Sequence[Es
 def replay_frames(
     frames: Iterable[tuple[Frame, Estimate]], guide: Guide, segmenter: Segmenter, hand: HandShape
 ) -> Iterator[TrackedFrame]:
-    """Segment frames again as they were when they were tracked: `guide` restores the ROI prior from the estimates."""
+    """Segment frames again as during tracking.
+
+    guide: restores the ROI prior from the estimates.
+    """
     model = HandModel(hand)
     for frame, estimate in frames:
         observation, milliseconds = segment(frame, segmenter, model, guide, time.perf_counter)
@@ -122,7 +127,7 @@ def replay_frames(
 def segment(
     frame: Frame, segmenter: Segmenter, model: HandModel, guide: Guide, clock: Callable[[], float]
 ) -> tuple[Observation | None, float]:
-    """Return the observation of a frame, segmented near the guide's prediction, and the time in milliseconds."""
+    """Return the observation of a frame near the prediction, and the time in milliseconds."""
     begun = clock()
     observation = segmenter.segment(frame, roi_prior(model, guide.predicted_pose))
     return observation, 1e3 * (clock() - begun)

@@ -9,7 +9,10 @@ from depthtrack.types import Array
 
 
 def frame_generator(seed: int, frame_index: int) -> np.random.Generator:
-    """Return the random numbers of one frame: Philox keyed by seed and frame, independent of earlier frames."""
+    """Return the random number generator of one frame: Philox keyed by seed and frame.
+
+    It does not depend on earlier frames.
+    """
     return np.random.Generator(np.random.Philox(key=[seed, frame_index]))
 
 
@@ -17,7 +20,7 @@ def checked_pose(pose: ArrayLike) -> Array:
     """Return a start pose (27,) as an array.
 
     Raises:
-        InputError: the shape is another one, or a number is not finite.
+        InputError: if the shape is not (27,), or a number is not finite.
     """
     given = np.asarray(pose, dtype=np.float64)
     if given.shape != (POSE_SIZE,) or not np.all(np.isfinite(given)):

@@ -23,10 +23,12 @@ BUILDERS = {
 
 
 def tracker_config(name: str, **options: Any) -> TrackerConfig:
-    """Return the configuration of a tracker; `options` by name or dotted path, as `options.parameters` lists them.
+    """Return the configuration of a tracker.
+
+    options: values by name or dotted path, as `options.parameters` lists them.
 
     Raises:
-        InputError: no tracker has this name, or an option does not exist or has the wrong type.
+        InputError: if no tracker has this name, or if an option does not exist or has the wrong type.
     """
     if name not in CONFIGURATIONS:
         raise InputError(f"no tracker '{name:.60}': choose one of {', '.join(CONFIGURATIONS)}")
@@ -42,7 +44,7 @@ def create_tracker(
     synergies: synergies in place of those that the configuration names.
 
     Raises:
-        InputError: a file of synergies cannot be read, or no skin fits the sizes of the hand.
+        InputError: if a file of synergies cannot be read, or no skin fits the sizes of the hand.
     """
     chosen = getattr(config, "synergies", None)
     if synergies is None and chosen is not None and chosen.synergies is not None:

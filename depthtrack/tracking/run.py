@@ -46,14 +46,14 @@ def configure(
 
 
 class TrackingRun(Closing):
-    """Tracks a recording as a configuration says; equal configurations give equal bits.
+    """Run of a tracker on a recording; equal configurations give equal bits.
 
     threads: threads of the renderer; poses do not depend on it.
     wrap: returns the tracker to use in place of the one that the configuration describes, to time it for example.
     clock: seconds, for the time of the segmentation.
 
     Raises:
-        InputError: the configuration does not fit the recording, or a file that it names cannot be read.
+        InputError: if the configuration does not fit the recording, or a file that it names cannot be read.
     """
 
     def __init__(
@@ -79,10 +79,12 @@ class TrackingRun(Closing):
         return track_frames(islice(self.sequence, len(self)), self._pipeline(self._start_pose))
 
     def write(self, folder: Path, resume: bool = False) -> Iterator[TrackedFrame]:
-        """Yield each frame as it is tracked and appended to a run folder; with `resume`, only those that it lacks.
+        """Yield each frame after it is tracked and appended to a run folder.
+
+        resume: track only the frames that the folder lacks.
 
         Raises:
-            InputError: the folder holds another run, or a run without `resume`.
+            InputError: if the folder holds another run, or a run and `resume` is false.
         """
         fields = self.configuration.to_fields()
         with RunWriter(folder, fields, ("segment", *self.tracker.stages), resume) as run:
@@ -101,7 +103,11 @@ class TrackingRun(Closing):
 
 
 def true_start(sequence: Sequence) -> Array:
-    """Return the true pose (27,) of the recording's first frame. Raises InputError if it has none."""
+    """Return the true pose (27,) of the recording's first frame.
+
+    Raises:
+        InputError: if it has none.
+    """
     truth = sequence.ground_truth
     row = None if truth is None else truth.at(float(sequence.timestamps[0]))
     if truth is None or truth.poses is None or row is None:

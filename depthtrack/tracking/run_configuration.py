@@ -37,7 +37,7 @@ Start = Literal["auto", "truth"]
 
 @dataclass(frozen=True)
 class RunConfiguration:
-    """A recording, a hand, a tracker with its options, and what belongs to neither.
+    """A recording, a hand, a tracker with its options, and the settings of the run.
 
     sequence: path of the recording.
     camera, hand: contents of `camera.json` and `hand.json`.
@@ -94,10 +94,10 @@ class RunConfiguration:
 
     @classmethod
     def from_fields(cls, fields: Mapping[str, Any], where: str) -> Self:
-        """Return the configuration that the contents of a `run.json` describe, earlier layouts included.
+        """Return the configuration of the contents of a `run.json`, earlier layouts included.
 
         Raises:
-            InputError: an entry is missing or malformed; it names `where`.
+            InputError: if an entry is missing or malformed; the message names `where`.
         """
         if "format" not in fields:
             fields = upgraded(fields, where)

@@ -1,4 +1,4 @@
-"""The tracker skeleton: runs lists of stages over candidates, and keeps the state between frames."""
+"""Tracker made of stages: lists of stages over candidates, and the state between frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,12 @@ from depthtrack.types import Array
 
 @dataclass(frozen=True)
 class Stages:
-    """What a tracker does: `follow` a pose, `start` without one, or `refine` a pose that the user gave."""
+    """Lists of stages of a tracker.
+
+    follow: stages from the pose of the last frame.
+    start: stages without a pose.
+    refine: stages from a pose that the user gave.
+    """
 
     follow: Sequence[Stage]
     start: Sequence[Stage]
@@ -28,7 +33,7 @@ class Stages:
 
 
 class StageTracker:
-    """Tracks a hand with lists of stages: see `tracker.Tracker`."""
+    """Tracker with lists of stages: see `tracker.Tracker`."""
 
     def __init__(self, name: str, stages: Stages, tools: Toolkit, thresholds: TrackingThresholds, seed: int) -> None:
         self.name, self._stages, self._tools, self._seed = name, stages, tools, seed
@@ -37,7 +42,7 @@ class StageTracker:
         self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed)))
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
-        """Begin on this frame, from a pose (27,) that is refined, or by a search."""
+        """Start on this frame: refine a pose (27,), or search if there is none."""
         self._state.forget_last()
         if pose is None:
             return self._run(self._stages.start, self._frame(observation), Status.STARTED)
@@ -55,7 +60,7 @@ class StageTracker:
 
     @property
     def predicted_pose(self) -> Array | None:
-        """Linear prediction (27,) of the next pose if the track may guide the segmentation, else None."""
+        """Linear prediction (27,) of the next pose; None if it must not guide the segmentation."""
         return self._state.predicted_pose
 
     def close(self) -> None:

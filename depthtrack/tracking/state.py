@@ -1,4 +1,7 @@
-"""The state of a track between frames. It depends on the estimates alone, so that a run can be resumed."""
+"""State of a track between frames.
+
+It depends on the estimates alone, so that a run can be resumed.
+"""
 
 from collections import deque
 from collections.abc import Sequence
@@ -37,7 +40,9 @@ class TrackState:
         return self.is_beyond(energy, confidence, self._thresholds.energy, self._thresholds.confidence)
 
     def is_beyond(self, energy: float, confidence: float, most_energy: float, least_confidence: float) -> bool:
-        """Return whether the confidence is too low, or the energy too high, also beside the median energy.
+        """Return whether the confidence is too low or the energy too high.
+
+        The energy is also compared with the median energy.
 
         most_energy: multiple of `Objective.clamp`.
         """
@@ -49,7 +54,7 @@ class TrackState:
     def commit(
         self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
     ) -> Estimate:
-        """Update the state with the pose of the next frame; return its estimate, lost if it is not trusted."""
+        """Update the state with the next pose; return its estimate, lost if it is not trusted."""
         trusted = not self.is_lost(energy, confidence)
         estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms)
         self.update(estimate)
@@ -61,7 +66,7 @@ class TrackState:
             self.update(estimate)
 
     def forget_last(self) -> None:
-        """Forget where the hand was: a new track starts anywhere."""
+        """Remove the last pose, so that a new track may start anywhere."""
         self.pose, self.last_trusted = None, None
 
     def update(self, estimate: Estimate) -> None:
@@ -84,7 +89,7 @@ class TrackState:
     def predicted_pose(self) -> Array | None:
         """Linear prediction (27,) if the last pose may guide the segmentation, else None.
 
-        A wrong pose must not guide: it would cut out what agrees with it.
+        A wrong pose must not guide the segmentation: it would select the pixels that agree with it.
         """
         limits = self._thresholds
         if self.pose is None or self._confidence < limits.guide_confidence:

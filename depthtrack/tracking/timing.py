@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 
 class StageClock:
-    """Accumulates the `milliseconds` of stages that follow each other; 0 for stages that did not run."""
+    """Clock of consecutive stages: `milliseconds` of each, 0 for stages that did not run."""
 
     def __init__(self, stages: Iterable[str]) -> None:
         self.milliseconds = dict.fromkeys(stages, 0.0)

@@ -13,7 +13,7 @@ from depthtrack.types import Array
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a tracker returns for one frame.
+    """Estimate of a tracker for one frame.
 
     pose: (27,) pose vector, None if no hand was observed.
     energy: E of Oikonomidis et al. 2011, Eq. (1); NaN without a pose.
@@ -45,7 +45,7 @@ class Guide(Protocol):
 
     @property
     def predicted_pose(self) -> Array | None:
-        """Pose (27,) expected in the next frame; None if the track is not certain enough to guide the segmentation."""
+        """Predicted pose (27,) of the next frame; None if it must not guide the segmentation."""
         ...
 
 
@@ -65,5 +65,5 @@ class Tracker(Guide, Protocol):
         ...
 
     def close(self) -> None:
-        """Free what the tracker holds."""
+        """Free the renderers of the tracker."""
         ...

@@ -1,4 +1,4 @@
-"""Calibration: sizes recovered from a recording, gradients held to differences, and what cannot be measured refused."""
+"""Calibration: sizes from a recording, gradients, and rejected recordings."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -45,7 +45,7 @@ pytestmark = pytest.mark.slow
 
 
 def _rendered(pose: np.ndarray) -> Observation:
-    """The true hand in a pose, as a perfect sensor and segmentation see it."""
+    """Return the observation of the true hand without noise."""
     camera = Camera(240, 240, 500, 500, 120, 120)
     skin = Skin.of(TRUE_HAND)
     vertices = skin.at(pose)
@@ -55,7 +55,7 @@ def _rendered(pose: np.ndarray) -> Observation:
 
 
 def _empty_room(folder: Path) -> Path:
-    """Four frames of a wall."""
+    """Write a recording of a wall, four frames."""
     camera = Camera(64, 48, 60, 60, 31.5, 23.5, 0.001)
     with SequenceWriter(folder, camera) as writer:
         for i in range(4):
@@ -64,7 +64,7 @@ def _empty_room(folder: Path) -> Path:
 
 
 def _sizes() -> np.ndarray:
-    """A hand of scale 0.9 whose middle finger is a tenth longer."""
+    """Return the sizes (35,) of a hand of scale 0.9 with a middle finger longer by a tenth."""
     values = np.zeros(COUNT)
     values[SCALE] = np.log(0.9)
     values[LENGTHS][6:9] = np.log(1.1)
@@ -95,7 +95,7 @@ def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
     assert calibration.after_mm < 0.5 < calibration.before_mm
 
 
-def test_what_is_said_of_sureness_is_true(calibration: Calibration) -> None:
+def test_standard_deviations_cover_the_errors(calibration: Calibration) -> None:
     truth = {name: 1000 * metres for name, (metres, _) in measures(_sizes()).items()}
     for name, found in calibration.measured.items():
         assert 0 < found.confidence < 1
@@ -128,7 +128,7 @@ def test_views_are_shown_in_the_order_of_the_recording(calibration: Calibration)
 
 
 @pytest.mark.parametrize(("margin", "sure"), [(0.012, False), (0.3, True), (None, True)])
-def test_a_side_that_fits_hardly_better_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
+def test_a_side_with_a_small_margin_is_not_sure(calibration: Calibration, margin: float | None, sure: bool) -> None:
     certain = {name: replace(m, confidence=0.9999) for name, m in calibration.measured.items()}
     found = replace(calibration, side_margin=margin, measured=certain)
     assert summary(found)["side_sure"] == sure
@@ -154,7 +154,7 @@ def test_gradients_agree_with_finite_differences_on_the_bones(side: Side) -> Non
     np.testing.assert_allclose(J, expected, atol=1e-8)
 
 
-def test_usual_proportions_leave_the_hand_as_it_is() -> None:
+def test_usual_proportions_do_not_change_the_hand() -> None:
     generator = np.random.default_rng(4)
     values = generator.standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
     before, after = hand_of(values, "left"), hand_of(with_usual_proportions(values), "left")
@@ -164,8 +164,8 @@ def test_usual_proportions_leave_the_hand_as_it_is() -> None:
         np.testing.assert_allclose(np.asarray(getattr(after, name)) * after.scale, expected, atol=1e-12)
 
 
-def test_sizes_that_no_view_shows_stay_as_among_people() -> None:
-    """A fist tells less of the fingers' lengths than an open hand does, and both more than nothing."""
+def test_sizes_without_observations_keep_the_prior() -> None:
+    """An open hand determines finger lengths better than a fist, and a fist better than none."""
     frames = {"fist": POSTURES["fist"], "open": POSTURES["open"]}
     sigma = {}
     for name, angles in frames.items():
@@ -192,7 +192,7 @@ def test_open_hands_are_chosen_before_fists() -> None:
     assert finger_area(open_hand) > 4 * finger_area(fist)
 
 
-def test_recordings_without_a_hand_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recordings_without_a_hand_are_rejected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     empty = _empty_room(tmp_path / "empty")
     with pytest.raises(InputError, match="0 of 4 frames"):
         choose_views(open_sequence(empty), Segmenter())

@@ -52,12 +52,12 @@ def test_the_scale_of_a_rig_is_found(calibration: RigCalibration, rig: HandShape
 
 
 @pytest.mark.slow
-def test_a_hand_of_the_other_side_is_refused(views: list[Observation], rig: HandShape) -> None:
+def test_a_hand_of_the_other_side_is_rejected(views: list[Observation], rig: HandShape) -> None:
     with pytest.raises(InputError, match="must show a left hand like the rig"):
         calibrate_rig(views, rig.with_(side="left"), RasterScorer)
 
 
-def test_sizes_without_a_rig_are_refused(views: list[Observation]) -> None:
+def test_sizes_without_a_rig_are_rejected(views: list[Observation]) -> None:
     with pytest.raises(InputError, match="must be a rigged mesh"):
         calibrate_rig(views, HandShape(), RasterScorer)
 

@@ -1,4 +1,4 @@
-"""Residuals, normal equations and the damped Gauss-Newton of the IK solver, held to dense and slow ones."""
+"""Residuals, normal equations and Gauss-Newton, compared with dense computations."""
 
 import math
 from collections.abc import Callable
@@ -37,8 +37,10 @@ NO_POINTS = FixedPoints.none()
 
 
 class Problem:
-    """Random matches of a random hand, some points without one; `rows` (M, 3 or 1, 3) are the directions in which
-    each distance counts."""
+    """Random correspondences of a random hand; some points have none.
+
+    rows: (M, 3 or 1, 3) directions of the residuals.
+    """
 
     def __init__(self, seed: int, residual: Residual, kernel_scale: float, count: int = 60) -> None:
         rng = np.random.default_rng(seed)
@@ -59,7 +61,7 @@ class Problem:
         self.weights = np.ones(count) if kernel_scale == 0 else 1 / (1 + (gap / kernel_scale) ** 2) ** 2
 
     def residuals(self, pose: np.ndarray) -> np.ndarray:
-        """(M, 3 or 1) with the matched points carried along, weights and directions unchanged."""
+        """Return the residuals (M, 3 or 1) at a pose, with fixed weights and directions."""
         gap = HAND.transform_points(pose, np.maximum(self.correspondences.body, 0), self.local) - self.cloud.points
         return np.asarray(np.einsum("nri,ni->nr", self.rows, gap))[self.kept]
 
@@ -67,7 +69,7 @@ class Problem:
         return float(0.5 * np.sum(self.weights[self.kept, None] * self.residuals(pose) ** 2))
 
     def normal_equations(self) -> tuple[np.ndarray, np.ndarray]:
-        """J^T W J and J^T W e from the dense Jacobian."""
+        """Return J^T W J and J^T W e from the dense Jacobian."""
         J = HAND.point_jacobian(self.pose, np.maximum(self.correspondences.body, 0), self.correspondences.x)
         J = np.einsum("nri,nij->nrj", self.rows, J)[self.kept]
         w = self.weights[self.kept]
@@ -97,7 +99,7 @@ def test_normal_equations_are_those_of_the_dense_jacobian(seed: int, residual: R
 
 @settings(max_examples=10)
 @given(seed=SEEDS, residual=RESIDUALS, kernel_scale=SOFTNESS)
-def test_the_gradient_is_the_energys_slope(seed: int, residual: Residual, kernel_scale: float) -> None:
+def test_the_gradient_agrees_with_finite_differences(seed: int, residual: Residual, kernel_scale: float) -> None:
     problem = Problem(seed, residual, kernel_scale)
     gradient = np.empty(26)
     sums.normal_equations(problem.equations, NO_POINTS, problem.bodies, np.empty((26, 26)), gradient)
@@ -107,8 +109,8 @@ def test_the_gradient_is_the_energys_slope(seed: int, residual: Residual, kernel
 
 @settings(max_examples=10)
 @given(seed=SEEDS, residual=RESIDUALS)
-def test_after_small_steps_sums_still_tell_energy_and_slope(seed: int, residual: Residual) -> None:
-    """A body's turn is followed to first order: what is left out is of second order in it."""
+def test_sums_approximate_energy_and_gradient_after_small_steps(seed: int, residual: Residual) -> None:
+    """The sums are exact to first order in the rotation of a body."""
     problem = Problem(seed, residual, 0.01)
     pose = retract(problem.pose, np.random.default_rng(seed).normal(0, 0.004, 26))
     bodies, gradient = BodyPoses.at(CHAIN, pose), np.empty(26)
@@ -120,7 +122,7 @@ def test_after_small_steps_sums_still_tell_energy_and_slope(seed: int, residual:
 
 
 @given(gap=st.floats(0, 0.1), kernel_scale=st.sampled_from([0.0, 0.003, 0.03]))
-def test_weights_are_geman_and_mcclures(gap: float, kernel_scale: float) -> None:
+def test_weights_equal_the_geman_mcclure_kernel(gap: float, kernel_scale: float) -> None:
     x, y, z = gap * np.array([2, -1, 2]) / 3
     expected = 1.0 if kernel_scale == 0 else (kernel_scale**2 / (kernel_scale**2 + gap**2)) ** 2
     assert weight(x, y, z, kernel_scale) == pytest.approx(expected)
@@ -144,7 +146,7 @@ def test_synergies_reduce_the_system_as_in_equation_8(seed: int, count: int) -> 
     width=st.floats(0.05, 3),
     share=st.floats(0.02, 0.98),
 )
-def test_the_limit_slope_is_that_of_the_papers_function(low: float, width: float, share: float) -> None:
+def test_the_limit_slope_agrees_with_finite_differences(low: float, width: float, share: float) -> None:
     high, x, h = low + width, low + share * width, 1e-6 * width
 
     def limit_function(x: float) -> float:
@@ -156,7 +158,7 @@ def test_the_limit_slope_is_that_of_the_papers_function(low: float, width: float
 
 
 @given(seed=SEEDS, size=st.integers(1, 26))
-def test_cholesky_solves_as_numpy_does(seed: int, size: int) -> None:
+def test_cholesky_agrees_with_numpy(seed: int, size: int) -> None:
     rng = np.random.default_rng(seed)
     factor, b = rng.normal(size=(size + 2, size)), rng.normal(size=size)
     A = factor.T @ factor
@@ -171,8 +173,8 @@ def solved(problem: Problem, space: PostureSubspace, prior: Prior, options: Solv
 
 
 @given(seed=SEEDS, residual=RESIDUALS, strength=st.sampled_from([1e-4, 1e-2]))
-def test_one_step_is_the_damped_least_squares_one(seed: int, residual: Residual, strength: float) -> None:
-    """Eq. (4), with a pull to other angles; on distances so small that nothing limits or halves the step."""
+def test_one_step_equals_damped_least_squares(seed: int, residual: Residual, strength: float) -> None:
+    """Eq. (4) with a prior. The residuals are small enough for a full, unlimited step."""
     problem = Problem(seed, residual, 0.0)
     problem.pose[ANGLES] = (LOWER + UPPER) / 2
     problem = _nearly_met(problem, 1e-3)
@@ -187,7 +189,7 @@ def test_one_step_is_the_damped_least_squares_one(seed: int, residual: Residual,
 
 
 def _nearly_met(problem: Problem, share: float) -> Problem:
-    """The same matches in the pose as it is now, every distance this share of what it was."""
+    """Return the correspondences at the current pose, with distances scaled by `share`."""
     gap = problem.cloud.points - problem.correspondences.x
     problem.bodies = BodyPoses.at(CHAIN, problem.pose)
     problem.correspondences.x[:] = HAND.transform_points(
@@ -200,7 +202,7 @@ def _nearly_met(problem: Problem, share: float) -> Problem:
 
 
 @given(seed=SEEDS, residual=RESIDUALS, count=st.sampled_from([None, 3, 12]), avoid=st.booleans())
-def test_solving_lessens_the_energy_within_the_limits(
+def test_solving_decreases_the_energy_within_the_limits(
     seed: int, residual: Residual, count: int | None, avoid: bool
 ) -> None:
     problem = Problem(seed, residual, 0.0)
@@ -217,7 +219,7 @@ def test_solving_lessens_the_energy_within_the_limits(
 
 
 @given(seed=SEEDS, residual=RESIDUALS, iterations=st.integers(0, 12))
-def test_the_trace_falls_and_the_status_says_why_it_ends(seed: int, residual: Residual, iterations: int) -> None:
+def test_the_trace_decreases_and_the_status_states_why_it_ends(seed: int, residual: Residual, iterations: int) -> None:
     problem = Problem(seed, residual, 0.0)
     problem.pose = within_limits(problem.pose)
     solution = solved(problem, FULL, Prior.none(), SolverOptions(iterations, 1e-5))
@@ -255,7 +257,7 @@ def test_a_held_parameter_leaves_the_system_of_the_others(seed: int, size: int) 
 
 
 def _pulled_up(by: float) -> Problem:
-    """Matches that would have all fingers, which are 0.05 rad below their upper limits, bend `by` more."""
+    """Return correspondences that bend all fingers by `by`, from 0.05 rad below their limits."""
     problem = Problem(0, "point", 0.0)
     problem.pose[ANGLES] = UPPER - 0.05
     target = problem.pose.copy()
@@ -268,15 +270,15 @@ def _pulled_up(by: float) -> Problem:
     return _nearly_met(problem, 1.0)
 
 
-def test_limits_hold() -> None:
+def test_angles_stay_within_the_limits() -> None:
     pulled = solved(_pulled_up(0.3), FULL, Prior.none(), SolverOptions(10, 1e-6))
     assert np.all(pulled.pose[ANGLES] <= UPPER)
     assert np.mean(pulled.pose[ANGLES] > UPPER - 1e-3) > 0.6
 
 
-def test_limit_avoidance_slows_what_moves_towards_a_limit_and_nothing_that_leaves_it() -> None:
+def test_limit_avoidance_slows_only_motion_towards_a_limit() -> None:
     def bent(by: float, avoid: bool) -> float:
-        """Mean bend after two steps."""
+        """Return the mean bend after two steps, rad."""
         problem = _pulled_up(by)
         solution = solved(problem, FULL, Prior.none(), SolverOptions(2, 1e-5, avoid_limits=avoid))
         return float(np.mean(solution.pose[ANGLES] - problem.pose[ANGLES]))
@@ -287,7 +289,7 @@ def test_limit_avoidance_slows_what_moves_towards_a_limit_and_nothing_that_leave
 
 
 @given(seed=SEEDS, count=st.integers(1, 20))
-def test_likely_postures_are_those_of_probabilistic_components(seed: int, count: int) -> None:
+def test_the_synergy_prior_equals_probabilistic_components(seed: int, count: int) -> None:
     synergies = load_synergies().truncated(count)
     prior = Prior.from_synergies(synergies, 1e-6)
     covariance = synergies.components * synergies.variances @ synergies.components.T + np.radians(2) ** 2 * np.eye(20)

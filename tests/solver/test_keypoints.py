@@ -1,4 +1,4 @@
-"""Alignment, inverse kinematics on keypoints, and sizes measured on them: what went in comes out again."""
+"""Alignment, inverse kinematics on keypoints, and sizes recovered from keypoints."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_alignment_recovers_a_rigid_motion_and_agrees_with_scipy(seed: int) -> N
     assert np.linalg.det(found_R) == pytest.approx(1)
 
 
-def test_points_without_weight_do_not_count() -> None:
+def test_points_without_weight_are_ignored() -> None:
     points = np.random.default_rng(0).normal(size=(2, 5, 3))
     target = points + np.array([1.0, 2.0, 3.0])
     target[:, 4] = 1e6
@@ -85,8 +85,8 @@ def test_any_pose_is_recovered_from_its_keypoints(side: Side, wrist: bool) -> No
 
 
 @pytest.mark.parametrize(("joint", "least"), [(0, 1.0), (1, 0.95), (2, 0.98)])
-def test_unknown_joints_do_not_keep_the_known_ones_from_being_reached(joint: int, least: float) -> None:
-    """One joint missing in every finger. Bases follow from the palm; behind the others lie rare local minima."""
+def test_known_joints_are_reached_despite_missing_ones(joint: int, least: float) -> None:
+    """One joint is missing in every finger; rare local minima remain except for base joints."""
     model, poses = HandModel(HandShape()), random_poses(3, 200)
     keypoints = model.keypoints(poses)
     keypoints[:, 1 + joint :: 4] = np.nan
@@ -96,7 +96,7 @@ def test_unknown_joints_do_not_keep_the_known_ones_from_being_reached(joint: int
         assert distances(model, fitted.poses, poses).max() < 1e-6
 
 
-def test_a_finger_that_is_not_known_keeps_its_start() -> None:
+def test_a_missing_finger_keeps_its_start() -> None:
     model, poses = HandModel(HandShape()), random_poses(4, 50)
     keypoints = model.keypoints(poses)
     keypoints[:, 5:9] = np.nan
@@ -108,8 +108,8 @@ def test_a_finger_that_is_not_known_keeps_its_start() -> None:
     assert distances(model, fitted, poses)[:, others].max() < 1e-6
 
 
-def test_noise_is_averaged_not_amplified() -> None:
-    """Twenty-one points against 26 freedoms: most of the noise along the bones goes, and none is added."""
+def test_the_fit_reduces_noise() -> None:
+    """63 coordinates determine 26 parameters, so the fit removes part of the noise."""
     rng, noise = np.random.default_rng(5), 0.002
     model, poses = HandModel(HandShape()), random_poses(5, 300)
     noisy = model.keypoints(poses) + rng.normal(scale=noise, size=(300, 21, 3))
@@ -122,8 +122,8 @@ def test_noise_is_averaged_not_amplified() -> None:
     assert fitted.residuals.mean() == pytest.approx(expected, rel=0.1)
 
 
-def test_the_best_pose_is_sought_within_the_limits() -> None:
-    """A finger bent backwards: its joint stays at the limit, and no other admissible pose is nearer."""
+def test_the_best_pose_within_the_limits_is_returned() -> None:
+    """The joint of a finger bent backwards stays at its limit, and no near pose fits better."""
     model = HandModel(HandShape())
     angles = POSTURES["relaxed"].copy()
     angles[ANGLE_NAMES.index("index_pip_flexion")] = np.radians(-25)
@@ -140,7 +140,7 @@ def test_the_best_pose_is_sought_within_the_limits() -> None:
         assert others.min() >= fitted.residuals[0]
 
 
-def test_hands_fit_the_same_alone_and_in_company() -> None:
+def test_a_fit_does_not_depend_on_other_hands() -> None:
     model, poses = HandModel(HandShape()), random_poses(7, 5)
     keypoints = model.keypoints(poses) + np.random.default_rng(7).normal(scale=1e-3, size=(5, 21, 3))
     together = fit_poses(model, keypoints)
@@ -164,7 +164,7 @@ def test_too_few_joints_give_no_pose() -> None:
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("wrist", [True, False])
 def test_sizes_and_side_are_measured_on_keypoints(side: Side, wrist: bool) -> None:
-    """Of an average hand of any scale exactly; of other proportions so that the fit still lies on the keypoints."""
+    """Sizes are exact for average proportions, and fit the keypoints for others."""
     poses = random_poses(9, 60)
     poses[:, ANGLES][:, MIDDLE_ABDUCTION] = np.tile([-0.05, 0, 0.05], 20)  # forward on the average
     default = HandShape()
@@ -183,7 +183,7 @@ def test_sizes_and_side_are_measured_on_keypoints(side: Side, wrist: bool) -> No
         assert fit_poses(HandModel(measured), keypoints).residuals.max() < 1e-5
 
 
-def test_the_middle_finger_says_what_forward_is_where_the_wrist_is_not_known() -> None:
+def test_the_middle_finger_defines_forward_if_the_wrist_is_missing() -> None:
     model, poses = HandModel(HandShape()), random_poses(10, 60)
     poses[:, ANGLES][:, MIDDLE_ABDUCTION] = np.radians(10)
     keypoints = model.keypoints(poses)
@@ -192,7 +192,7 @@ def test_the_middle_finger_says_what_forward_is_where_the_wrist_is_not_known() -
     assert np.degrees(np.median(fitted.poses[:, ANGLES][:, MIDDLE_ABDUCTION])) == pytest.approx(0, abs=0.5)
 
 
-def test_what_cannot_be_measured_is_refused() -> None:
+def test_insufficient_keypoints_are_rejected() -> None:
     keypoints = HandModel(HandShape()).keypoints(random_poses(11, 4))
     no_palm = keypoints.copy()
     no_palm[:, [0, 1, 5, 9, 13]] = np.nan

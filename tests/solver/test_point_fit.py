@@ -1,4 +1,4 @@
-"""Fits to points fixed to bodies: residuals held to a dense form, and poses found again with points missing."""
+"""Fits to points fixed to bodies: dense residuals, and poses from incomplete points."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ def dense_residuals(points: FixedPoints, pose: np.ndarray) -> np.ndarray:
 
 
 @given(seed=SEEDS, directed=st.booleans())
-def test_energy_gradient_and_matrix_are_the_dense_ones(seed: int, directed: bool) -> None:
+def test_normal_equations_equal_the_dense_ones(seed: int, directed: bool) -> None:
     points, pose = block(seed, directed)
     equations, bodies = NormalEquations.empty(), BodyPoses.at(CHAIN, pose)
     clear(equations, bodies)
@@ -87,7 +87,7 @@ def test_the_energy_is_exact_far_from_the_start(seed: int, turn: float) -> None:
 
 @settings(max_examples=25)
 @given(seed=SEEDS, missing=st.floats(0, 0.4))
-def test_a_pose_is_recovered_from_markers_some_of_them_missing(seed: int, missing: float) -> None:
+def test_a_pose_is_recovered_from_incomplete_markers(seed: int, missing: float) -> None:
     rng = np.random.default_rng(seed)
     pose, local = random_pose(rng), markers(seed)
     start = within_limits(retract(pose, rng.normal(0, 1, 26) * np.repeat([0.02, 0.2, 0.2], [3, 3, 20])))
@@ -112,7 +112,7 @@ def test_weights_decide_between_contradicting_points() -> None:
     np.testing.assert_allclose(along.pose[:3], [0, 0, 0.4], atol=1e-8)
 
 
-def test_a_prior_holds_what_points_leave_open_and_a_subspace_binds_the_rest() -> None:
+def test_a_prior_determines_missing_fingers_and_a_subspace_constrains_all() -> None:
     rng = np.random.default_rng(4)
     pose, local = random_pose(rng), markers(4)
     targets = HAND.transform_points(pose, MARKERS, local)
@@ -128,7 +128,7 @@ def test_a_prior_holds_what_points_leave_open_and_a_subspace_binds_the_rest() ->
     np.testing.assert_allclose(bound, space.angles(space.project(bound)), atol=1e-9)
 
 
-def test_many_hands_are_fitted_as_each_alone() -> None:
+def test_a_batch_equals_single_fits() -> None:
     rng = np.random.default_rng(5)
     poses, local = np.stack([random_pose(rng) for _ in range(4)]), markers(5)
     targets = np.stack([HAND.transform_points(pose, MARKERS, local) for pose in poses])
@@ -141,7 +141,7 @@ def test_many_hands_are_fitted_as_each_alone() -> None:
         assert energies[i] == pytest.approx(alone.energy)
 
 
-def test_iterations_end_a_fit_and_bad_arrays_are_refused() -> None:
+def test_the_iteration_limit_ends_a_fit_and_malformed_arrays_are_rejected() -> None:
     rng = np.random.default_rng(6)
     pose, local = random_pose(rng), markers(6)
     targets = HAND.transform_points(pose, MARKERS, local) + rng.normal(0, 0.01, local.shape)

@@ -9,7 +9,7 @@ from depthtrack.solver.robust import compiled_symmetric_direction, geman_mcclure
 
 
 @given(seed=st.integers(0, 2**32 - 1), kernel_scale=st.floats(1e-4, 0.1))
-def test_both_kinds_agree(seed: int, kernel_scale: float) -> None:
+def test_compiled_and_numpy_functions_agree(seed: int, kernel_scale: float) -> None:
     rng = np.random.default_rng(seed)
     gaps, n, m = rng.normal(0, 0.02, (5, 3)), rng.normal(size=(5, 3)), rng.normal(size=(5, 3))
     weights = geman_mcclure(np.sum(gaps**2, axis=1), kernel_scale)

@@ -18,14 +18,14 @@ from depthtrack.tracking.visible_centroid import visible_centroid
 seeds = st.integers(0, 2**32 - 1)
 
 
-def test_constriction_is_clerc_and_kennedys() -> None:
+def test_the_constriction_equals_that_of_clerc_and_kennedy() -> None:
     assert constriction(2.8, 1.3) == pytest.approx(0.7298, abs=5e-5)
     with pytest.raises(InputError, match="exceed 4"):
         constriction(2.0, 2.0)
 
 
 @given(seed=seeds)
-def test_a_step_is_equation_3_and_4(seed: int) -> None:
+def test_a_step_equals_equations_3_and_4(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x, v, own = rng.normal(size=(3, 5, 4))
     best, lower, upper = rng.normal(size=4), np.full(4, -0.5), np.full(4, 0.7)
@@ -82,7 +82,7 @@ def test_the_same_generator_gives_the_same_bits() -> None:
 
 @pytest.mark.parametrize("kind", [ParameterSpace, TangentSpace])
 @given(seed=seeds)
-def test_spaces_lead_to_poses_and_back(kind: type[ParameterSpace] | type[TangentSpace], seed: int) -> None:
+def test_poses_round_trip_through_search_spaces(kind: type[ParameterSpace] | type[TangentSpace], seed: int) -> None:
     rng = np.random.default_rng(seed)
     reference = make_pose([0, 0, 0.5], rng.normal(size=4), rng.uniform(LOWER, UPPER))
     space: SwarmSpace = kind(reference)
@@ -94,7 +94,7 @@ def test_spaces_lead_to_poses_and_back(kind: type[ParameterSpace] | type[Tangent
 
 
 @given(seed=seeds)
-def test_the_tangent_kernel_is_retract(seed: int) -> None:
+def test_the_tangent_kernel_equals_retract(seed: int) -> None:
     rng = np.random.default_rng(seed)
     reference = make_pose(rng.normal(size=3), rng.normal(size=4), rng.uniform(LOWER, UPPER))
     steps = np.vstack([rng.normal(size=(5, 26)), np.zeros(26)])
@@ -116,13 +116,13 @@ def test_the_visible_centroid_is_the_mean_of_the_points(seed: int) -> None:
     assert np.isnan(visible_centroid(np.zeros_like(depth), intrinsics)).all()
 
 
-def test_a_quaternion_of_no_length_keeps_the_reference() -> None:
+def test_a_zero_quaternion_keeps_the_reference() -> None:
     reference = make_pose([0, 0, 0.5], [0.5, 0.5, 0.5, 0.5], np.zeros(20))
     coordinates = np.concatenate([reference[:3], np.zeros(4), reference[7:]])[None]
     np.testing.assert_allclose(ParameterSpace(reference).poses(coordinates)[0], reference)
 
 
 @pytest.mark.parametrize("change", [{"particles": 0}, {"generations": -1}, {"randomise": 2.0}, {"randomise_every": -1}])
-def test_absurd_options_are_refused(change: dict[str, float]) -> None:
+def test_invalid_options_are_rejected(change: dict[str, float]) -> None:
     with pytest.raises(InputError):
         SwarmOptions(**change)  # type: ignore[arg-type]

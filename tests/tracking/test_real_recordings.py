@@ -16,10 +16,10 @@ from depthtrack.tracking.registry import create_tracker, tracker_config
 
 
 @pytest.mark.parametrize(("margin", "least"), [(0.0, 0.74), (0.02, 0.81)])
-def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: float) -> None:
-    """The annotation is a mesh that ends 23 mm beyond its wrist joint and lies several pixels beside the image.
+def test_the_annotated_hand_is_segmented(real_data: Path, margin: float, least: float) -> None:
+    """The annotation is a mesh that is misaligned by several pixels.
 
-    With its own wrist taken for the cut, the best union of colour and depth reaches 0.844.
+    It ends 23 mm beyond its wrist joint. If segmentation ends there too, its best union with colour and depth is 0.844.
     """
     sequence = open_sequence(real_data / "rgbd" / "open-close")
     rows = [
@@ -31,7 +31,7 @@ def test_the_annotated_hand_is_cut_out(real_data: Path, margin: float, least: fl
     assert report["mean_iou"] > least
 
 
-def test_the_annotated_hand_is_cut_out_by_depth_alone(real_data: Path) -> None:
+def test_the_annotated_hand_is_segmented_by_depth_alone(real_data: Path) -> None:
     """It begins with a hand half closed, and a shoulder in view."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
     report = summary(
@@ -56,8 +56,8 @@ def test_single_frames_with_a_body_in_view_show_a_hand(real_data: Path) -> None:
     assert all(o.centre[2] < 0.85 for o in found if o is not None)
 
 
-def test_the_swarm_follows_a_real_hand(real_data: Path) -> None:
-    """From nothing but the recording: joints within 15 mm of an annotation that is itself good to 5 to 10 mm."""
+def test_the_swarm_tracks_a_real_hand(real_data: Path) -> None:
+    """Joints lie within 15 mm of an annotation with an uncertainty of 5 to 10 mm."""
     sequence = open_sequence(real_data / "rgbd" / "open-close")
     truth, model = sequence.ground_truth, HandModel(HandShape())
     assert truth is not None

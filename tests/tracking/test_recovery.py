@@ -1,4 +1,4 @@
-"""Recovery: poses with fingers matched to their neighbours are left, and proposals respect what a wrist allows."""
+"""Recovery from shifted fingers and losses, and proposals within anatomical limits."""
 
 from contextlib import closing
 from dataclasses import replace
@@ -39,7 +39,7 @@ def made(everyday_skin: Synthesiser) -> Synthesiser:
 
 
 def _shifted(made: Synthesiser, pose: np.ndarray) -> np.ndarray:
-    """The palm one finger further, the middle finger folded: each other finger where the next one was."""
+    """Return a pose with the palm shifted by one finger and the middle finger folded."""
     wrong = pose.copy()
     towards_thumb = rotation_matrix(pose[3:7])[:, 0] * made.options.hand.mirror
     wrong[POSITION] += 0.02 * towards_thumb
@@ -48,8 +48,8 @@ def _shifted(made: Synthesiser, pose: np.ndarray) -> np.ndarray:
     return wrong
 
 
-def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
-    """From one finger further, in a single frame: a swarm of the same spread does not get there."""
+def test_recovery_leaves_a_local_minimum_of_the_swarm(made: Synthesiser) -> None:
+    """In one frame, a swarm of the same spread stays at the pose shifted by one finger."""
     frame, wrong = 11, _shifted(made, made.poses[11])
     o = observe(made, frame)
     with RasterScorer(made.options.hand) as scorer:
@@ -63,18 +63,18 @@ def test_another_place_is_found_where_a_swarm_stays(made: Synthesiser) -> None:
     assert errors[1] < 0.7 * errors[0]
 
 
-def test_poses_close_by_are_possible_and_close(made: Synthesiser) -> None:
+def test_local_proposals_are_admissible_and_near(made: Synthesiser) -> None:
     poses = local_proposals(made.poses[20], np.random.default_rng(1), RecoveryOptions(proposals=500))
     angles = poses[:, ANGLES]
     assert ((angles >= LOWER - 1e-12) & (angles <= UPPER + 1e-12)).all()
     assert np.linalg.norm(poses[:, POSITION] - made.poses[20, POSITION], axis=1).max() < 0.12
-    # Some keep the fingers, as far as they are varied, and others change them all.
+    # Some proposals keep the fingers up to noise, and others change all of them.
     change = np.abs(angles - made.poses[20, ANGLES]).max(axis=1)
     assert change.min() < 0.4
     assert np.median(change) > 0.6
 
 
-def test_orientations_that_no_wrist_allows_are_left_out() -> None:
+def test_orientations_outside_the_wrist_limits_are_excluded() -> None:
     arm, angles = np.array([0.0, 0.6, 0.8]), typical_angles(np.random.default_rng(3), 400)
     poses = orientation_proposals(np.array([0, 0, 0.5]), angles, np.random.default_rng(2), arm)
     towards_wrist = -rotation_matrix(poses[:, 3:7])[:, :, 1]
@@ -83,8 +83,8 @@ def test_orientations_that_no_wrist_allows_are_left_out() -> None:
     assert (rotation_matrix(free[:, 3:7])[:, :, 1] @ arm > 0.15).any()
 
 
-def test_a_finger_that_is_elsewhere_is_found(made: Synthesiser) -> None:
-    """Each finger in turn is bent or stretched; moved alone, it is found again, and no other one moves."""
+def test_the_search_of_one_finger_corrects_it(made: Synthesiser) -> None:
+    """Each finger in turn is bent or stretched. The search corrects it and moves no other."""
     frame = 11
     o, truth = observe(made, frame), made.poses[frame]
     with RasterScorer(made.options.hand) as scorer:
@@ -101,8 +101,8 @@ def test_a_finger_that_is_elsewhere_is_found(made: Synthesiser) -> None:
             assert np.array_equal(np.delete(found, np.r_[angles]), np.delete(wrong, np.r_[angles]))
 
 
-def test_one_finger_further_undoes_a_shift(made: Synthesiser) -> None:
-    """A hand one finger beside its place, either way: three of its four fingers are where they should be again."""
+def test_opposite_finger_shifts_cancel(made: Synthesiser) -> None:
+    """Opposite shifts by one finger restore three of the four fingers."""
     truth = made.poses[11].copy()
     truth[ANGLES] = POSTURES["open"]
     for way in (0, 1):
@@ -115,32 +115,32 @@ def test_one_finger_further_undoes_a_shift(made: Synthesiser) -> None:
         assert np.linalg.norm(there - MODEL.endpoints(shifted).reshape(5, 4, 3), axis=-1)[1:, 3].min() > 0.015
 
 
-@pytest.mark.parametrize(("frames", "remembered"), [(15, True), (16, False)])
-def test_where_a_hand_was_is_remembered_for_half_a_second(made: Synthesiser, frames: int, remembered: bool) -> None:
-    memory, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
-    memory.commit(pose, 5.0, 0.9, Status.TRACKED, {})
+@pytest.mark.parametrize(("frames", "kept"), [(15, True), (16, False)])
+def test_the_last_trusted_pose_is_kept_for_half_a_second(made: Synthesiser, frames: int, kept: bool) -> None:
+    state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
+    state.commit(pose, 5.0, 0.9, Status.TRACKED, {})
     for _ in range(frames):
-        lost = memory.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {})
+        lost = state.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {})
         assert lost.status is Status.LOST
-        assert memory.pose is None
-    assert (memory.last_trusted is pose) == remembered
+        assert state.pose is None
+    assert (state.last_trusted is pose) == kept
 
 
-def test_a_pose_of_unusual_energy_does_not_guide(made: Synthesiser) -> None:
-    memory, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
+def test_a_pose_of_unusual_energy_gives_no_prediction(made: Synthesiser) -> None:
+    state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
     for _ in range(5):
-        memory.commit(pose, 16.0, 0.8, Status.TRACKED, {})
-        assert memory.predicted_pose is not None
-    memory.commit(pose, 22.0, 0.8, Status.TRACKED, {})
-    assert memory.pose is not None
-    assert memory.predicted_pose is None
-    memory.commit(pose, 18.0, 0.55, Status.TRACKED, {})
-    assert memory.pose is not None
-    assert memory.predicted_pose is None
+        state.commit(pose, 16.0, 0.8, Status.TRACKED, {})
+        assert state.predicted_pose is not None
+    state.commit(pose, 22.0, 0.8, Status.TRACKED, {})
+    assert state.pose is not None
+    assert state.predicted_pose is None
+    state.commit(pose, 18.0, 0.55, Status.TRACKED, {})
+    assert state.pose is not None
+    assert state.predicted_pose is None
 
 
 class _Levels:
-    """A scorer whose energy is the difference of one angle from a given one."""
+    """Scorer with the difference of one angle from a given one as energy."""
 
     def __init__(self, angle: float) -> None:
         self.angle, self.seen = angle, list[np.ndarray]()
@@ -151,7 +151,7 @@ class _Levels:
         return Scores(energy, np.ones_like(energy))
 
 
-def test_each_of_the_best_postures_of_a_finger_leads_to_the_next(made: Synthesiser) -> None:
+def test_several_postures_of_a_finger_are_refined(made: Synthesiser) -> None:
     scorer, options = _Levels(0.7), FingerOptions()
     search_one_finger(scorer, made.poses[0], 1, np.random.default_rng(0), options)  # type: ignore[arg-type]
     first, second = scorer.seen[0], scorer.seen[1]
@@ -163,7 +163,7 @@ def test_each_of_the_best_postures_of_a_finger_leads_to_the_next(made: Synthesis
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
-def test_a_start_does_not_depend_on_what_was_tracked_before(made: Synthesiser, name: str) -> None:
+def test_a_start_does_not_depend_on_earlier_frames(made: Synthesiser, name: str) -> None:
     with (
         closing(create_tracker(tracker_config(name), made.options.hand)) as fresh,
         closing(create_tracker(tracker_config(name), made.options.hand)) as used,
@@ -175,12 +175,12 @@ def test_a_start_does_not_depend_on_what_was_tracked_before(made: Synthesiser, n
 
 
 @pytest.mark.parametrize("name", ["ik", "pso"])
-def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synthesiser, name: str) -> None:
-    """One frame shows a few crumbs far apart, as no hand does: it is lost, and found again beside where it was."""
+def test_a_restored_tracker_continues_after_a_loss_with_the_same_bits(made: Synthesiser, name: str) -> None:
+    """One frame has only a few distant pixels: its status is lost, and the next one's started."""
     frames = [observe(made, index) for index in (20, 21, 22, 23)]
-    crumbs = np.zeros_like(frames[1].silhouette)
-    crumbs[:3, :3] = crumbs[-3:, -3:] = crumbs[:3, -3:] = crumbs[-3:, :3] = True
-    frames[1] = replace(frames[1], silhouette=crumbs, depth=np.where(crumbs, np.float32(0.5), np.float32(0)))
+    pixels = np.zeros_like(frames[1].silhouette)
+    pixels[:3, :3] = pixels[-3:, -3:] = pixels[:3, -3:] = pixels[-3:, :3] = True
+    frames[1] = replace(frames[1], silhouette=pixels, depth=np.where(pixels, np.float32(0.5), np.float32(0)))
     with (
         closing(create_tracker(tracker_config(name), made.options.hand)) as whole,
         closing(create_tracker(tracker_config(name), made.options.hand)) as cut,
@@ -196,7 +196,7 @@ def test_a_tracker_that_recalls_a_loss_goes_on_like_the_one_that_lost(made: Synt
 
 @pytest.mark.parametrize(("name", "recovers"), [("ik", 1), ("pso", 1), ("schroeder2014", 0), ("oikonomidis2011", 0)])
 def test_the_papers_trackers_do_not_recover(made: Synthesiser, name: str, recovers: bool) -> None:
-    """The hand jumps so far that each other tracker searches near the pose."""
+    """The jump of the hand triggers the recovery of the other trackers."""
     with closing(create_tracker(tracker_config(name), made.options.hand)) as tracker:
         tracker.start(observe(made, 20), made.poses[20])
         estimate = tracker.track(observe(made, 130))

@@ -1,4 +1,4 @@
-"""The configuration of a run: its JSON round trip, repeating a run from it, and run folders of earlier versions."""
+"""Configuration of a run: JSON round trip, repeated runs, and earlier run folders."""
 
 import json
 from dataclasses import replace
@@ -60,7 +60,7 @@ def _other(parameter: Parameter) -> Any:
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
-def test_a_configuration_survives_json(name: str) -> None:
+def test_a_configuration_round_trips_through_json(name: str) -> None:
     for config in (CONFIGURATIONS[name](), changed(CONFIGURATIONS[name]())):
         assert from_data(type(config), json.loads(json.dumps(to_data(config))), "test") == config
     usual = {each.path: each.default for each in parameters(CONFIGURATIONS[name]())}
@@ -110,7 +110,7 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
         ({"start": "guess"}, "auto or truth"),
     ],
 )
-def test_a_malformed_configuration_is_refused(recording: Path, change: dict[str, Any], expected: str) -> None:
+def test_a_malformed_configuration_is_rejected(recording: Path, change: dict[str, Any], expected: str) -> None:
     sequence = open_sequence(recording)
     fields = configure(recording, sequence, CONFIGURATIONS["ik"](), HandShape()).to_fields()
     with pytest.raises(InputError, match=expected):
@@ -144,7 +144,7 @@ def test_runs_of_earlier_versions_are_read() -> None:
         upgraded({"tracker": "magic"}, "run.json")
 
 
-def test_changed_files_are_noticed(recording: Path, tmp_path: Path) -> None:
+def test_changed_files_are_rejected(recording: Path, tmp_path: Path) -> None:
     from depthtrack.hand.synergies import load_synergies, save_synergies
 
     file, folder = tmp_path / "mine.json", tmp_path / "run"

@@ -1,4 +1,4 @@
-"""Proposals of single fingers: other postures of one finger, and each finger where its neighbour was."""
+"""Proposals of finger postures: other postures of one finger, and shifted fingers."""
 
 import numpy as np
 
@@ -43,10 +43,10 @@ def search_one_finger(
 
 
 def finger_shift_proposals(model: HandModel, pose: Array) -> Array:
-    """Return poses (2, 27) with each finger where the next one was, in one direction and the other.
+    """Return poses (2, 27) with the fingers shifted by one place in both directions.
 
-    They correct a hand that was matched one finger beside its place. The thumb moves along, and so does a finger
-    without a neighbour on that side.
+    They correct a hand that was matched one finger beside its place. The thumb moves along. So does a finger without a
+    neighbour on that side.
     """
 
     # The last bits of these points reach the tracked poses, which the compiled kinematics would change.

@@ -1,4 +1,7 @@
-"""Proposals of a global search: any orientation that the forearm allows, the palm near the observed centre."""
+"""Proposals of a global search.
+
+They have any orientation that the forearm allows, and the palm near the observed centre.
+"""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -51,9 +54,10 @@ def synergy_angles(synergies: Synergies, generator: np.random.Generator, count: 
 
 
 def mixed_angles(synergies: Synergies, generator: np.random.Generator, options: GlobalSearchOptions) -> Array:
-    """Return angles (N, 20) of all proposals: a share drawn from the synergies, the others typical postures.
+    """Return the angles (N, 20), rad, of all proposals.
 
-    Typical postures matter because some are rare in the recordings that synergies are computed from.
+    A share is drawn from the synergies. The others are typical postures, because some are rare in the recordings behind
+    the synergies.
     """
     count, share = options.proposals, options.synergy_share
     if share <= 0:
@@ -64,7 +68,11 @@ def mixed_angles(synergies: Synergies, generator: np.random.Generator, options: 
 
 
 def distinct_orientations(poses: Array, angle: float, count: int) -> list[int]:
-    """Return the first `count` rows of poses (N, 27) whose orientations differ from earlier ones by `angle` (rad)."""
+    """Return the first `count` rows of poses with orientations apart from those of earlier rows.
+
+    poses: (N, 27).
+    angle: least difference, rad.
+    """
     chosen: list[int] = []
     conjugate = poses[:, ORIENTATION] * [1, -1, -1, -1]
     for i in range(len(poses)):

@@ -1,4 +1,4 @@
-"""Proposals near a known pose: other palm poses close by, every finger in some typical posture."""
+"""Proposals near a known pose: other palm poses, and a typical posture of each finger."""
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from depthtrack.types import Array
 
 
 def local_proposals(pose: Array, generator: np.random.Generator, options: RecoveryOptions) -> Array:
-    """Return poses (N, 27) near `pose` (27,): swarms and descents rarely move a finger past its neighbours."""
+    """Return poses (N, 27) near `pose` (27,).
+
+    They cover what swarms and descents rarely reach: a finger on the other side of its neighbours.
+    """
     count, spreads = options.proposals, [[[options.position_spread]], [[options.rotation_spread]]]
     shift, turn = generator.standard_normal((2, count, 3)) * spreads
     mixed = FINGER_POSTURES[generator.integers(0, len(FINGER_POSTURES), (count, 5)), np.arange(5)].reshape(count, 20)

@@ -100,12 +100,16 @@ def fit_in_synergies(fitter: IcpFitter, pose: Array, synergies: Synergies, optio
 
 
 def posture_subspace(synergies: Synergies, count: int | None) -> PostureSubspace:
-    """Return the subspace of the first `count` synergies, or of as many as there are; None for all angles."""
+    """Return the subspace of the first `count` synergies, at most all; None for all angles."""
     return FULL if count is None else PostureSubspace.of(synergies, min(count, len(synergies)))
 
 
 def _distinct_postures(angles: Array, difference: float, count: int) -> list[int]:
-    """Return the first `count` rows of angles (N, 20) that differ from earlier ones by `difference` (rad, RMS)."""
+    """Return the first `count` rows of angles that differ from earlier rows.
+
+    angles: (N, 20) rad.
+    difference: least RMS difference, rad.
+    """
     chosen: list[int] = []
     for i, one in enumerate(angles):
         if not chosen or np.sqrt(np.mean((angles[chosen] - one) ** 2, axis=1)).min() >= difference:

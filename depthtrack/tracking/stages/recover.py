@@ -32,9 +32,11 @@ class SearchGlobally:
 
 @dataclass(frozen=True)
 class RefineFingers:
-    """Try other postures of single fingers, and all fingers moved by one place, in frames that fit poorly.
+    """Try other postures of fingers in frames that fit poorly.
 
-    refit: surface fit after a finger was changed; None keeps what was rendered.
+    Proposals are other postures of single fingers, and all fingers shifted by one place.
+
+    refit: surface fit after a finger changed; None keeps the rendered candidate.
     """
 
     search: Search
@@ -60,7 +62,10 @@ class RefineFingers:
         return [best]
 
     def _refitted(self, frame: FrameContext, scorer: Scorer, best: Candidate, found: Candidate) -> Candidate:
-        """Return the better of `best` and `found` fitted to the surface, if rendering at low resolution agrees."""
+        """Return the surface fit of `found` if its energy is low enough, else `best`.
+
+        The energy of `found` at low resolution is compared first.
+        """
         assert self.refit is not None
         if found.energy >= self.recovery.accept_finger * scorer.score(best.pose[None])[0]:
             return best
@@ -107,7 +112,10 @@ class RecoverLocally:
 
 @dataclass(frozen=True)
 class ReinitialiseNearLast:
-    """After a loss, search near the last trusted pose too: a hand hardly turns over in half a second."""
+    """Search near the last trusted pose after a loss.
+
+    A hand hardly turns over in half a second.
+    """
 
     search: Search
     options: RecoveryOptions

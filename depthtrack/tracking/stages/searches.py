@@ -42,7 +42,7 @@ class Search(Protocol):
 
 @dataclass(frozen=True)
 class SwarmSearch:
-    """Search by ever fewer and finer swarms, with surface fits of the best poses between the rounds."""
+    """Search by rounds of fewer and finer swarms, with surface fits between the rounds."""
 
     options: SwarmSearchOptions
 
@@ -109,9 +109,9 @@ class FitSearch:
 
 
 def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOptions) -> Candidate:
-    """Return the best candidate of repeated global searches of a frame (Oikonomidis et al. 2011, Sec. 3).
+    """Return the best candidate of repeated global searches (Oikonomidis et al. 2011, Sec. 3).
 
-    The gain of a repetition ends the search too: a hand of other sizes than the model's has no good pose.
+    The search ends if a repetition gains little: a hand of other sizes than the model's has no good pose.
     """
     best: Candidate | None = None
     generator, observation = search.random(frame), frame.observation

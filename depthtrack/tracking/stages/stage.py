@@ -1,4 +1,4 @@
-"""The stage protocol: what trackers are lists of."""
+"""The stage protocol: trackers are lists of stages."""
 
 from typing import Protocol
 

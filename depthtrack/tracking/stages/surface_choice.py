@@ -14,10 +14,10 @@ from depthtrack.tracking.options import SurfaceChoiceOptions
 
 @dataclass(frozen=True)
 class ChooseSurface:
-    """Fit the best candidate briefly to each surface; all fits of the frame use the one with the lowest residual.
+    """Choose the surface with the lowest residual of a brief fit, for all fits of the frame.
 
-    The first surface is preferred: the others are tried only if its residual is not small, and must reduce it to
-    `accept`. The choice depends on the frame alone, so that a run can be resumed.
+    The first surface is preferred. The others are tried only if its residual is not small, and must reduce it by the
+    factor `accept`. The choice depends on the frame alone, so that a run can be resumed.
     """
 
     options: SurfaceChoiceOptions
@@ -34,7 +34,7 @@ class ChooseSurface:
         return candidates
 
     def _residual(self, frame: FrameContext, candidate: Candidate, surface: SurfaceName) -> float:
-        """Return the residual of a brief fit; infinity if no such surface fits the sizes of the hand."""
+        """Return the residual of a brief fit; infinity if the hand has no such surface."""
         frame.surface = surface
         try:
             fitter = frame.fitter(self.fit)

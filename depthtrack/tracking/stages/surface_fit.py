@@ -1,4 +1,4 @@
-"""Surface fits: candidates moved onto the point cloud by ICP (Schroeder et al. 2014, Sec. IV)."""
+"""Surface fits: ICP of candidates to the point cloud (Schroeder et al. 2014, Sec. IV)."""
 
 from dataclasses import dataclass
 
@@ -48,9 +48,9 @@ class SurfaceFit:
 
 @dataclass(frozen=True)
 class RetryPredictions:
-    """Fit the other predictions too if the first fit ended much higher than the last frame, then fit the best longer.
+    """Fit the other predictions if the first fit has a high energy, then fit the best longer.
 
-    ratio, margin: the energy exceeds `ratio` times that of the last frame plus `margin` (clamp).
+    ratio, margin: an energy is high above `ratio` times that of the last frame plus `margin` (clamp).
     """
 
     fit: SurfaceFit

@@ -23,7 +23,10 @@ Spread = tuple[float, float, float]
 def run_swarm(
     scorer: Scorer, space: SwarmSpace, particles: Array, generator: np.random.Generator, options: SwarmOptions
 ) -> list[Candidate]:
-    """Return the best pose of each particle, best first, from particles (N, D) in the coordinates of `space`."""
+    """Return the best pose of each particle, best first.
+
+    particles: (N, D) in the coordinates of `space`.
+    """
     least, confidence = np.full(len(particles), np.inf), np.zeros(len(particles))
 
     def score(coordinates: Array) -> Array:
@@ -63,9 +66,11 @@ class SwarmAround:
 class Swarm:
     """Follow the last pose by one swarm.
 
-    Space "parameters" holds the 27 raw parameters of the paper, whose first generation surrounds the last pose. Space
-    "tangent" holds the 26-dimensional tangent space; a third of its first generation surrounds each of the last pose,
-    its linear prediction, and the last pose moved onto the observed hand, wider if the hand moved fast by `widen`.
+    space: "parameters" for the 27 raw parameters of the paper, or "tangent" for the 26-dimensional tangent space.
+    widen: weight of the hand's velocity in the spread of "tangent".
+
+    The first generation of "parameters" surrounds the last pose. That of "tangent" surrounds three poses in equal
+    parts: the last pose, its linear prediction, and the last pose moved onto the observed hand.
     """
 
     options: SwarmOptions
@@ -102,7 +107,7 @@ class Swarm:
 
 
 def observed_drift(frame: FrameContext, pose: Array) -> Array:
-    """Return how far (3,), m, the observed hand lies from `pose` (27,) rendered through the same camera."""
+    """Return the offset (3,), m, of the observed hand from the rendered hand in `pose` (27,)."""
     target = frame.tools.scorer.target
     intrinsics = (target.camera.fx, target.camera.fy, target.camera.cx, target.camera.cy)
     rendered = frame.tools.scorer.render(pose)

@@ -15,7 +15,7 @@ from depthtrack.tracking.stages.swarm import run_swarm
 
 @dataclass(frozen=True)
 class SwarmProposals:
-    """Let a small swarm search around the best candidate and the last motion, and fit its best particles.
+    """Search with a small swarm around the best candidate, and fit its best particles.
 
     A fitted proposal is accepted if its energy is lower than `accept` times that of the best candidate.
     """

@@ -1,6 +1,6 @@
-"""Tapered capsules that stand for a hand's skin: one for each phalanx, and a few for what moves with the palm.
+"""Fit of tapered capsules to the skin of a hand: one per phalanx, and six for the palm.
 
-They are fitted to the skin itself, so that a tracker that uses them is not misled by a palm of another outline.
+The capsules are fitted to the skin mesh, since the palm of the primitive model has another outline.
 """
 
 from functools import lru_cache
@@ -16,18 +16,25 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.types import Array, Index
 
 _POINTS = 240
-"""About how many vertices a capsule is fitted to."""
+"""Approximate number of vertices that a capsule is fitted to."""
 _ROUNDS = 6
-"""How often the palm's vertices are shared out anew among its capsules."""
+"""Number of iterations that assign the vertices of the palm to its capsules."""
 _NEAR = 0.012
-"""Metres that an end may move from where it is first put, twice as far as a radius may change."""
+"""Metres, largest motion of an end from its initial position; a radius changes at most half as much."""
 _SOFT = 5e-4
-"""Metres from which on a vertex counts less: webs and folds are no capsules."""
+"""Metres, scale of the robust kernel: vertices of webs and folds are outliers."""
 
 
 class Capsules(NamedTuple):
-    """Tapered capsules: the `body` (K,) each is fixed to; `start` (K, 3) and unit `axis` (K, 3) in that body's frame,
-    `length` (K,), `radius` (K,) at the start, and `taper` (K,), what the radius loses along the axis. Metres."""
+    """Tapered capsules, each fixed to a body.
+
+    body: (K,) body that moves the capsule.
+    start: (K, 3) start of the axis, metres, frame of the body.
+    axis: (K, 3) unit direction, frame of the body.
+    length: (K,) metres.
+    radius: (K,) radius at the start, metres.
+    taper: (K,) decrease of the radius per length.
+    """
 
     body: Index
     start: Array
@@ -39,7 +46,10 @@ class Capsules(NamedTuple):
 
 @lru_cache(maxsize=8)
 def fitted_capsules(shape: HandShape) -> Capsules:
-    """The capsules of a hand; fitted once for each shape (about a second), then remembered."""
+    """Return the capsules of a hand.
+
+    The fit takes about a second, and its result is cached.
+    """
     skin = Skin.of(shape)
     mover = skin.weights.argmax(axis=1)
     bodies: list[int] = []
@@ -65,7 +75,11 @@ def fitted_capsules(shape: HandShape) -> Capsules:
 
 
 def distance(ends: Array, points: Array) -> Array:
-    """Return the signed distance (N,), metres, of points (N, 3) to a capsule (8,): start, end and both radii."""
+    """Return the signed distances (N,), metres, of points to one capsule.
+
+    ends: (8,) start, end and both radii, metres.
+    points: (N, 3) metres, in the frame of `ends`.
+    """
     axis = ends[3:6] - ends[:3]
     length = float(np.linalg.norm(axis))
     taper = float(_taper(np.array(ends[6] - ends[7]), np.array(length)))
@@ -76,13 +90,13 @@ def distance(ends: Array, points: Array) -> Array:
 
 
 def _taper(lost: Array, length: Array) -> Array:
-    # A ball that swallows the next one would leave no cone between them.
+    # There is no cone between two balls if one contains the other.
     return np.clip(lost / np.maximum(length, 1e-6), -0.95, 0.95)
 
 
 def _fit(capsules: list[Array], points: Array, scale: float) -> list[Array]:
-    """Fit capsules to the points nearest to each, in turn."""
-    # Ends that no vertex holds would wander off.
+    """Return capsules (8,) after alternating assignments of points (N, 3) and fits."""
+    # The bounds hold ends that no vertex determines.
     near = np.concatenate([np.full(6, _NEAR), np.full(2, _NEAR / 2)]) * scale
     bounds = [(np.maximum(ends - near, np.repeat([-1, 1e-4], [6, 2])), ends + near) for ends in capsules]
     for _ in range(_ROUNDS if len(capsules) > 1 else 1):
@@ -99,7 +113,7 @@ def _fit(capsules: list[Array], points: Array, scale: float) -> list[Array]:
 
 
 def _phalanx(shape: HandShape, body: int) -> Array:
-    """A bone of the primitive model, to begin with."""
+    """Return the initial capsule (8,) of a phalanx: the bone of the primitive model."""
     finger, k = divmod(body - 1, 3)
     r0, r1 = shape.radii[finger, k : k + 2]
     length = shape.lengths[finger, k] - (r1 if k == 2 else 0)
@@ -107,7 +121,7 @@ def _phalanx(shape: HandShape, body: int) -> Array:
 
 
 def _palm(shape: HandShape) -> list[Array]:
-    """The metacarpals from wrist to knuckles, and the muscles towards the thumb and below the little finger."""
+    """Return the initial capsules (8,) of the palm: four metacarpals and two muscles."""
     model = HandModel(shape)
     bases, wrist = model.base_transforms[:, :3, 3], shape.wrist
     thick, radii = shape.palm_thickness / 2 * shape.scale, shape.radii[:, 0] * shape.scale

@@ -1,7 +1,7 @@
-"""Closest points on a hand of tapered capsules (Schroeder et al. 2014, Sec. VI-C, has cylinders).
+"""Closest points on tapered capsules (cylinders in Schroeder et al. 2014, Sec. VI-C).
 
-A capsule is swept by balls along its bone, their radius changing on the way. All capsules are tried for all points, one
-capsule after the other, so that the compiler can take several points at a time.
+A capsule is the union of balls along its axis, with a linear radius. The distances of all points to one capsule are
+computed together, which the compiler vectorises.
 """
 
 import math
@@ -22,15 +22,24 @@ from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
 from depthtrack.types import Array, Array32, Depth
 
 
-class Placed(NamedTuple):
-    """Capsules in the camera frame: `start` (K, 3) and unit `axis` (K, 3), and what `Capsules` says of the rest."""
+class PosedCapsules(NamedTuple):
+    """Axes of the capsules of a posed hand.
+
+    start: (K, 3) metres, camera frame.
+    axis: (K, 3) unit, camera frame.
+    """
 
     start: Array
     axis: Array
 
 
 class Distances(NamedTuple):
-    """`each` (K, N) metres from each point to the surface of each capsule; `least` (N,) of them, and `which` (N,)."""
+    """Distances of points to the surfaces of capsules.
+
+    each: (K, N) metres.
+    least: (N,) smallest distance of each point, metres.
+    which: (N,) row of the capsule at that distance.
+    """
 
     each: Array32
     least: Array32
@@ -38,15 +47,17 @@ class Distances(NamedTuple):
 
     @staticmethod
     def allocate(capsules: int, points: int) -> "Distances":
-        """Room for so many."""
+        """Allocate the distances of `points` points to `capsules` capsules."""
         each = np.empty((capsules, points), np.float32)
         return Distances(each, np.empty(points, np.float32), np.empty(points, np.int32))
 
 
-class View(NamedTuple):
-    """The hand as rendered.
+class RenderedHand(NamedTuple):
+    """Depth map of the rendered hand.
 
-    depth: (h, w) metres, 0 for none. lens: fx, fy, cx, cy. hidden_depth: depth behind it at which a point is hidden, m.
+    depth: (h, w) metres, 0 for none.
+    lens: fx, fy, cx, cy, pixels.
+    hidden_depth: metres behind the depth map from which on a point is hidden.
     """
 
     depth: Depth
@@ -55,12 +66,12 @@ class View(NamedTuple):
 
 
 class CapsuleSurface:
-    """See the module, and `matching.Surface`."""
+    """Surface of tapered capsules: see `correspondences.Surface`."""
 
     def __init__(self, shape: HandShape, scorer: Scorer, options: SurfaceOptions) -> None:
         self._options = options
         self._capsules = fitted_capsules(shape)
-        self._placed = Placed(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
+        self._posed = PosedCapsules(np.empty_like(self._capsules.start), np.empty_like(self._capsules.start))
         self._scorer = scorer
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
@@ -68,7 +79,7 @@ class CapsuleSurface:
         self._scorer.set_target(target)
         c = target.camera
         self._lens = (c.fx, c.fy, c.cx, c.cy)
-        self._reach = max_distance
+        self._max_distance = max_distance
         self._distances = Distances.allocate(len(self._capsules.body), len(cloud.points))
 
     def match(
@@ -79,42 +90,45 @@ class CapsuleSurface:
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        view = View(self._scorer.render(pose), self._lens, self._options.cylinder_hidden_depth)
-        place_capsules(self._capsules, bodies, self._placed)
-        measure(cloud.points, self._capsules, self._placed, self._distances)
-        limits = (self._reach, min_normal_cosine)
-        choose(cloud, self._capsules, self._placed, self._distances, view, limits, correspondences)
+        rendered = RenderedHand(self._scorer.render(pose), self._lens, self._options.cylinder_hidden_depth)
+        pose_capsules(self._capsules, bodies, self._posed)
+        measure(cloud.points, self._capsules, self._posed, self._distances)
+        limits = (self._max_distance, min_normal_cosine)
+        choose(cloud, self._capsules, self._posed, self._distances, rendered, limits, correspondences)
 
 
 @numba.njit(cache=True, nogil=True)
-def place_capsules(capsules: Capsules, bodies: BodyPoses, placed: Placed) -> None:
-    """Move the capsules to where their bodies are."""
+def pose_capsules(capsules: Capsules, bodies: BodyPoses, posed: PosedCapsules) -> None:
+    """Write the capsules of a posed hand to `posed`."""
     for k in range(capsules.body.shape[0]):
         T = bodies.T[capsules.body[k]]
         for i in range(3):
-            placed.start[k, i], placed.axis[k, i] = T[i, 3], 0.0
+            posed.start[k, i], posed.axis[k, i] = T[i, 3], 0.0
             for j in range(3):
-                placed.start[k, i] += T[i, j] * capsules.start[k, j]
-                placed.axis[k, i] += T[i, j] * capsules.axis[k, j]
+                posed.start[k, i] += T[i, j] * capsules.start[k, j]
+                posed.axis[k, i] += T[i, j] * capsules.axis[k, j]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -> None:
-    """Write the distances of points (N, 3) to all capsules to `out`, which may have space for more points.
+def measure(points: Array, capsules: Capsules, posed: PosedCapsules, out: Distances) -> None:
+    """Write the distances of points to all capsules to `out`.
+
+    points: (N, 3) metres, camera frame.
+    out: distances of at least N points.
 
     The distance is `geometry.capsules.capsule_distance`, unsigned and in single precision, written for vectorisation.
     """
     count = points.shape[0]
     each, least, which = out
-    # Single precision, coordinate by coordinate: twice as many points at a time, and tenths of micrometres are left.
+    # Single precision doubles the points per instruction. Its error is below a micrometre.
     px, py, pz = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
     for i in range(count):
         px[i], py[i], pz[i] = points[i, 0], points[i, 1], points[i, 2]
         least[i] = np.float32(1e9)
     nothing = np.float32(0.0)
     for k in range(capsules.body.shape[0]):
-        cx, cy, cz = np.float32(placed.start[k, 0]), np.float32(placed.start[k, 1]), np.float32(placed.start[k, 2])
-        ax, ay, az = np.float32(placed.axis[k, 0]), np.float32(placed.axis[k, 1]), np.float32(placed.axis[k, 2])
+        cx, cy, cz = np.float32(posed.start[k, 0]), np.float32(posed.start[k, 1]), np.float32(posed.start[k, 2])
+        ax, ay, az = np.float32(posed.axis[k, 0]), np.float32(posed.axis[k, 1]), np.float32(posed.axis[k, 2])
         length, radius = np.float32(capsules.length[k]), np.float32(capsules.radius[k])
         taper = np.float32(capsules.taper[k])
         lean = taper / np.float32(math.sqrt(1.0 - taper * taper))
@@ -136,16 +150,17 @@ def measure(points: Array, capsules: Capsules, placed: Placed, out: Distances) -
 def choose(
     cloud: PointCloud,
     capsules: Capsules,
-    placed: Placed,
+    posed: PosedCapsules,
     distances: Distances,
-    view: View,
+    rendered: RenderedHand,
     limits: tuple[float, float],
     correspondences: Correspondences,
 ) -> None:
-    """The nearest capsule whose closest point is seen and faces as observed; its point and normal into
-    `correspondences`.
+    """Write the closest point on the nearest admissible capsule to `correspondences`.
 
-    `limits`: reach (m) and agreement (cosine) of `matching.Surface`.
+    A capsule is admissible if its closest point is visible and its normal agrees with the observed one.
+
+    limits: largest distance (m) and smallest cosine between the normals, see `correspondences.Surface`.
     """
     x, n, normals = correspondences.x, correspondences.n, cloud.normals
     max_distance, min_normal_cosine = limits
@@ -153,12 +168,12 @@ def choose(
         correspondences.body[i] = -1
         k, distance = distances.which[i], distances.least[i]
         while distance < max_distance:
-            surface_point(cloud.points, i, capsules, placed, k, x, n)
+            surface_point(cloud.points, i, capsules, posed, k, x, n)
             same = n[i, 0] * normals[i, 0] + n[i, 1] * normals[i, 1] + n[i, 2] * normals[i, 2]
-            if same >= min_normal_cosine and not _hidden(x, i, view):
+            if same >= min_normal_cosine and not _hidden(x, i, rendered):
                 correspondences.body[i] = capsules.body[k]
                 break
-            # The next one further out.
+            # Continue with the next nearest capsule.
             passed, distance = distance, max_distance
             for j in range(capsules.body.shape[0]):
                 if passed < distances.each[j, i] < distance:
@@ -166,23 +181,26 @@ def choose(
 
 
 @numba.njit(cache=True, nogil=True)
-def surface_point(points: Array, i: int, capsules: Capsules, placed: Placed, k: int, x: Array, n: Array) -> None:
-    """The point of capsule k closest to point i, and the outward normal there, into row i of `x` and `n`.
+def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsules, k: int, x: Array, n: Array) -> None:
+    """Write the point of capsule k closest to point i, and its normal, to row i of `x` and `n`.
 
-    A point on the far side is replaced by its mirror image on the side that the camera sees.
+    x: (N, 3) metres, camera frame.
+    n: (N, 3) outward unit normals, camera frame.
+
+    A point on the far side is replaced by its mirror image on the visible side.
     """
     taper = capsules.taper[k]
     along = square = 0.0
     for j in range(3):
-        along += (points[i, j] - placed.start[k, j]) * placed.axis[k, j]
+        along += (points[i, j] - posed.start[k, j]) * posed.axis[k, j]
     for j in range(3):
-        square += (points[i, j] - placed.start[k, j] - along * placed.axis[k, j]) ** 2
+        square += (points[i, j] - posed.start[k, j] - along * posed.axis[k, j]) ** 2
     t = compiled_nearest_ball(along, math.sqrt(square), taper, capsules.length[k])
     radius = capsules.radius[k] - taper * t
     scale = 1 / max(math.sqrt(square + (along - t) ** 2), 1e-12)
     sight = square = 0.0
     for j in range(3):
-        x[i, j] = placed.start[k, j] + t * placed.axis[k, j]
+        x[i, j] = posed.start[k, j] + t * posed.axis[k, j]
         n[i, j] = (points[i, j] - x[i, j]) * scale
         sight += n[i, j] * x[i, j]
         square += x[i, j] * x[i, j]
@@ -194,12 +212,12 @@ def surface_point(points: Array, i: int, capsules: Capsules, placed: Placed, k: 
 
 
 @numba.njit(cache=True, nogil=True)
-def _hidden(x: Array, i: int, view: View) -> bool:
-    """Whether the rendered hand lies in front of a point."""
-    fx, fy, cx, cy = view.lens
+def _hidden(x: Array, i: int, rendered: RenderedHand) -> bool:
+    """Return whether the rendered hand hides row i of x (N, 3)."""
+    fx, fy, cx, cy = rendered.lens
     z = x[i, 2]
     u, v = round(x[i, 0] / z * fx + cx), round(x[i, 1] / z * fy + cy)
-    if 0 <= u < view.depth.shape[1] and 0 <= v < view.depth.shape[0]:
-        front = view.depth[v, u]
-        return front > 0 and z > front + view.hidden_depth
+    if 0 <= u < rendered.depth.shape[1] and 0 <= v < rendered.depth.shape[0]:
+        front = rendered.depth[v, u]
+        return front > 0 and z > front + rendered.hidden_depth
     return False

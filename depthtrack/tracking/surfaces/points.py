@@ -1,7 +1,7 @@
-"""Correspondences with a surface that is given by points with normals, among those that the camera can see.
+"""Correspondences with the visible points of a surface given by points with normals.
 
-The posed points that face the camera, and that no nearer one hides, are sorted into cells of the image. The search for
-an observed point visits the cells around its own until no other can hold a closer point.
+A posed point is visible if it faces the camera and no nearer point hides it. The visible points are sorted into cells
+of the image. The search visits the cells around an observed point until no other cell can contain a closer point.
 """
 
 import math
@@ -35,7 +35,7 @@ class SurfacePoints(NamedTuple):
 
 
 def subsample_evenly(points: Array, spacing: float) -> Index:
-    """Return rows of points (N, 3), in order, no two of which are closer than `spacing` (m)."""
+    """Return increasing rows of points (N, 3) that are at least `spacing` (m) apart."""
     tree, free, picked = cKDTree(points), np.ones(len(points), np.bool_), []
     for i in range(len(points)):
         if free[i]:
@@ -45,18 +45,22 @@ def subsample_evenly(points: Array, spacing: float) -> Index:
 
 
 class Posed(NamedTuple):
-    """Posed points `x` (V, 3), metres, and their outward unit normals `n` (V, 3), camera frame."""
+    """Points of a posed hand.
+
+    x: (V, 3) metres, camera frame.
+    n: (V, 3) outward unit normals, camera frame.
+    """
 
     x: Array
     n: Array
 
 
 class Visible(NamedTuple):
-    """The points that the camera sees, sorted by cell.
+    """Visible points sorted by cell.
 
-    first: (C + 1,) cell c holds the rows from first[c] up to first[c + 1].
+    first: (C + 1,) cell c contains the rows from first[c] up to first[c + 1].
     vertex: (S,) rows of the posed points.
-    table: (6, S + LANES) their coordinates, relative to `origin`, and normals; LANES far points end it.
+    table: (6, S + LANES) coordinates (m) relative to `origin`, and unit normals; the last LANES columns are padding.
     origin: (3,) metres, camera frame.
     """
 
@@ -67,7 +71,12 @@ class Visible(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of the image plane z = 1: (rows, columns) of side `size` from corner (`u`, `v`)."""
+    """Square cells of the image plane z = 1.
+
+    u, v: corner of the first cell.
+    size: side of a cell.
+    rows, columns: numbers of cells.
+    """
 
     u: float
     v: float
@@ -77,14 +86,14 @@ class Cells(NamedTuple):
 
 
 class PointSurface:
-    """A surface given by points: see `correspondences.Surface`."""
+    """Surface given by points: see `correspondences.Surface`."""
 
     def __init__(self, points: SurfacePoints, options: SurfaceOptions) -> None:
-        self._model, self._options = points, options
+        self._points, self._options = points, options
         self._posed = Posed(np.empty_like(points.rest), np.empty_like(points.rest))
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        self._reach = max_distance
+        self._max_distance = max_distance
         self._cells = cells_over(cloud.points, self._options.cell, max_distance)
 
     def match(
@@ -95,35 +104,35 @@ class PointSurface:
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        pose_points(self._model, bodies, self._posed)
-        visible = sort_visible(self._model, self._posed, self._cells, self._options.hidden_depth)
-        closest_vertices(cloud, visible, self._cells, self._reach, min_normal_cosine, correspondences.body)
-        resolve_bodies(self._model, self._posed, visible, correspondences)
+        pose_points(self._points, bodies, self._posed)
+        visible = sort_visible(self._posed, self._cells, self._options.hidden_depth)
+        closest_vertices(cloud, visible, self._cells, self._max_distance, min_normal_cosine, correspondences.body)
+        resolve_bodies(self._points, self._posed, visible, correspondences)
 
 
 @numba.njit(cache=True, nogil=True)
-def pose_points(model: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
-    """Pose points and normals by linear blend skinning."""
+def pose_points(points: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
+    """Write the posed points and normals to `posed`, by linear blend skinning."""
     A = np.empty((16, 12))
     for b in range(16):
-        T, R = bodies.T[b], model.T_body_rest[b]
+        T, R = bodies.T[b], points.T_body_rest[b]
         for i in range(3):
             for j in range(4):
                 A[b, 4 * i + j] = T[i, 0] * R[0, j] + T[i, 1] * R[1, j] + T[i, 2] * R[2, j]
             A[b, 4 * i + 3] += T[i, 3]
     m = np.empty(12)
-    for v in range(model.rest.shape[0]):
-        w, b = model.weights[v, 0], model.bodies[v, 0]
+    for v in range(points.rest.shape[0]):
+        w, b = points.weights[v, 0], points.bodies[v, 0]
         for j in range(12):
             m[j] = w * A[b, j]
         for k in range(1, 4):
-            w, b = model.weights[v, k], model.bodies[v, k]
+            w, b = points.weights[v, k], points.bodies[v, k]
             if w == 0.0:
                 break
             for j in range(12):
                 m[j] += w * A[b, j]
-        x, y, z = model.rest[v, 0], model.rest[v, 1], model.rest[v, 2]
-        nx, ny, nz = model.normals[v, 0], model.normals[v, 1], model.normals[v, 2]
+        x, y, z = points.rest[v, 0], points.rest[v, 1], points.rest[v, 2]
+        nx, ny, nz = points.normals[v, 0], points.normals[v, 1], points.normals[v, 2]
         length = 0.0
         for i in range(3):
             posed.x[v, i] = m[4 * i] * x + m[4 * i + 1] * y + m[4 * i + 2] * z + m[4 * i + 3]
@@ -137,8 +146,11 @@ def pose_points(model: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def cells_over(points: Array, size: float, margin: float) -> Cells:
-    """Cells over the image of points (N, 3) and `margin` (m) around it; `size` is a cell's side in metres at the
-    points' mean depth."""
+    """Return the cells that cover the image of points and a margin around it.
+
+    points: (N, 3) metres, camera frame.
+    size, margin: side of a cell and width of the margin, metres at the mean depth of the points.
+    """
     if points.shape[0] == 0:
         return Cells(0.0, 0.0, 1.0, 1, 1)
     low_u = low_v = 1e9
@@ -157,10 +169,10 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
 
 
 @numba.njit(cache=True, nogil=True)
-def sort_visible(model: SurfacePoints, posed: Posed, cells: Cells, tolerance: float) -> Visible:
-    """Find the vertices that the camera sees, and sort them by cell.
+def sort_visible(posed: Posed, cells: Cells, tolerance: float) -> Visible:
+    """Return the visible points, sorted by cell.
 
-    A vertex is hidden when it lies more than `tolerance` (m) behind the nearest one of its cell, or faces away.
+    A point is hidden if it faces away, or lies more than `tolerance` (m) behind the nearest point of its cell.
     """
     count = posed.x.shape[0]
     cell = np.empty(count, np.int64)
@@ -198,12 +210,14 @@ def sort_visible(model: SurfacePoints, posed: Posed, cells: Cells, tolerance: fl
 
 
 @numba.njit(cache=True, nogil=True)
-def resolve_bodies(model: SurfacePoints, posed: Posed, visible: Visible, correspondences: Correspondences) -> None:
-    """Complete the matches, whose `body` tells a visible vertex as yet: it counts as fixed to the body that moves it
-    most."""
+def resolve_bodies(points: SurfacePoints, posed: Posed, visible: Visible, correspondences: Correspondences) -> None:
+    """Replace the rows of visible points in `correspondences.body` by bodies; write `x` and `n`.
+
+    Each point counts as fixed to the body with its largest weight.
+    """
     for i in range(correspondences.body.shape[0]):
         if correspondences.body[i] >= 0:
             v = visible.vertex[correspondences.body[i]]
-            correspondences.body[i] = model.bodies[v, 0]
+            correspondences.body[i] = points.bodies[v, 0]
             for j in range(3):
                 correspondences.x[i, j], correspondences.n[i, j] = posed.x[v, j], posed.n[v, j]

@@ -1,4 +1,4 @@
-"""The 37 spheres and cylinders that hypotheses are rendered with, as a surface to fit."""
+"""Surface of the 37 spheres and cylinders that hypotheses are rendered with."""
 
 import numpy as np
 
@@ -44,7 +44,9 @@ def primitive_points(shape: HandShape, spacing: float) -> SurfacePoints:
 
 
 def sample_primitive(kind: int, T: Array) -> tuple[Array, Array]:
-    """Return points and outward unit normals (N, 3) of a unit primitive under T (4, 4), which may be projective.
+    """Return points and outward unit normals (N, 3) of a transformed unit primitive.
+
+    T: (4, 4) homogeneous transform, possibly projective.
 
     A quadric u^T Q u = 0 maps to x^T T^-T Q T^-1 x = 0, whose gradient is the normal.
     """

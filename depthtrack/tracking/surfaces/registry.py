@@ -20,7 +20,7 @@ def make_surface(
     renderer: backend that finds which cylinders are hidden.
 
     Raises:
-        InputError: no skin fits the sizes of the hand.
+        InputError: if no skin fits the sizes of the hand.
     """
     if name == "cylinders":
         return CapsuleSurface(hand, create_scorer(renderer, hand), options)

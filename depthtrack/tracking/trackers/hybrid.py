@@ -1,4 +1,7 @@
-"""The hybrid tracker: surface fits, and a small swarm whose best particles are fitted too, verified by rendering."""
+"""The hybrid tracker: surface fits, and a small swarm with fits of its best particles.
+
+Rendering verifies the fits.
+"""
 
 from dataclasses import replace
 

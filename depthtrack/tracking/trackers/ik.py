@@ -1,4 +1,4 @@
-"""The IK tracker: the hand's surface fitted to the point cloud (Schroeder et al. 2014, and beyond it)."""
+"""The IK tracker: fits of the hand's surface to the point cloud (Schroeder et al. 2014)."""
 
 from dataclasses import replace
 
@@ -15,14 +15,20 @@ from depthtrack.tracking.stages.surface_fit import RetryPredictions, SurfaceFit
 
 
 def ik(config: IkConfig, tools: Toolkit) -> Stages:
-    """Return the stages of the IK tracker: with all angles, with a synergy prior, or in synergies alone."""
+    """Return the stages of the IK tracker.
+
+    They fit all angles, all angles with a synergy prior, or synergies alone.
+    """
     if config.synergies.synergies is None:
         return _all_angles(config)
     return _synergy_prior(config, tools) if config.synergies.synergy_prior else _synergies_alone(config, tools)
 
 
 def _all_angles(config: IkConfig) -> Stages:
-    """Fit the best of some predictions; frames that fit poorly trigger the other ones, then searches."""
+    """Return the stages without synergies.
+
+    Frames that fit poorly trigger fits of the other predictions, then searches.
+    """
     fit = SurfaceFit(config.fit)
     search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
     fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
@@ -41,7 +47,7 @@ def _all_angles(config: IkConfig) -> Stages:
 
 
 def _synergy_prior(config: IkConfig, tools: Toolkit) -> Stages:
-    """Fit all angles, drawn to postures that the synergies make likely."""
+    """Return the stages that fit all angles with a prior from synergies."""
     fit = SurfaceFit(config.fit, Prior.from_synergies(tools.synergies, config.fit.icp.synergy_weight))
     near = FitSearch(config.local_search, config.fit)
     start: list[Stage] = [SearchGlobally(FitSearch(config.fit_search, config.fit), config.search), fit]
@@ -58,7 +64,10 @@ def _synergy_prior(config: IkConfig, tools: Toolkit) -> Stages:
 
 
 def _synergies_alone(config: IkConfig, tools: Toolkit) -> Stages:
-    """Fit the global pose and the synergies (Schroeder et al. 2014, Sec. V-A); their steps align the hand as well."""
+    """Return the stages that fit pose and synergies (Schroeder et al. 2014, Sec. V-A).
+
+    Their steps align the hand as well.
+    """
     prior = Prior.from_synergies(tools.synergies, config.fit.icp.synergy_weight)
     fit = SurfaceFit(config.fit, prior, subspace=PostureSubspace.of(tools.synergies))
     return Stages(

@@ -1,4 +1,7 @@
-"""The trackers as their papers describe them: no recovery, no surface fit in PSO, no rendering in IK's fit."""
+"""The trackers as in their papers.
+
+They have no recovery. The PSO tracker has no surface fit, and the IK tracker no rendering in its fit.
+"""
 
 from dataclasses import replace
 
@@ -16,7 +19,10 @@ from depthtrack.tracking.stages.swarm import Swarm, SwarmAround
 
 
 def oikonomidis2011(config: Oikonomidis2011Config, tools: Toolkit) -> Stages:
-    """Return the stages of Oikonomidis et al. 2011, Sec. 2.4: one swarm around the last solution."""
+    """Return the stages of Oikonomidis et al. 2011, Sec. 2.4.
+
+    One swarm searches around the last solution.
+    """
     return Stages(
         follow=[Swarm(config.swarm, config.spread, space="parameters")],
         start=[SearchGlobally(SwarmSearch(config.swarm_search), config.search)],
@@ -25,7 +31,10 @@ def oikonomidis2011(config: Oikonomidis2011Config, tools: Toolkit) -> Stages:
 
 
 def schroeder2014(config: Schroeder2014Config, tools: Toolkit) -> Stages:
-    """Return the stages of Schroeder et al. 2014, Sec. IV and V: linear prediction, then one fit."""
+    """Return the stages of Schroeder et al. 2014, Sec. IV and V.
+
+    One fit starts from the linear prediction.
+    """
     fit, given = SurfaceFit(config.fit), config.synergies.synergies is not None
     if given:
         subspace = FULL if config.synergies.synergy_prior else PostureSubspace.of(tools.synergies)

@@ -1,4 +1,4 @@
-"""The PSO tracker: one swarm of rendered hypotheses per frame (Oikonomidis et al. 2011, and beyond it)."""
+"""The PSO tracker: a swarm of rendered hypotheses per frame (Oikonomidis et al. 2011)."""
 
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.frame import Toolkit

@@ -1,4 +1,4 @@
-"""Posing the skin and finding its closest seen points, held to slow searches through all vertices."""
+"""Posed skin points and closest visible points, compared with searches over all vertices."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def cloud_near(posed: Posed, rng: np.random.Generator, count: int = 60, spread: float = 0.01) -> PointCloud:
-    """Points about the vertices that face the camera, with normals about theirs."""
+    """Return noisy points and normals at random vertices that face the camera."""
     facing = np.flatnonzero(np.einsum("vi,vi->v", posed.x, posed.n) < 0)
     pick = rng.choice(facing, count)
     normals = unit(posed.n[pick] + rng.normal(0, 0.3, (count, 3)))
@@ -42,7 +42,7 @@ def cloud_near(posed: Posed, rng: np.random.Generator, count: int = 60, spread: 
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_vertices_and_normals_are_blended_as_skinning_says(seed: int) -> None:
+def test_vertices_and_normals_equal_linear_blend_skinning(seed: int) -> None:
     pose = random_pose(np.random.default_rng(seed))
     posed = posed_hand(pose)
     weights = np.zeros((len(MODEL.rest), 16))
@@ -55,13 +55,13 @@ def test_vertices_and_normals_are_blended_as_skinning_says(seed: int) -> None:
     np.testing.assert_allclose(posed.n, unit(np.einsum("vij,vj->vi", blended[:, :, :3], MODEL.normals)), atol=1e-9)
 
 
-def test_four_bodies_a_vertex_are_as_good_as_all() -> None:
+def test_four_bodies_per_vertex_suffice() -> None:
     pose = random_pose(np.random.default_rng(1))
     posed = posed_hand(pose, mesh_points(SKIN))
     assert np.abs(posed.x - SKIN.at(pose)).max() < 2e-4
 
 
-def test_spread_points_are_apart_and_leave_no_gaps() -> None:
+def test_subsampled_points_are_apart_and_leave_no_gaps() -> None:
     points = np.random.default_rng(0).uniform(size=(400, 3))
     picked = surface.subsample_evenly(points, 0.2)
     distance = np.linalg.norm(points[:, None] - points[picked], axis=-1)
@@ -71,7 +71,7 @@ def test_spread_points_are_apart_and_leave_no_gaps() -> None:
 
 
 def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
-    """Vertices by cell."""
+    """Return the visible vertices of each cell."""
     in_cell: dict[int, list[int]] = {}
     for v, (x, n) in enumerate(zip(posed.x, posed.n, strict=True)):
         column, row = ((x[:2] / x[2] - [cells.u, cells.v]) // cells.size).astype(int)
@@ -84,11 +84,11 @@ def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_seen_vertices_are_sorted_by_cell(seed: int) -> None:
+def test_visible_vertices_are_sorted_by_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
     cells = surface.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
-    seen = surface.sort_visible(MODEL, posed, cells, TOLERANCE)
+    seen = surface.sort_visible(posed, cells, TOLERANCE)
     predicted_pose = _seen_slowly(posed, cells)
     assert seen.first[-1] == len(seen.vertex) == sum(map(len, predicted_pose.values()))
     for cell in range(cells.rows * cells.columns):
@@ -99,12 +99,12 @@ def test_seen_vertices_are_sorted_by_cell(seed: int) -> None:
     assert np.all(seen.table[:, len(seen.vertex) :] == closest.FAR)
 
 
-def test_what_another_finger_hides_is_not_seen() -> None:
-    """A flat hand seen from its side: its outer fingers hide the middle one."""
+def test_vertices_behind_another_finger_are_not_visible() -> None:
+    """The outer fingers of a flat hand hide the middle finger from the side."""
     flat = make_pose([0, 0, 0.5], [np.sqrt(0.5), 0, np.sqrt(0.5), 0], np.zeros(20))
     posed = posed_hand(flat)
     cells = surface.cells_over(posed.x, 0.004, 0.01)
-    seen = surface.sort_visible(MODEL, posed, cells, TOLERANCE)
+    seen = surface.sort_visible(posed, cells, TOLERANCE)
     facing = np.einsum("vi,vi->v", posed.x, posed.n) < 0
     middle = np.isin(MODEL.bodies[:, 0], [7, 8, 9])
     assert middle[seen.vertex].sum() < 0.5 * (facing & middle).sum()
@@ -117,7 +117,7 @@ def test_what_another_finger_hides_is_not_seen() -> None:
     min_normal_cosine=st.sampled_from([-1.1, 0.3, 0.9]),
     cell=st.sampled_from([0.002, 0.004, 0.02]),
 )
-def test_matches_are_the_closest_seen_vertices_that_agree(
+def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
     seed: int, max_distance: float, min_normal_cosine: float, cell: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -125,7 +125,7 @@ def test_matches_are_the_closest_seen_vertices_that_agree(
     cloud = cloud_near(posed, rng, spread=0.5 * max_distance)
     cells = surface.cells_over(cloud.points, cell, max_distance)
     seen, correspondences = (
-        surface.sort_visible(MODEL, posed, cells, TOLERANCE),
+        surface.sort_visible(posed, cells, TOLERANCE),
         Correspondences.allocate(len(cloud.points)),
     )
     closest.closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, correspondences.body)
@@ -138,7 +138,7 @@ def test_matches_are_the_closest_seen_vertices_that_agree(
 
     distance = np.linalg.norm(cloud.points[:, None] - posed.x[seen.vertex], axis=-1)
     same = cloud.normals @ posed.n[seen.vertex].T
-    # Single precision may see equal distances, and normals at the edge of agreement, either way.
+    # In single precision, equal distances and limiting normals may compare either way.
     least, most = (np.where(same < min_normal_cosine + slack, np.inf, distance).min(axis=1) for slack in (-1e-6, 1e-6))
     np.testing.assert_array_equal(found[least == most], (least < max_distance)[least == most])
     at = _index(seen, vertex)
@@ -149,7 +149,7 @@ def test_matches_are_the_closest_seen_vertices_that_agree(
 
 
 def _index(seen: Visible, vertex: np.ndarray) -> np.ndarray:
-    """Where vertices stand among the seen ones; anywhere for others."""
+    """Return the places of vertices among the visible ones, arbitrary for the others."""
     return np.asarray(np.argmax(seen.vertex == vertex[:, None], axis=1))
 
 

@@ -1,4 +1,4 @@
-"""The primitives as a surface to fit: its points lie on what the ray caster draws, with the normals of the quadrics."""
+"""Surface points of the primitives, compared with ray casting and the quadrics."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ SHAPES = {"average": HandShape(), "left, small": HandShape(side="left", scale=0.
 
 
 def implicit(kind: int, T: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the unit primitive's equation at points (N, 3): 0 on its curved surface, positive outside."""
+    """Return the quadric of a primitive at points (N, 3): 0 on the surface, positive outside."""
     unit = np.column_stack([x, np.ones(len(x))]) @ np.linalg.inv(T).T
     unit = unit[:, :3] / unit[:, 3:]
     return np.asarray((unit**2).sum(axis=1) - 1 if kind == SPHERE else (unit[:, :2] ** 2).sum(axis=1) - 1)
@@ -45,7 +45,7 @@ def posed(points: SurfacePoints, shape: HandShape, pose: np.ndarray) -> Posed:
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("posture", ["open", "grasp", "fist"])
-def test_visible_points_lie_where_the_ray_caster_draws_the_hand(name: str, posture: str) -> None:
+def test_visible_points_lie_on_the_ray_cast_surface(name: str, posture: str) -> None:
     shape, camera = SHAPES[name], Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
     pose = make_pose([0.01, 0.02, 0.45], [0.9, 0.2, 0.3, 0.1], POSTURES[posture])
     found, primitives = posed(primitive_points(shape, 0.026), shape, pose), Primitives.of(shape)
@@ -55,6 +55,6 @@ def test_visible_points_lie_where_the_ray_caster_draws_the_hand(name: str, postu
     drawn = depth[v, u]
     facing = np.einsum("vi,vi->v", found.n, found.x) / np.linalg.norm(found.x, axis=1) < -0.5
     gap = (found.x[:, 2] - drawn)[facing & (drawn > 0)]
-    # None lies before the drawn surface by more than the slope within a pixel; most of the visible ones lie on it.
+    # No point lies before the drawn surface by more than the slope within a pixel. Most visible points lie on it.
     assert gap.min() > -0.004
     assert np.median(np.abs(gap[gap < 0.004])) < 0.0008

@@ -1,4 +1,4 @@
-"""The hybrid tracker: accurate on both kinds of synthetic hand, and the same bits when resumed."""
+"""The hybrid tracker: accuracy on both kinds of synthetic hand, and resuming."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def follow(made: Synthesiser, frames: range) -> list[Estimate]:
 
 
 @pytest.mark.parametrize("hand", ["everyday", "everyday_skin"])
-def test_it_is_accurate_on_both_kinds_of_hand(hand: str, request: pytest.FixtureRequest) -> None:
+def test_joints_are_accurate_on_both_kinds_of_hand(hand: str, request: pytest.FixtureRequest) -> None:
     made: Synthesiser = request.getfixturevalue(hand)
     frames = range(100, 130)
     estimates = follow(made, frames)
@@ -48,7 +48,7 @@ def test_the_surface_that_was_drawn_is_chosen(hand: str, surface: str, request: 
         assert frame.surface == surface
 
 
-def test_a_tracker_that_restores_estimates_continues_with_the_same_bits(everyday: Synthesiser) -> None:
+def test_a_restored_tracker_returns_the_same_bits(everyday: Synthesiser) -> None:
     whole = follow(everyday, range(60, 68))
     resumed = create_tracker(HybridConfig(), HandShape())
     resumed.restore(whole[:5])

@@ -1,4 +1,4 @@
-"""The PSO tracker: accuracy on synthetic motion, start by itself, recovery, and the same bits however it is run."""
+"""The PSO tracker: accuracy on synthetic motion, initialisation, recovery and determinism."""
 
 from pathlib import Path
 
@@ -39,8 +39,8 @@ def errors_mm(made: Synthesiser, estimates: list[Estimate], frames: range) -> np
 
 
 @pytest.mark.parametrize(("name", "highest"), [("pso", 3.0), ("oikonomidis2011", 5.5)])
-def test_follows_everyday_motion(made: Synthesiser, name: str, highest: float) -> None:
-    """At the paper's budget and the sensor's resolution; the paper reports 5 mm on its own sequence."""
+def test_tracks_everyday_motion(made: Synthesiser, name: str, highest: float) -> None:
+    """The budget is that of the paper, which reports 5 mm on its own sequence."""
     frames = range(100, 150)
     tracker = create_tracker(tracker_config(name), HandShape())
     estimates = follow(made, tracker, frames)
@@ -50,13 +50,13 @@ def test_follows_everyday_motion(made: Synthesiser, name: str, highest: float) -
     assert set(estimates[1].stage_ms) == set(tracker.stages)
 
 
-def test_follows_noisy_readings() -> None:
+def test_tracks_noisy_readings() -> None:
     noisy, frames = Synthesiser(Synthesis(sensor="kinect1")), range(100, 130)
     estimates = follow(noisy, create_tracker(PsoConfig(), HandShape()), frames)
     assert errors_mm(noisy, estimates, frames).mean() < 4
 
 
-def test_the_skin_finishes_what_cylinders_cannot_fit(everyday_skin: Synthesiser) -> None:
+def test_the_skin_fit_halves_the_error_of_the_swarm(everyday_skin: Synthesiser) -> None:
     frames = range(100, 115)
     errors = {}
     for refine in (False, True):
@@ -67,7 +67,7 @@ def test_the_skin_finishes_what_cylinders_cannot_fit(everyday_skin: Synthesiser)
 
 
 @pytest.mark.parametrize("frame", [10, 150, 300])
-def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
+def test_initialises_without_a_pose(made: Synthesiser, frame: int) -> None:
     tracker = create_tracker(tracker_config("pso", resolution=64), HandShape())
     estimate = tracker.track(observe(made, frame))
     assert estimate.status is Status.STARTED
@@ -75,7 +75,7 @@ def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
 
 
 def test_a_hand_that_jumps_is_found_in_the_same_frame(made: Synthesiser) -> None:
-    """The jump moves the joints by more than 3 cm on average, which a swarm about the prediction does not cover."""
+    """The mean jump of the joints exceeds 3 cm, which the swarm does not cover."""
     tracker = create_tracker(tracker_config("pso", resolution=64), HandShape())
     *_, before = follow(made, tracker, range(10, 14))
     assert errors_mm(made, [before], range(300, 301))[0] > 30
@@ -84,7 +84,7 @@ def test_a_hand_that_jumps_is_found_in_the_same_frame(made: Synthesiser) -> None
     assert errors_mm(made, [found], range(300, 301))[0] < 5
 
 
-def test_the_same_bits_for_any_number_of_threads(made: Synthesiser) -> None:
+def test_poses_do_not_depend_on_the_number_of_threads(made: Synthesiser) -> None:
     poses = [
         np.array([e.pose for e in follow(made, create_tracker(PsoConfig(), HandShape(), threads), range(0, 4))])
         for threads in (1, 3)
@@ -92,7 +92,7 @@ def test_the_same_bits_for_any_number_of_threads(made: Synthesiser) -> None:
     np.testing.assert_array_equal(poses[0], poses[1])
 
 
-def test_seeds_matter(made: Synthesiser) -> None:
+def test_different_seeds_give_different_poses(made: Synthesiser) -> None:
     poses = [
         follow(made, create_tracker(tracker_config("pso", seed=seed), HandShape()), range(2))[1].pose for seed in (1, 2)
     ]
@@ -101,7 +101,7 @@ def test_seeds_matter(made: Synthesiser) -> None:
     assert not np.array_equal(poses[0], poses[1])
 
 
-def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) -> None:
+def test_a_restored_tracker_returns_the_same_bits(made: Synthesiser) -> None:
     options = tracker_config("pso", resolution=64)
     whole = follow(made, create_tracker(options, HandShape()), range(0, 8))
     resumed = create_tracker(options, HandShape())
@@ -113,7 +113,7 @@ def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) ->
 
 
 class _Recording:
-    """Frames of a synthetic motion; every eighth shows no hand."""
+    """Frames of a synthetic motion; one of eight shows no hand."""
 
     def __init__(self, made: Synthesiser, count: int) -> None:
         self.made, self.count = made, count
@@ -142,9 +142,7 @@ def run(made: Synthesiser, folder: Path, count: int, resume: bool = False) -> No
 
 
 @pytest.mark.parametrize("interrupted_after", [1, 4, 6, 7])
-def test_an_interrupted_run_ends_like_one_that_was_not(
-    made: Synthesiser, tmp_path: Path, interrupted_after: int
-) -> None:
+def test_a_resumed_run_equals_an_uninterrupted_one(made: Synthesiser, tmp_path: Path, interrupted_after: int) -> None:
     run(made, tmp_path / "whole", 12)
     run(made, tmp_path / "cut", interrupted_after)
     run(made, tmp_path / "cut", 12, resume=True)
@@ -155,7 +153,7 @@ def test_an_interrupted_run_ends_like_one_that_was_not(
     assert set(result.stage_ms) == {"segment", *create_tracker(PsoConfig(), HandShape()).stages}
 
 
-def test_absent_frames_forget_the_track(made: Synthesiser) -> None:
+def test_frames_without_a_hand_end_the_track(made: Synthesiser) -> None:
     tracker = create_tracker(tracker_config("pso", resolution=64), HandShape())
     follow(made, tracker, range(0, 3))
     tracker.restore([ABSENT])
@@ -163,6 +161,6 @@ def test_absent_frames_forget_the_track(made: Synthesiser) -> None:
 
 
 @pytest.mark.parametrize("pose", [np.zeros(26), np.full(27, np.nan)])
-def test_start_poses_of_the_wrong_form_are_refused(made: Synthesiser, pose: np.ndarray) -> None:
+def test_malformed_start_poses_are_rejected(made: Synthesiser, pose: np.ndarray) -> None:
     with pytest.raises(InputError, match="27 finite numbers"):
         create_tracker(PsoConfig(), HandShape()).start(observe(made, 0), pose)

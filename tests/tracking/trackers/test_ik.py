@@ -1,4 +1,4 @@
-"""The IK tracker: accuracy on the skin and on the cylinder model, start by itself, and the same bits when resumed."""
+"""The IK tracker: accuracy on skin and cylinders, initialisation, and resuming."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def follow(made: Synthesiser, tracker: StageTracker, frames: range) -> list[Esti
 
 
 @pytest.mark.parametrize(("model", "highest_mm", "highest_deg"), [("skin", 2.0, 2.0), ("cylinders", 5.0, 6.0)])
-def test_follows_everyday_motion_rendered_from_the_skin(
+def test_tracks_everyday_motion_rendered_from_the_skin(
     made: Synthesiser, model: SurfaceName, highest_mm: float, highest_deg: float
 ) -> None:
     """Five ICP iterations on a third of the points, as Schroeder et al. 2014 measure."""
@@ -50,15 +50,15 @@ def test_follows_everyday_motion_rendered_from_the_skin(
 
 
 @pytest.mark.parametrize("frame", [10, 150, 270])
-def test_starts_by_itself(made: Synthesiser, frame: int) -> None:
+def test_initialises_without_a_pose(made: Synthesiser, frame: int) -> None:
     estimate = create_tracker(IkConfig(), made.options.hand).track(observe(made, frame))
     assert estimate.status is Status.STARTED
     assert estimate.pose is not None
     assert endpoint_error(MODEL, estimate.pose[None], MODEL, made.poses[[frame]]).values[0] < 10
 
 
-def test_finds_the_hand_again_after_a_cut(made: Synthesiser) -> None:
-    """From its palm to its back."""
+def test_reinitialises_after_a_cut(made: Synthesiser) -> None:
+    """The view changes from the palm to the back of the hand."""
     tracker = create_tracker(IkConfig(), made.options.hand)
     tracker.start(observe(made, 30), made.poses[30])
     after = [tracker.track(observe(made, frame)) for frame in (92, 93, 94)]
@@ -67,7 +67,7 @@ def test_finds_the_hand_again_after_a_cut(made: Synthesiser) -> None:
     assert Status.STARTED in {estimate.status for estimate in after}
 
 
-def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
+def test_an_edge_on_hand_under_sensor_noise_stays_tracked() -> None:
     made = Synthesiser(Synthesis(model="skin", sensor="kinect1"))
     tracker = create_tracker(IkConfig(), made.options.hand)
     tracker.start(observe(made, 74), made.poses[74])
@@ -76,7 +76,7 @@ def test_what_a_noisy_sensor_sees_of_a_hand_edge_on_is_no_loss() -> None:
 
 @pytest.mark.parametrize("model", ["skin", "cylinders"])
 @pytest.mark.parametrize("readings", [0, 1, 5])
-def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(
+def test_a_frame_with_few_readings_is_lost_and_the_next_one_is_started(
     made: Synthesiser, model: SurfaceName, readings: int
 ) -> None:
     seen, tracker = observe(made, 0), create_tracker(tracker_config("ik", surface=model), made.options.hand)
@@ -88,8 +88,8 @@ def test_a_frame_with_hardly_a_reading_is_lost_and_the_next_one_is_not(
     assert tracker.track(observe(made, 1)).status is Status.STARTED
 
 
-def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
-    """A grasp seen from behind: with synergies of other grasps, drawn to or alone, angles err by half or less."""
+def test_synergies_reduce_the_errors_of_hidden_fingers() -> None:
+    """The camera is behind a grasp, and the synergies are fitted to other grasps."""
     made = Synthesiser(Synthesis(motion="grasp", model="skin"))
     synergies = _synergies_of("other-grasps")
     synergies = synergies.truncated(synergies.components_for(0.99))
@@ -108,7 +108,7 @@ def test_likely_postures_tell_of_fingers_that_the_hand_hides() -> None:
     assert mean_error(synergies, synergy_prior=True) < 0.6 * free
 
 
-def test_a_hierarchy_of_synergies_reads_a_sign_from_one_frame() -> None:
+def test_coarse_to_fine_synergies_estimate_a_sign_from_one_frame() -> None:
     made = Synthesiser(Synthesis(motion="signs", model="skin"))
     synergies, frames = _synergies_of("signs"), [16, 108, 330]
 
@@ -128,7 +128,7 @@ def _synergies_of(motion: str) -> Synergies:
     return Synergies.fit(Synthesiser(Synthesis(motion=motion)).poses[:, ANGLES])
 
 
-def test_a_tracker_that_recalls_goes_on_with_the_same_bits(made: Synthesiser) -> None:
+def test_a_restored_tracker_returns_the_same_bits(made: Synthesiser) -> None:
     whole = follow(made, create_tracker(IkConfig(), made.options.hand), range(0, 8))
     resumed = create_tracker(IkConfig(), made.options.hand)
     resumed.restore(whole[:5])
