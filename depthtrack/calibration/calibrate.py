@@ -35,11 +35,15 @@ class Measured:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibrated hand, and how well it fits.
+    """Calibrated hand and the quality of its fit.
 
-    measured: each length and width by name; side_margin: extra energy of the other side, a share, None if the side was
-    given; before_mm, after_mm: median distance of the observed points to the skin, of the average hand at its best and
-    of this hand; observations: the views; poses: (V, 27) of `hand` in them; poses_before: (V, 27) of the average hand;
+    measured: each length and width by name.
+    side_margin: extra energy of the other side, a share, None if the side was given.
+    before_mm, after_mm: median distance of the observed points to the skin, of the average hand at its best and of this
+        hand.
+    observations: the views.
+    poses: (V, 27) of `hand` in them.
+    poses_before: (V, 27) of the average hand.
     sure_margin: extra energy from which on the side is sure.
     """
 

@@ -25,7 +25,9 @@ from depthtrack.types import Array
 class JointFit:
     """Sizes and poses that fit all views.
 
-    values: (35,) sizes, see `parameters`; covariance: (35, 35) of the sizes given views and prior; poses: (V, 27);
+    values: (35,) sizes, see `parameters`.
+    covariance: (35, 35) of the sizes given views and prior.
+    poses: (V, 27).
     distances: (V,) metres, median distance of the points of each view to the skin.
     """
 

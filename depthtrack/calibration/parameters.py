@@ -31,7 +31,7 @@ Anat. Cell Biol. 57(2), 2024): beside those 6 %, by some 5 % of their own; and e
 _WIDTHS_SPREAD, _WIDTH_SPREAD = 0.10, 0.04
 """All fingers together, by build, and each by itself: finger breadths vary by 8 to 9 % (Greiner 1991)."""
 _PALM_SPREAD = (0.06, 0.06, 0.10)
-"""Hand breadth varies by 8 %, men and women together (Gordon et al.), and goes with length in part."""
+"""Hand breadth varies by 8 %, men and women together (Gordon et al.), and partly correlates with length."""
 _KNUCKLE_SPREAD, _THUMB_SPREAD = 0.003, 0.004
 """Metres; of the kind of the 3 mm by which metacarpals differ at the same hand length (Buryanov and Kotiuk 2010)."""
 

@@ -35,7 +35,7 @@ PATCH = 0.010
 
 
 class CalibrationView:
-    """The observation of one frame, prepared for many fits."""
+    """Observation of one frame, prepared for many fits."""
 
     def __init__(self, observation: Observation) -> None:
         self.observation = observation
@@ -53,7 +53,7 @@ class CalibrationView:
 
 
 class PosedSkin:
-    """The skin of a hand of given sizes, rendered in the views.
+    """Skin of a hand of given sizes, rendered in the views.
 
     By default it is the skin of the average hand, stretched along and across its bones, which is fast. `exact` builds
     the skin of the sizes.
@@ -103,8 +103,11 @@ class Evidence:
 class _Residuals:
     """Residuals of skin points along directions.
 
-    bodies: (N,); x: (N, 3) metres, camera frame; directions: (N, 3); errors: (N,) m, signed; distances: (N,) m, from
-    which the robust weights follow.
+    bodies: (N,).
+    x: (N, 3) metres, camera frame.
+    directions: (N, 3).
+    errors: (N,) m, signed.
+    distances: (N,) m, from which the robust weights follow.
     """
 
     bodies: Index

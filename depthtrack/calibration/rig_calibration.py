@@ -36,7 +36,7 @@ _CLIPPED = 0.04
 
 @dataclass(frozen=True)
 class RigCalibration:
-    """A rigged hand at the scale of a recording.
+    """Rigged hand at the scale of a recording.
 
     `side_margin`: relative extra energy of the other side.
     `before`, `after`: mean disagreement (0 to 1) at the rig's own scale and at the measured one.
@@ -76,7 +76,7 @@ def calibrate_rig(
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
 ) -> RigCalibration:
-    """Return a rigged hand scaled to the hand seen in `observations`, the most open hands first.
+    """Return a rigged hand scaled to the hand in `observations`, the most open hands first.
 
     `scorer` makes the scorer of a hand. Equal observations, seed and energies give an equal hand.
 
@@ -121,7 +121,7 @@ def calibrate_rig(
 
 
 class _ScaleFit:
-    """The disagreement of a rig and the observations as a function of its scale."""
+    """Disagreement of a rig and the observations as a function of its scale."""
 
     def __init__(self, rig: HandShape, observations: list[Observation], poses: Array) -> None:
         self.observations, self._rig, self._poses = observations, rig, poses

@@ -12,7 +12,8 @@ from depthtrack.types import Array, Index
 class PointCloud(NamedTuple):
     """Observed points with normals.
 
-    points: (N, 3) metres, camera frame; normals: (N, 3) unit, camera frame, towards the camera.
+    points: (N, 3) metres, camera frame.
+    normals: (N, 3) unit, camera frame, towards the camera.
     """
 
     points: Array
@@ -31,10 +32,11 @@ class PointCloud(NamedTuple):
 
 
 class Correspondences(NamedTuple):
-    """The point of the surface that corresponds to each observed point.
+    """Surface points that correspond to the observed points.
 
-    body: (N,) body that moves the surface there, -1 for no correspondence; x: (N, 3) metres, camera frame; n: (N, 3)
-    outward unit normal, camera frame.
+    body: (N,) body that moves the surface there, -1 for no correspondence.
+    x: (N, 3) metres, camera frame.
+    n: (N, 3) outward unit normal, camera frame.
     """
 
     body: Index
@@ -48,7 +50,7 @@ class Correspondences(NamedTuple):
 
 
 class Surface(Protocol):
-    """A surface of the hand that correspondences are searched on."""
+    """Surface of the hand, for searches of correspondences."""
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         """Prepare searches for the points of a cloud.

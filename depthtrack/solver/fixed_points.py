@@ -17,8 +17,10 @@ from depthtrack.types import Array, Index
 class FixedPoints(NamedTuple):
     """Points fixed to bodies, with their measured positions.
 
-    body: (N,) body that moves the point; local: (N, 3) metres, frame of that body; target: (N, 3) metres, camera frame;
-    direction: (N, 3) unit, camera frame: the residual counts along it, or in all three coordinates if it is zero;
+    body: (N,) body that moves the point.
+    local: (N, 3) metres, frame of that body.
+    target: (N, 3) metres, camera frame.
+    direction: (N, 3) unit, camera frame: the residual counts along it, or in all three coordinates if it is zero.
     weight: (N,) factor of the squared residual, 0 for a missing point.
     """
 
@@ -43,8 +45,11 @@ class FixedPoints(NamedTuple):
     ) -> "FixedPoints":
         """Return the block of these points; a point without a finite target is missing.
 
-        bodies: (N,); local_points: (N, 3) metres, body frames; targets: (N, 3) metres, camera frame, NaN if missing;
-        weights: (N,) at least 0, 1 by default; directions: (N, 3) unit, all three coordinates by default.
+        bodies: (N,).
+        local_points: (N, 3) metres, body frames.
+        targets: (N, 3) metres, camera frame, NaN if missing.
+        weights: (N,) at least 0, 1 by default.
+        directions: (N, 3) unit, all three coordinates by default.
 
         Raises:
             ValueError: if a body is not one of the 16, or if the arrays differ in length.

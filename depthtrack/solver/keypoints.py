@@ -41,7 +41,8 @@ class KeypointFitOptions:
 class FittedPoses:
     """Poses fitted to keypoints; NaN for hands with fewer than three known ones.
 
-    poses: (N, 27) within the limits; residuals: (N,) root mean square distance to the known keypoints, metres.
+    poses: (N, 27) within the limits.
+    residuals: (N,) root mean square distance to the known keypoints, metres.
     """
 
     poses: Array

@@ -26,7 +26,7 @@ _SCHROEDER = "Schroeder et al. 2014"
 
 @dataclass(frozen=True)
 class IcpOptions:
-    """How the hand is fitted to a point cloud (Schroeder et al. 2014, Sec. IV)."""
+    """ICP fit of the hand to a point cloud (Schroeder et al. 2014, Sec. IV)."""
 
     icp_iterations: int = option(5, "Rounds of correspondences per fit", source=f"{_SCHROEDER}, Fig. 8")
     gn_iterations: int = option(5, "Gauss-Newton steps per round, at most")
@@ -88,7 +88,7 @@ PAPER_ICP = IcpOptions(
 
 @dataclass(frozen=True)
 class SurfaceOptions:
-    """How a surface is sampled, and which of its points are visible."""
+    """Sampling of a surface, and visibility of its points."""
 
     spacing: float = option(
         0.026,
@@ -109,7 +109,7 @@ class SurfaceOptions:
 
 @dataclass(frozen=True)
 class SurfaceFitOptions:
-    """How one stage fits the hand's surface to the point cloud."""
+    """Fit of the hand's surface to the point cloud in one stage."""
 
     surface: SurfaceName = option(
         "skin", "Surface to fit: the skin mesh, tapered cylinders with round ends, or the 37 rendered primitives"
@@ -139,7 +139,7 @@ def constriction(cognitive: float, social: float) -> float:
 
 @dataclass(frozen=True)
 class SwarmOptions:
-    """How a particle swarm searches (Oikonomidis et al. 2011, Sec. 2.4)."""
+    """Particle swarm (Oikonomidis et al. 2011, Sec. 2.4)."""
 
     particles: int = option(64, "Particles of the swarm", source="Oikonomidis et al. 2011, Fig. 2a")
     generations: int = option(25, "Generations of the swarm", source="Oikonomidis et al. 2011, Fig. 2a")

@@ -22,7 +22,7 @@ from depthtrack.types import Array
 
 
 class SolverStatus(IntEnum):
-    """The reason for which a solver stopped.
+    """Reason why the solver stopped.
 
     CONVERGED: the last step, or the decrease of the energy by it, fell below its tolerance. NO_PROGRESS: no halved step
     decreased the energy. ITERATION_LIMIT: all iterations were used. SINGULAR: the damped normal equations were not
@@ -98,10 +98,13 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved problem.
+    """Solution of a problem.
 
-    pose: (27,); status: why the solver stopped; iterations: accepted steps; energy: m^2, prior included; trace:
-    (iterations + 1,) m^2, the energy at the start and after each step.
+    pose: (27,).
+    status: why the solver stopped.
+    iterations: accepted steps.
+    energy: m^2, prior included.
+    trace: (iterations + 1,) m^2, the energy at the start and after each step.
     """
 
     pose: Array

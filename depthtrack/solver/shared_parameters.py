@@ -16,10 +16,12 @@ from depthtrack.types import Array, Mask
 
 @dataclass(frozen=True)
 class EliminatedPose:
-    """The normal equations of m shared parameters after the pose of one view is eliminated.
+    """Normal equations of m shared parameters after elimination of the pose of one view.
 
-    step: (26,) of the pose if the shared parameters stay; step_by_shared: (26, m) its change with them; information:
-    (m, m); gradient: (m,).
+    step: (26,) of the pose if the shared parameters stay.
+    step_by_shared: (26, m) its change with them.
+    information: (m, m).
+    gradient: (m,).
     """
 
     step: Array

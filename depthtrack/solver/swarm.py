@@ -15,7 +15,7 @@ from depthtrack.types import Array
 
 
 class Optimum(NamedTuple):
-    """The best position of each particle of a swarm.
+    """Best positions of the particles of a swarm.
 
     positions: (N, D) best position of each particle.
     energies: (N,) their energies.

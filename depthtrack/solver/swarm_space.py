@@ -31,7 +31,10 @@ class SwarmSpace(Protocol):
 
 
 class ParameterSpace:
-    """The 27 pose parameters with a redundant quaternion (Oikonomidis et al. 2011, Sec. 2.4)."""
+    """Space of the 27 pose parameters (Oikonomidis et al. 2011, Sec. 2.4).
+
+    The quaternion is redundant.
+    """
 
     fingers = ANGLES
 

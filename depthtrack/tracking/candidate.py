@@ -10,7 +10,7 @@ from depthtrack.types import Array
 
 
 class Candidate(NamedTuple):
-    """A pose that was scored.
+    """Scored pose.
 
     pose: (27,) pose vector, camera frame.
     energy: E of Oikonomidis et al. 2011, Eq. (1).

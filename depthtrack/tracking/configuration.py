@@ -30,9 +30,9 @@ _LOCAL_FITS = FitSearchOptions(
 _FIT_RECOVERY = RecoveryOptions(
     good_energy=0.3, proposals=3000, min_angle=0.0, accept_local=0.9, doubt_confidence=0.5, doubt_energy=0.4
 )
-"""When they search locally."""
+"""Conditions of their local search."""
 _FIT_FINGERS = FingerOptions(resolution=96, stop_early=False)
-"""How they search single fingers."""
+"""Search of single fingers."""
 
 
 @dataclass(frozen=True)

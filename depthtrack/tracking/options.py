@@ -23,7 +23,7 @@ def damped_swarm(particles: int, generations: int) -> SwarmOptions:
 
 @dataclass(frozen=True)
 class TrackingThresholds:
-    """When a pose is trusted, and when it may guide the segmentation.
+    """Conditions for a trusted pose, and for one that guides the segmentation.
 
     The median term adapts to hands whose shape differs from the model: their energy is high in every frame.
     """
@@ -52,7 +52,7 @@ class SwarmRound:
 
 @dataclass(frozen=True)
 class SwarmSearchOptions:
-    """A search by ever fewer and finer swarms (Oikonomidis et al. 2011, Sec. 3)."""
+    """Search by rounds of fewer and finer swarms (Oikonomidis et al. 2011, Sec. 3)."""
 
     rounds: tuple[SwarmRound, ...] = option(
         (
@@ -81,7 +81,7 @@ class FitRound:
 
 @dataclass(frozen=True)
 class FitSearchOptions:
-    """A search by surface fits of ever fewer poses (after Schroeder et al. 2014, Sec. V-B)."""
+    """Search by rounds of surface fits of fewer poses (after Schroeder et al. 2014, Sec. V-B)."""
 
     rounds: tuple[FitRound, ...] = option(
         (FitRound(48, 8, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12)), "Rounds"
@@ -90,7 +90,7 @@ class FitSearchOptions:
 
 @dataclass(frozen=True)
 class GlobalSearchOptions:
-    """Where a search starts if no pose is known: any orientation that the forearm allows."""
+    """Global search without a known pose, over the orientations that the forearm allows."""
 
     proposals: int = option(4000, "Poses scored first")
     min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
@@ -112,7 +112,7 @@ class GlobalSearchOptions:
 
 @dataclass(frozen=True)
 class RecoveryOptions:
-    """When other poses are tried for a frame that fits poorly, and which of them are accepted.
+    """Local search of frames that fit poorly: triggers, proposals and acceptance.
 
     Ratios compare the energy of the new pose with that of the old one.
     """
@@ -134,7 +134,7 @@ class RecoveryOptions:
 
 @dataclass(frozen=True)
 class FingerOptions:
-    """How the posture of a single finger is searched."""
+    """Search of the posture of a single finger."""
 
     proposals: int = option(96, "Postures of one finger that are scored together")
     kept: int = option(8, "Postures that lead to the next ones")
@@ -159,7 +159,7 @@ class SynergyOptions:
 
 @dataclass(frozen=True)
 class SurfaceChoiceOptions:
-    """Which surface the fits of a frame use."""
+    """Choice of the surface that the fits of a frame use."""
 
     surfaces: tuple[SurfaceName, ...] = option(
         ("skin", "primitives"), "Surfaces to choose from, the preferred one first"
@@ -172,7 +172,7 @@ class SurfaceChoiceOptions:
 
 @dataclass(frozen=True)
 class SwarmProposalOptions:
-    """A small swarm whose best particles are fitted to the surface."""
+    """Small swarm with surface fits of its best particles."""
 
     swarm: SwarmOptions = option(damped_swarm(32, 8), "Swarm of each frame")
     spread: Spread = option(

@@ -37,7 +37,7 @@ Start = Literal["auto", "truth"]
 
 @dataclass(frozen=True)
 class RunConfiguration:
-    """A recording, a hand, a tracker with its options, and the settings of the run.
+    """Recording, hand, tracker with its options, and settings of a run.
 
     sequence: path of the recording.
     camera, hand: contents of `camera.json` and `hand.json`.

@@ -21,7 +21,7 @@ MIDDLE_ABDUCTION = ANGLE_NAMES.index("middle_mcp_abduction")
 
 
 def random_poses(seed: int, count: int) -> np.ndarray:
-    """Anywhere, turned anyhow, with angles anywhere within their limits."""
+    """Return random poses with angles within the limits."""
     rng = np.random.default_rng(seed)
     return make_pose(
         rng.uniform([-0.3, -0.3, 0.3], [0.3, 0.3, 0.9], (count, 3)),

@@ -33,7 +33,7 @@ def markers(seed: int) -> np.ndarray:
 
 
 def block(seed: int, directed: bool) -> tuple[FixedPoints, np.ndarray]:
-    """Random points of a random pose, near their targets, some missing."""
+    """Return random points of a random pose near their targets, some missing."""
     rng = np.random.default_rng(seed)
     pose, local = random_pose(rng), markers(seed)
     targets = HAND.transform_points(pose, MARKERS, local) + rng.normal(0, 0.01, local.shape)
@@ -45,7 +45,7 @@ def block(seed: int, directed: bool) -> tuple[FixedPoints, np.ndarray]:
 
 
 def dense_residuals(points: FixedPoints, pose: np.ndarray) -> np.ndarray:
-    """(N, 3) weighted residuals: all three coordinates, or the one along the direction."""
+    """Return weighted residuals (N, 3): all coordinates, or the one along the direction."""
     gap = HAND.transform_points(pose, points.body, points.local) - points.target
     along = np.sum(gap * points.direction, axis=1, keepdims=True) * points.direction
     whole = ~points.direction.any(axis=1, keepdims=True)

@@ -29,7 +29,7 @@ from depthtrack.types import Array
 
 @dataclass(frozen=True)
 class CoarseToFine:
-    """The hierarchy of rounds for the posture of a single frame.
+    """Rounds of the coarse-to-fine fit for the posture of a single frame.
 
     samples: postures from which the first round takes the best; one sample is the mean posture.
     min_difference: least root mean square difference (rad) between the postures that continue.

@@ -89,7 +89,7 @@ def swarm_search(
 
 @dataclass(frozen=True)
 class FitSearch:
-    """Search by surface fits of ever fewer poses."""
+    """Search by rounds of surface fits of fewer poses."""
 
     options: FitSearchOptions
     surface: SurfaceFitOptions
