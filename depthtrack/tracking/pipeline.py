@@ -7,7 +7,7 @@ Runs, replay, segmentation figures, comparison, examples and live use all consum
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
@@ -17,7 +17,7 @@ from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunRow, RunWriter
 from depthtrack.recording.sequence import Frame
-from depthtrack.segmentation.hand_size import HandSize
+from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
@@ -134,11 +134,15 @@ def segment(
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
-    """Return the ROI prior of a hand in `pose` (27,); None without a pose."""
+    """Return the ROI prior of a hand in `pose` (27,); None without a pose.
+
+    Only the reach is the hand's own. With the palm sizes of a calibrated hand the IK tracker lost 22 of 1600 frames of
+    a real recording, with average sizes 3.
+    """
     if pose is None:
         return None
     wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return RoiPrior(pose[POSITION].copy(), wrist, HandSize.of(model.shape))
+    return RoiPrior(pose[POSITION].copy(), wrist, replace(AVERAGE_HAND, reach=HandSize.of(model.shape).reach))
 
 
 def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:
