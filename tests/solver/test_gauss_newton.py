@@ -19,7 +19,6 @@ from depthtrack.solver import problem as problems
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import minimise
-from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.solver.normal_equations import NormalEquations
 from depthtrack.solver.options import Residual
 from depthtrack.solver.prior import Prior, add_prior, reduced_precision
@@ -157,17 +156,6 @@ def test_the_limit_slope_agrees_with_finite_differences(low: float, width: float
     assert math.isfinite(limit_gradient(low, low, high))
 
 
-@given(seed=SEEDS, size=st.integers(1, 26))
-def test_cholesky_agrees_with_numpy(seed: int, size: int) -> None:
-    rng = np.random.default_rng(seed)
-    factor, b = rng.normal(size=(size + 2, size)), rng.normal(size=size)
-    A = factor.T @ factor
-    expected, x = np.linalg.solve(A, b), b.copy()
-    assert cholesky_solve(A.copy(), x)
-    np.testing.assert_allclose(A @ x, b, atol=1e-9 * max(1, float(np.abs(expected).max())) * np.abs(A).max())
-    assert not cholesky_solve(A - (np.linalg.eigvalsh(A)[0] + 0.1) * np.eye(size), b.copy())
-
-
 def solved(problem: Problem, space: PostureSubspace, prior: Prior, options: SolverOptions) -> Solution:
     return minimise(problems.Problem(CHAIN, problem.equations, NO_POINTS, prior, space), options, problem.pose)
 
@@ -243,19 +231,6 @@ def test_undetermined_parameters_are_singular() -> None:
     assert solution.status == SolverStatus.SINGULAR
     assert solution.iterations == 0
     assert not solution.converged
-
-
-@given(seed=SEEDS, size=st.integers(2, 12))
-def test_a_held_parameter_leaves_the_system_of_the_others(seed: int, size: int) -> None:
-    rng = np.random.default_rng(seed)
-    factor, b = rng.normal(size=(size + 2, size)), rng.normal(size=size)
-    A, held = factor.T @ factor, int(rng.integers(size))
-    others = np.delete(np.arange(size), held)
-    expected = np.linalg.solve(A[np.ix_(others, others)], b[others])
-    hold_parameter(A, b, held)
-    x = np.linalg.solve(A, b)
-    assert x[held] == 0
-    np.testing.assert_allclose(x[others], expected, rtol=1e-9)
 
 
 def _pulled_up(by: float) -> Problem:
