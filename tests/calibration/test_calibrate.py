@@ -133,7 +133,7 @@ def test_a_side_with_a_small_margin_is_not_sure(calibration: Calibration, margin
     found = replace(calibration, side_margin=margin, measured=certain)
     assert summary(found)["side_sure"] == sure
     text = _text(found, Path("hand.json"), Path("hand.png"))
-    assert ("side not sure; give --side" in text) == (not sure)
+    assert ("the side is uncertain; give --side" in text) == (not sure)
     assert "0.99" in text
     assert "1.00\n" not in text
 
@@ -199,5 +199,5 @@ def test_recordings_without_a_hand_are_rejected(tmp_path: Path, capsys: pytest.C
     assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
     assert "calibrating needs at least 3 frames" in capsys.readouterr().err
     assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2
-    assert "is a folder: name a file in it" in capsys.readouterr().err
+    assert "name a file in it" in capsys.readouterr().err
     assert not (tmp_path / "hand.json").exists()
