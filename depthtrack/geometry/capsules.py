@@ -4,6 +4,8 @@ The surface between the balls is the cone that touches them. Its normal leans to
 ball is not the one straight across the axis. Functions take scalars or arrays; the `compiled_` forms serve kernels.
 """
 
+import math
+
 import numba
 import numpy as np
 
@@ -29,4 +31,8 @@ def capsule_distance(along: Array, across: Array, radius: float, taper: float, l
     return np.sqrt((along - t) ** 2 + across**2) - (radius - taper * t)
 
 
-compiled_nearest_ball = numba.njit(cache=True, nogil=True)(nearest_ball)
+@numba.njit(cache=True, nogil=True, inline="always")
+def compiled_nearest_ball(along: float, across: float, taper: float, length: float) -> float:
+    """Return `nearest_ball` of one point. It is inlined because a call per point takes a quarter of an IK frame."""
+    t = along - across * taper / math.sqrt(1.0 - taper * taper)
+    return min(max(t, 0.0), length)
