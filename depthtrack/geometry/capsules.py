@@ -33,6 +33,9 @@ def capsule_distance(along: Array, across: Array, radius: float, taper: float, l
 
 @numba.njit(cache=True, nogil=True, inline="always")
 def compiled_nearest_ball(along: float, across: float, taper: float, length: float) -> float:
-    """Return `nearest_ball` of one point. It is inlined because a call per point takes a quarter of an IK frame."""
+    """Return `nearest_ball` of one point.
+
+    Inlined, because a call per point takes a quarter of an IK frame.
+    """
     t = along - across * taper / math.sqrt(1.0 - taper * taper)
     return min(max(t, 0.0), length)
