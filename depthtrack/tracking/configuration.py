@@ -107,7 +107,7 @@ class HybridConfig:
         1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
     )
     retry_energy: float = option(0.05, "Added to that multiple", unit="clamp", advanced=True)
-    proposals: SwarmProposalOptions = option(SwarmProposalOptions(), "Swarm of each frame")
+    proposals: SwarmProposalOptions = option(SwarmProposalOptions(), "Swarm of frames whose energy rises")
     search: GlobalSearchOptions = option(
         _GLOBAL_FITS,
         "Global search",
