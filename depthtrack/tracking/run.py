@@ -10,8 +10,9 @@ from typing import Any
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.read_ahead import read_ahead
 from depthtrack.recording.run_folder import RunWriter
-from depthtrack.recording.sequence import Sequence
+from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import TrackerConfig
@@ -63,8 +64,9 @@ class TrackingRun(Closing):
         threads: int = 1,
         wrap: Callable[[Tracker], Tracker] = lambda tracker: tracker,
         clock: Callable[[], float] = time.perf_counter,
+        ahead: int = 2,
     ) -> None:
-        self.configuration, self.sequence = configuration, sequence
+        self.configuration, self.sequence, self._ahead = configuration, sequence, ahead
         self.hand = configuration.hand_shape()
         self._clock, self._start_pose = clock, true_start(sequence) if configuration.start == "truth" else None
         self.tracker = wrap(create_tracker(configuration.tracker, self.hand, threads))
@@ -76,7 +78,7 @@ class TrackingRun(Closing):
 
     def track(self) -> Iterator[TrackedFrame]:
         """Yield each frame as it is tracked."""
-        return track_frames(islice(self.sequence, len(self)), self._pipeline(self._start_pose))
+        return track_frames(self._frames(), self._pipeline(self._start_pose))
 
     def write(self, folder: Path, resume: bool = False) -> Iterator[TrackedFrame]:
         """Yield each frame after it is tracked and appended to a run folder.
@@ -91,7 +93,10 @@ class TrackingRun(Closing):
             known = estimates_of(run.rows)
             awaiting = all(estimate.pose is None for estimate in known)
             pipeline = self._pipeline(self._start_pose if awaiting else None)
-            yield from write_run(track_frames(islice(self.sequence, len(self)), pipeline, known), run)
+            yield from write_run(track_frames(self._frames(), pipeline, known), run)
+
+    def _frames(self) -> Iterator[Frame]:
+        return read_ahead(islice(self.sequence, len(self)), self._ahead)
 
     def _pipeline(self, start_pose: Array | None) -> Pipeline:
         segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)

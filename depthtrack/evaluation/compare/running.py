@@ -151,7 +151,7 @@ def track_cell(cell: Cell) -> Row:
     # Other runs use the other cores.
     cv2.setNumThreads(1)
     sequence, folder = plan.source.open(), Path(plan.folder)
-    with TrackingRun(plan.configuration(sequence), sequence, wrap=CpuTimed, clock=time.process_time) as run:
+    with TrackingRun(plan.configuration(sequence), sequence, wrap=CpuTimed, clock=time.process_time, ahead=0) as run:
         tracked_now = sum(1 for _ in run.write(folder, resume=True))
         done = {"frames": len(read_rows(folder)), "damaged": [asdict(damage) for damage in sequence.damaged]}
     write_atomic(folder / DONE, json.dumps(done) + "\n")
