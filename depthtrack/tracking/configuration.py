@@ -33,6 +33,14 @@ _FIT_RECOVERY = RecoveryOptions(
 """Conditions of their local search."""
 _FIT_FINGERS = FingerOptions(resolution=96, stop_early=False)
 """Search of single fingers."""
+_HYBRID_SEARCH = replace(_GLOBAL_FITS, good_ratio=1.2)
+"""Global search of the hybrid tracker. A track's median energy states what a good one is."""
+_HYBRID_RECOVERY = replace(_FIT_RECOVERY, elevated_ratio=1.1)
+"""Its conditions of a local search."""
+_HYBRID_FINGERS = replace(_FIT_FINGERS, turns=2, usual_turns=6, shift_iterations=3)
+"""Its search of single fingers."""
+_ROUTINE_FITS = FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 4), FitRound(1, None, 8)))
+"""Surface fits of its routine local search."""
 
 
 @dataclass(frozen=True)
@@ -109,13 +117,13 @@ class HybridConfig:
     retry_energy: float = option(0.05, "Added to that multiple", unit="clamp", advanced=True)
     proposals: SwarmProposalOptions = option(SwarmProposalOptions(), "Swarm of frames whose energy rises")
     search: GlobalSearchOptions = option(
-        _GLOBAL_FITS,
+        _HYBRID_SEARCH,
         "Global search",
         advanced=True,
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     recovery: RecoveryOptions = option(
-        _FIT_RECOVERY,
+        _HYBRID_RECOVERY,
         "Local re-initialisation",
         advanced=True,
     )
@@ -124,7 +132,8 @@ class HybridConfig:
         "Surface fits of a local search",
         advanced=True,
     )
-    fingers: FingerOptions = option(_FIT_FINGERS, "Search of single fingers", advanced=True)
+    routine_search: FitSearchOptions = option(_ROUTINE_FITS, "Surface fits of a routine local search", advanced=True)
+    fingers: FingerOptions = option(_HYBRID_FINGERS, "Search of single fingers", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")

@@ -106,6 +106,7 @@ class GlobalSearchOptions:
         0.17, "Cosine of the largest bend of a wrist, 80 degrees", source="Greene and Heckman 1994"
     )
     good_energy: float = option(0.2, "An energy that ends the search", unit="clamp")
+    good_ratio: float = option(0.0, "Multiple of the track's median energy that ends the search too")
     attempts: int = option(3, "Repetitions, at most")
     min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
 
@@ -118,8 +119,14 @@ class RecoveryOptions:
     """
 
     good_energy: float = option(0.2, "Frames with a lower energy are left alone", unit="clamp")
-    every: int = option(5, "Search locally in every n-th frame; 0 only in doubtful frames", unit="frames")
+    every: int = option(
+        5, "Search locally in every n-th frame if its energy is elevated; 0 only in doubtful frames", unit="frames"
+    )
     proposals: int = option(4000, "Poses near the last one that a local search scores")
+    routine_proposals: int = option(500, "Poses that it scores in a frame that is not doubtful, if it is smaller there")
+    elevated_ratio: float = option(
+        0.0, "Multiple of the track's median energy above which an energy is elevated; 0: any is"
+    )
     position_spread: float = option(0.02, "Standard deviation of their position", unit="m")
     rotation_spread: float = option(0.3, "Standard deviation of their rotation", unit="rad")
     angle_spread: float = option(0.15, "Standard deviation of their angles about typical postures", unit="rad")
@@ -141,6 +148,14 @@ class FingerOptions:
     spreads: tuple[float, ...] = option((0.2, 0.1), "Standard deviations of the following postures", unit="rad")
     resolution: int | None = option(None, "Longest side at which they are rendered; that of the scorer if absent")
     stop_early: bool = option(True, "Stop as soon as the energy is good")
+    shift_iterations: int = option(0, "Rounds of a first, coarse fit of shifted fingers; 0: one full fit at once")
+    shift_margin: float = option(1.1, "Energy ratio below which a coarse fit of shifted fingers is continued")
+    turns: int = option(1, "Frames over which the fingers and the shifts are searched in turn", unit="frames")
+    usual_turns: int = option(1, "The same in frames whose energy is not elevated", unit="frames")
+
+    def __post_init__(self) -> None:
+        if min(self.turns, self.usual_turns) < 1:
+            raise InputError(f"turns and usual_turns must be at least 1, found {self.turns} and {self.usual_turns}")
 
 
 @dataclass(frozen=True)
@@ -165,9 +180,9 @@ class SurfaceChoiceOptions:
         ("skin", "primitives"), "Surfaces to choose from, the preferred one first"
     )
     good_residual: float = option(0.02, "Residual below which no other surface is tried; robust cost, 0 to 1")
-    iterations: int = option(2, "Rounds of correspondences of each brief fit")
+    iterations: int = option(3, "Rounds of correspondences of each brief fit")
     scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
-    accept: float = option(0.8, "Residual ratio below which another surface than the preferred one is used")
+    accept: float = option(0.85, "Residual ratio below which another surface than the preferred one is used")
 
 
 @dataclass(frozen=True)

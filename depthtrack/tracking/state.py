@@ -46,10 +46,18 @@ class TrackState:
 
         most_energy: multiple of `Objective.clamp`.
         """
-        median = float(np.median(self._energies)) if self._energies else np.inf
         return confidence < least_confidence or energy > max(
-            most_energy * self._clamp, self._thresholds.lost_ratio * median
+            most_energy * self._clamp, self._thresholds.lost_ratio * self.median_energy
         )
+
+    @property
+    def median_energy(self) -> float:
+        """Median energy of the last trusted poses; infinity before the first one."""
+        return float(np.median(self._energies)) if self._energies else np.inf
+
+    def is_elevated(self, energy: float, ratio: float) -> bool:
+        """Return whether an energy exceeds `ratio` times the median energy; always at ratio 0."""
+        return ratio == 0 or energy > ratio * self.median_energy
 
     def commit(
         self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
@@ -66,8 +74,9 @@ class TrackState:
             self.update(estimate)
 
     def forget_last(self) -> None:
-        """Remove the last pose, so that a new track may start anywhere."""
+        """Remove the last pose and the energies, so that a new track may start anywhere."""
         self.pose, self.last_trusted = None, None
+        self._energies.clear()
 
     def update(self, estimate: Estimate) -> None:
         """Update the state with the estimate of the next frame."""
@@ -94,6 +103,6 @@ class TrackState:
         limits = self._thresholds
         if self.pose is None or self._confidence < limits.guide_confidence:
             return None
-        if self.energy > max(limits.energy * self._clamp, limits.guide_ratio * float(np.median(self._energies))):
+        if self.energy > max(limits.energy * self._clamp, limits.guide_ratio * self.median_energy):
             return None
         return retract(self.pose, self.velocity)

@@ -18,14 +18,22 @@ from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.scorer import Scores
 from depthtrack.solver.options import SwarmOptions
 from depthtrack.synthesis.generate import Synthesiser
-from depthtrack.tracking.candidate import evaluate
-from depthtrack.tracking.configuration import PsoConfig
-from depthtrack.tracking.options import FingerOptions, RecoveryOptions, SwarmSearchOptions, TrackingThresholds
+from depthtrack.tracking.candidate import Candidate, evaluate
+from depthtrack.tracking.configuration import HybridConfig, PsoConfig
+from depthtrack.tracking.frame import FrameContext, Toolkit
+from depthtrack.tracking.options import (
+    FingerOptions,
+    GlobalSearchOptions,
+    RecoveryOptions,
+    SwarmSearchOptions,
+    TrackingThresholds,
+)
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
 from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.registry import create_tracker, tracker_config
-from depthtrack.tracking.stages.searches import swarm_search
+from depthtrack.tracking.stages import recover
+from depthtrack.tracking.stages.searches import SwarmSearch, search_globally, swarm_search
 from depthtrack.tracking.stages.swarm import swarm_around
 from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
@@ -126,6 +134,69 @@ def test_the_last_trusted_pose_is_kept_for_half_a_second(made: Synthesiser, fram
     assert (state.last_trusted is pose) == kept
 
 
+def test_an_energy_is_elevated_above_the_median_of_the_track(made: Synthesiser) -> None:
+    state = TrackState(TrackingThresholds(), 40.0)
+    assert state.is_elevated(1.0, 0)
+    assert not state.is_elevated(1000.0, 1.1)
+    for energy in (9.0, 10.0, 14.0):
+        state.commit(made.poses[0], energy, 0.9, Status.TRACKED, {})
+    assert [state.is_elevated(energy, 1.1) for energy in (10.9, 11.1)] == [False, True]
+    state.forget_last()
+    assert not state.is_elevated(1000.0, 1.1)
+
+
+@pytest.mark.parametrize(("turns", "searched"), [(1, [5, 5, 5, 5]), (2, [3, 2, 3, 2]), (6, [1, 1, 1, 1])])
+def test_fingers_take_turns(
+    made: Synthesiser, turns: int, searched: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In six frames, each finger is searched equally often."""
+    fingers: list[int] = []
+
+    def search(scorer: RasterScorer, pose: np.ndarray, finger: int, *_: object) -> Candidate:
+        fingers.append(finger)
+        return Candidate(pose, np.inf, 0.0)
+
+    monkeypatch.setattr(recover, "search_one_finger", search)
+    config, tools = HybridConfig(), Toolkit(HandShape(), HybridConfig().scoring)
+    options = FingerOptions(turns=turns, usual_turns=1)
+    stage = recover.RefineFingers(SwarmSearch(SwarmSearchOptions(refine=False)), RecoveryOptions(), options)
+    counts = []
+    for index in range(6):
+        observation = observe(made, index)
+        tools.set_target(observation)
+        frame, before = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0), len(fingers)
+        stage(frame, [Candidate(made.poses[index], 100.0, 0.9)])
+        counts.append(len(fingers) - before)
+    assert counts[:4] == searched
+    assert {fingers.count(finger) for finger in range(5)} == {6 // turns}
+
+
+class _Repeated:
+    """Search that returns the same energy again and again."""
+
+    def __init__(self, energy: float) -> None:
+        self.energy, self.calls = energy, 0
+
+    def improve(self, frame: FrameContext, poses: np.ndarray, min_angle: float) -> list[Candidate]:
+        self.calls += 1
+        return [Candidate(poses[0], self.energy / self.calls, 0.9)]
+
+    def random(self, frame: FrameContext) -> np.random.Generator:
+        return frame.random
+
+
+def test_a_global_search_ends_at_the_usual_energy_of_the_track(made: Synthesiser) -> None:
+    state, tools = TrackState(TrackingThresholds(), 40.0), Toolkit(HandShape(), HybridConfig().scoring)
+    frame = FrameContext(observe(made, 20), tools, state, 0)
+    for known, repetitions in ((False, 3), (True, 1)):
+        if known:
+            state.commit(made.poses[0], 20.0, 0.9, Status.TRACKED, {})
+        search = _Repeated(23.0)
+        options = GlobalSearchOptions(proposals=8, good_energy=0.1, good_ratio=1.2)
+        search_globally(frame, search, options)  # type: ignore[arg-type]
+        assert search.calls == repetitions
+
+
 def test_a_pose_of_unusual_energy_gives_no_prediction(made: Synthesiser) -> None:
     state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
     for _ in range(5):
@@ -162,7 +233,7 @@ def test_several_postures_of_a_finger_are_refined(made: Synthesiser) -> None:
     assert len(set(nearest.tolist())) >= 4
 
 
-@pytest.mark.parametrize("name", ["ik", "pso"])
+@pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
 def test_a_start_does_not_depend_on_earlier_frames(made: Synthesiser, name: str) -> None:
     with (
         closing(create_tracker(tracker_config(name), made.options.hand)) as fresh,
@@ -174,7 +245,7 @@ def test_a_start_does_not_depend_on_earlier_frames(made: Synthesiser, name: str)
     assert first.pose.tolist() == second.pose.tolist()  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("name", ["ik", "pso"])
+@pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
 def test_a_restored_tracker_continues_after_a_loss_with_the_same_bits(made: Synthesiser, name: str) -> None:
     """One frame has only a few distant pixels: its status is lost, and the next one's started."""
     frames = [observe(made, index) for index in (20, 21, 22, 23)]

@@ -1,12 +1,13 @@
 """Recovery: global and local re-initialisation, and other postures of single fingers."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from depthtrack.hand.pose import ANGLES, POSITION
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.tracking.candidate import Candidate
@@ -16,6 +17,9 @@ from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.stages.searches import Search, search_globally
 from depthtrack.tracking.stages.stage import Stage
+
+_SHIFTS = 5
+"""Turn of the shifted fingers, after those of the five fingers."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class SearchGlobally:
 class RefineFingers:
     """Try other postures of fingers in frames that fit poorly.
 
-    Proposals are other postures of single fingers, and all fingers shifted by one place.
+    Proposals are other postures of single fingers, and all fingers shifted by one place. They take turns over
+    `options.turns` frames, or over `options.usual_turns` in frames whose energy is not elevated.
 
     refit: surface fit after a finger changed; None keeps the rendered candidate.
     """
@@ -49,17 +54,33 @@ class RefineFingers:
         best, good = candidates[0], self.recovery.good_energy * frame.clamp
         if frame.restarted or best.energy <= good or self.recovery.accept_finger == 0:
             return candidates
-        fit = self.search.fit(frame)
-        if fit is not None:
-            shifted = np.stack([fit(pose) for pose in finger_shift_proposals(frame.tools.model, best.pose)])
-            best = self._accepted(best, frame.evaluate(shifted)[0])
+        due = self._due_turns(frame, best)
+        fitter = self.search.fitter(frame)
+        if fitter is not None and _SHIFTS in due:
+            best = self._accepted(best, self._shifted(frame, best, fitter))
         scorer, generator = frame.tools.scorer_at(self.options.resolution, frame.observation), self.search.random(frame)
-        for finger in range(5):
+        for finger in sorted(due - {_SHIFTS}):
             if self.options.stop_early and best.energy <= good:
                 break
             found = search_one_finger(scorer, best.pose, finger, generator, self.options)
             best = self._accepted(best, found) if self.refit is None else self._refitted(frame, scorer, best, found)
         return [best]
+
+    def _shifted(self, frame: FrameContext, best: Candidate, fitter: IcpFitter) -> Candidate:
+        """Return the better fit of the fingers shifted by one place, in both directions."""
+        proposals, brief = finger_shift_proposals(frame.tools.model, best.pose), self.options.shift_iterations
+        if brief > 0:
+            coarse = frame.evaluate(np.stack([fitter.fit(pose, iterations=brief, coarse=True) for pose in proposals]))
+            if coarse[0].energy >= self.options.shift_margin * best.energy:
+                return coarse[0]
+            proposals = coarse[0].pose[None]
+        return frame.evaluate(np.stack([fitter.fit(pose) for pose in proposals]))[0]
+
+    def _due_turns(self, frame: FrameContext, best: Candidate) -> set[int]:
+        """Return the turns of this frame: fingers 0 to 4, and `_SHIFTS`."""
+        elevated = frame.state.is_elevated(best.energy, self.recovery.elevated_ratio)
+        turns = self.options.turns if elevated else self.options.usual_turns
+        return {turn for turn in range(_SHIFTS + 1) if turn % turns == frame.observation.frame_index % turns}
 
     def _refitted(self, frame: FrameContext, scorer: Scorer, best: Candidate, found: Candidate) -> Candidate:
         """Return the surface fit of `found` if its energy is low enough, else `best`.
@@ -80,24 +101,31 @@ class RefineFingers:
 
 @dataclass(frozen=True)
 class RecoverLocally:
-    """Search near the pose, regularly in frames that fit poorly and at once in doubtful ones.
+    """Search near the pose: at once in doubtful frames, in every n-th frame if it fits poorly.
 
     If the pose is doubtful, the stages `elsewhere` run too; a pose from there restarts the track.
+
+    routine: smaller search of frames that are not doubtful; None for `search`.
     """
 
     search: Search
     options: RecoveryOptions
     elsewhere: Sequence[Stage] = ()
+    routine: Search | None = None
     name: str = "recover"
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         best, options = candidates[0], self.options
         doubtful = frame.state.is_beyond(best.energy, best.confidence, options.doubt_energy, options.doubt_confidence)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
+        due = due and frame.state.is_elevated(best.energy, options.elevated_ratio)
         if best.energy <= options.good_energy * frame.clamp or not (due or doubtful):
             return candidates
-        proposals = local_proposals(best.pose, self.search.random(frame), options)
-        near = self.search.improve(frame, proposals, options.min_angle)[0]
+        search, spread = self.search, options
+        if self.routine is not None and not doubtful:
+            search, spread = self.routine, replace(options, proposals=options.routine_proposals)
+        proposals = local_proposals(best.pose, search.random(frame), spread)
+        near = search.improve(frame, proposals, options.min_angle)[0]
         if near.energy < (1 if doubtful else options.accept_local) * best.energy:
             best = near
         if self.elsewhere and doubtful:

@@ -1,6 +1,5 @@
 """Searches that improve many start poses: by swarms, or by surface fits from coarse to fine."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
 from depthtrack.tracking.frame import FrameContext
@@ -16,9 +16,6 @@ from depthtrack.tracking.proposals.global_ import distinct_orientations, mixed_a
 from depthtrack.tracking.stages.coarse_to_fine import run_rounds
 from depthtrack.tracking.stages.swarm import swarm_around
 from depthtrack.types import Array
-
-FitPose = Callable[[Array], Array]
-"""Moves a pose (27,) onto the observed surface."""
 
 
 class Search(Protocol):
@@ -31,8 +28,8 @@ class Search(Protocol):
         """
         ...
 
-    def fit(self, frame: FrameContext) -> FitPose | None:
-        """Return how the search fits a single pose to the surface, or None if it does not."""
+    def fitter(self, frame: FrameContext) -> IcpFitter | None:
+        """Return the surface fitter of the search, or None if it fits no surface."""
         ...
 
     def random(self, frame: FrameContext) -> np.random.Generator:
@@ -48,16 +45,15 @@ class SwarmSearch:
 
     def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
         starts = evaluate(frame.tools.scorer, poses)
-        return swarm_search(frame.tools.scorer, starts, frame.random, self.options, min_angle, self.fit(frame))
+        return swarm_search(frame.tools.scorer, starts, frame.random, self.options, min_angle, self.fitter(frame))
 
-    def fit(self, frame: FrameContext) -> FitPose | None:
+    def fitter(self, frame: FrameContext) -> IcpFitter | None:
         if not self.options.refine:
             return None
         try:
-            fitter = frame.fitter(self.options.fit)
+            return frame.fitter(self.options.fit)
         except InputError:
             return None  # no skin fits these sizes
-        return fitter.fit
 
     def random(self, frame: FrameContext) -> np.random.Generator:
         return frame.random
@@ -69,7 +65,7 @@ def swarm_search(
     generator: np.random.Generator,
     options: SwarmSearchOptions,
     min_angle: float,
-    fit: FitPose | None = None,
+    fitter: IcpFitter | None = None,
 ) -> list[Candidate]:
     """Return candidates, best first, after all rounds from `starts`, best first.
 
@@ -81,8 +77,8 @@ def swarm_search(
         found = by_energy(
             swarm_around(scorer, start.pose, turn.spread, turn.swarm, generator) for start in found[: turn.starts]
         )
-        if fit is not None:
-            fitted = evaluate(scorer, np.stack([fit(candidate.pose) for candidate in found[: options.refined]]))
+        if fitter is not None:
+            fitted = evaluate(scorer, np.stack([fitter.fit(candidate.pose) for candidate in found[: options.refined]]))
             found = by_energy([*found, *fitted])
     return found
 
@@ -101,8 +97,8 @@ class FitSearch:
         fitter = frame.fitter(self.surface)
         return run_rounds(fitter, frame.tools.scorer, starts, frame.tools.synergies, self.options.rounds)
 
-    def fit(self, frame: FrameContext) -> FitPose | None:
-        return frame.fitter(self.surface).fit
+    def fitter(self, frame: FrameContext) -> IcpFitter | None:
+        return frame.fitter(self.surface)
 
     def random(self, frame: FrameContext) -> np.random.Generator:
         return frame.new_random()
@@ -115,6 +111,9 @@ def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOp
     """
     best: Candidate | None = None
     generator, observation = search.random(frame), frame.observation
+    good = options.good_energy * frame.clamp
+    if options.good_ratio > 0 and np.isfinite(frame.state.median_energy):
+        good = max(good, options.good_ratio * frame.state.median_energy)
     for _ in range(options.attempts):
         angles = mixed_angles(frame.tools.synergies, generator, options)
         arm = observation.arm_direction if options.follow_arm else None
@@ -122,7 +121,7 @@ def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOp
         found = search.improve(frame, poses, options.min_angle)[0]
         before = np.inf if best is None else best.energy
         best = found if best is None or found.energy < best.energy else best
-        if best.energy <= options.good_energy * frame.clamp or best.energy > (1 - options.min_gain) * before:
+        if best.energy <= good or best.energy > (1 - options.min_gain) * before:
             break
     assert best is not None
     return best

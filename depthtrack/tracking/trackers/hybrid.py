@@ -12,7 +12,7 @@ from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.stages.stage import Stage
-from depthtrack.tracking.stages.surface_choice import ChooseSurface
+from depthtrack.tracking.stages.surface_choice import FitChosenSurface
 from depthtrack.tracking.stages.surface_fit import RetryPredictions, SurfaceFit
 from depthtrack.tracking.stages.swarm_proposals import SwarmProposals
 
@@ -24,20 +24,21 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches.
     """
     fit = SurfaceFit(config.fit)
-    surface = ChooseSurface(config.surface_choice, config.fit)
+    chosen = FitChosenSurface(config.surface_choice, fit)
     search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
-    fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
-    start: list[Stage] = [SearchGlobally(search, config.search), surface, fit, fingers]
+    routine = FitSearch(config.routine_search, config.fit)
+    in_turn = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
+    fingers = replace(in_turn, options=replace(config.fingers, turns=1, usual_turns=1))
+    start: list[Stage] = [SearchGlobally(search, config.search), chosen, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
-            surface,
-            fit,
+            chosen,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
             SwarmProposals(config.proposals, fit),
-            RecoverLocally(near, config.recovery, elsewhere=start),
-            fingers,
+            RecoverLocally(near, config.recovery, elsewhere=start, routine=routine),
+            in_turn,
         ],
         start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
-        refine=[GivenPose(), surface, replace(fit, hold_last=False, effort=2)],
+        refine=[GivenPose(), replace(chosen, fit=replace(fit, hold_last=False, effort=2))],
     )

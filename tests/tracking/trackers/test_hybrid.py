@@ -11,7 +11,8 @@ from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.stages.surface_choice import ChooseSurface
+from depthtrack.tracking.stages.surface_choice import FitChosenSurface
+from depthtrack.tracking.stages.surface_fit import SurfaceFit
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.tracker import Estimate
 from tests.support.observations import observe
@@ -39,7 +40,7 @@ def test_the_surface_that_was_drawn_is_chosen(hand: str, surface: str, request: 
     made: Synthesiser = request.getfixturevalue(hand)
     config = HybridConfig()
     tools = Toolkit(HandShape(), config.scoring)
-    stage = ChooseSurface(config.surface_choice, config.fit)
+    stage = FitChosenSurface(config.surface_choice, SurfaceFit(config.fit))
     for index in range(0, 300, 30):
         observation = observe(made, index)
         tools.set_target(observation)
