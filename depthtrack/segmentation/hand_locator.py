@@ -14,7 +14,7 @@ from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.masks import HandMasks
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.palm import Palm
-from depthtrack.segmentation.pixel_labels import hand_masks, label_hand
+from depthtrack.segmentation.pixel_labels import HAND, hand_masks, label_hand
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
 from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
@@ -110,6 +110,8 @@ class HandLocator:
         arm, centre, wrist = self._find_arm(surface, palm)
         arm_mask = None if arm is None or wrist is None else arm_nodes(surface.grid, palm, arm, wrist)
         labels = label_hand(surface, palm, arm_mask, wrist, options)
+        if not (labels == HAND).any():
+            return None
         masks = hand_masks(surface, labels, wrist, options)
         self._adapt_colours(surface, masks)
         return LocatedHand(masks, centre, palm.radius, None if arm is None else arm.direction, wrist)

@@ -51,6 +51,8 @@ def hand_masks(
 ) -> HandMasks:
     """Return the masks of the hand from the labels (rows, columns) of nodes.
 
+    At least one node must be HAND.
+
     Near the outline, depth is least reliable: within the dilation radius of it, only skin-coloured pixels are hand.
     Farther inside, depth alone decides, so that shadows and highlights leave no holes. Missing readings between others
     are filled if they are skin, and the outline is smoothed. Readings extend up to the radius outside the silhouette.

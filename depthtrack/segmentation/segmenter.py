@@ -78,11 +78,14 @@ class Segmenter:
         radius = float(np.linalg.norm(prior.wrist.point - prior.centre))
         return LocatedHand(masks, surface_centre, radius, None, prior.wrist)
 
-    def _observation(self, frame: Frame, located: LocatedHand) -> Observation:
+    def _observation(self, frame: Frame, located: LocatedHand) -> Observation | None:
+        """Return the observation of a located hand, or None if it has no reading."""
         masks = located.masks
         if self._skin is None or frame.colour is None:
             valid = ~flying_pixels(frame.depth[masks.region.slices], frame.camera.fx, self._options.flying_pixels)
             masks = replace(masks, readings=masks.readings & valid, silhouette=masks.silhouette & valid)
+        if not masks.readings.any():
+            return None
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)
         return Observation(
             camera=frame.camera.crop(masks.region),
