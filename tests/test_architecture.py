@@ -14,6 +14,7 @@ LAYERS = (
     ("closing", "errors", "types"),
     ("files", "options", "resources", "text_table", "selection"),
     ("machine",),
+    ("compilation",),
     ("geometry",),
     ("simd",),
     ("hand",),

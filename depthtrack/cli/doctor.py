@@ -49,12 +49,16 @@ class Command:
 
 def _text(machine: "SystemInfo", outcomes: "list[Outcome]") -> str:
     """Return aligned lines, with depth in millimetres."""
+    from depthtrack.compilation import VARIABLE
+
+    kept = machine.compiled_kernels or f"compiled again in each run: set {VARIABLE} to a writable folder"
     libraries = [f"{name} {version}" for name, version in machine.libraries.items() if version]
     absent = [name for name, version in machine.libraries.items() if version is None]
     vectors = ", ".join(name for name, has in (("AVX2", machine.avx2), ("AVX-512", machine.avx512)) if has)
     lines = [
         f"{'depthtrack':<15}{machine.depthtrack} on Python {machine.python}, {machine.system}",
         f"{'processor':<15}{machine.processor}, {machine.threads} threads, {vectors or 'neither AVX2 nor AVX-512'}",
+        f"{'kernels':<15}{kept}",
         *_wrapped("libraries", _listed(libraries)),
         *_wrapped("not installed", _listed(absent)),
         "",

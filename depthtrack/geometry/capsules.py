@@ -6,9 +6,9 @@ ball is not the one straight across the axis. Functions take scalars or arrays; 
 
 import math
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array
 
 
@@ -31,7 +31,7 @@ def capsule_distance(along: Array, across: Array, radius: float, taper: float, l
     return np.sqrt((along - t) ** 2 + across**2) - (radius - taper * t)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def compiled_nearest_ball(along: float, across: float, taper: float, length: float) -> float:
     """Return `nearest_ball` of one point.
 

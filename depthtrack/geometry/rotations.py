@@ -6,10 +6,10 @@ them.
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array
 
 Quaternion = tuple[float, float, float, float]
@@ -70,14 +70,14 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     return normalised(xyzw[:, [3, 0, 1, 2]].reshape(*R.shape[:-2], 4))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def compiled_normalised(w: float, x: float, y: float, z: float) -> Quaternion:
     """Return the unit quaternion with w >= 0."""
     scale = (1.0 if w >= 0 else -1.0) / math.sqrt(w * w + x * x + y * y + z * z)
     return w * scale, x * scale, y * scale, z * scale
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def compiled_product(
     aw: float, ax: float, ay: float, az: float, bw: float, bx: float, by: float, bz: float
 ) -> Quaternion:
@@ -90,7 +90,7 @@ def compiled_product(
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def compiled_exp(x: float, y: float, z: float) -> Quaternion:
     """Return the quaternion of a rotation vector (rad)."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -98,7 +98,7 @@ def compiled_exp(x: float, y: float, z: float) -> Quaternion:
     return math.cos(angle / 2), share * x, share * y, share * z
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def compiled_log(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return the rotation vector (rad), of angle at most pi, of a quaternion except zero."""
     w, x, y, z = compiled_normalised(w, x, y, z)
@@ -107,7 +107,7 @@ def compiled_log(w: float, x: float, y: float, z: float) -> tuple[float, float, 
     return share * x, share * y, share * z
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def compiled_matrix(w: float, x: float, y: float, z: float, out: Array) -> None:
     """Write the rotation matrix of a quaternion of any length except zero to `out[:3, :3]`."""
     s = 2.0 / (w * w + x * x + y * y + z * z)

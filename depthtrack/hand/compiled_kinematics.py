@@ -6,9 +6,9 @@
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.rotations import compiled_exp, compiled_matrix, compiled_normalised, compiled_product
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
@@ -68,7 +68,7 @@ class BodyPoses(NamedTuple):
         return bodies
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
     """Write the bodies in a pose (27,) to `bodies`: Eq. (1) of Schroeder et al. 2014.
 
@@ -112,7 +112,7 @@ def forward_kinematics(chain: Chain, pose: Array, bodies: BodyPoses) -> None:
                     T[body + 1, i, 3] = T[body, i, 3] + T[body, i, 1] * lengths[finger, k]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
     """Write T_camera_body (N, 16, 4, 4), metres, of poses (N, 27) to `out`."""
     bodies = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
@@ -123,14 +123,14 @@ def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
         out[n, :, 3, 3] = 1.0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def retract(pose: Array, tangent: Array, out: Array) -> None:
     """Write the pose `out` (27,) reached from `pose` by a step (26,); see `pose.retract`."""
     retract_unnormalised(pose, tangent, out)
     out[3], out[4], out[5], out[6] = compiled_normalised(out[3], out[4], out[5], out[6])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def retract_unnormalised(pose: Array, tangent: Array, out: Array) -> None:
     """Write the retraction to `out` (27,) without normalising its quaternion.
 

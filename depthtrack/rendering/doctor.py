@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import depthtrack
+from depthtrack.compilation import cache_folder
 from depthtrack.machine import installed_version, processor_name, system_name, usable_cores
 from depthtrack.rendering.selfcheck import SelfCheck
 
@@ -23,7 +24,11 @@ _LIBRARIES = (
 
 @dataclass(frozen=True)
 class SystemInfo:
-    """Versions, system and processor. `libraries` maps names to versions, None if not installed."""
+    """Versions, system and processor.
+
+    libraries: versions by name, None if not installed.
+    compiled_kernels: folder that holds compiled kernels between runs, None without a writable one.
+    """
 
     depthtrack: str
     python: str
@@ -33,6 +38,7 @@ class SystemInfo:
     avx2: bool
     avx512: bool
     libraries: dict[str, str | None]
+    compiled_kernels: str | None
 
     @classmethod
     def here(cls) -> Self:
@@ -49,6 +55,7 @@ class SystemInfo:
             avx2=bool(features.get("avx2")),
             avx512=bool(features.get("avx512f")),
             libraries={name: installed_version(name) for name in _LIBRARIES},
+            compiled_kernels=None if (folder := cache_folder()) is None else str(folder),
         )
 
 

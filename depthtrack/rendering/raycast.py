@@ -6,10 +6,10 @@ ux^2 + uy^2 (+ uz^2) = uw^2. Homogeneous coordinates cover cones, the projective
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import CYLINDER
@@ -62,7 +62,7 @@ def _bounds(camera: Camera, kind: int, T: Array) -> Rect:
     return Rect.around(camera.project(points)).clipped(camera.rect)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _cast(
     kinds: Index,
     inverses: Array,

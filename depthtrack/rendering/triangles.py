@@ -2,10 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.rendered_surface import NEAR, RenderedSurface
 from depthtrack.types import Array, Index
@@ -41,7 +41,7 @@ def rasterise(
     return surface
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _rasterise(
     vertices: Array,
     faces: Index,

@@ -2,9 +2,9 @@
 
 from functools import cache
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.segmentation.forearm import Arm
 from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.options import BreadthOptions
@@ -42,7 +42,7 @@ def breadth_profile(grid: Grid, palm: Palm, arm: Arm, options: BreadthOptions) -
     return np.asarray(smooth / width / sine)
 
 
-@numba.njit(cache=True)
+@compiled()
 def accumulate_areas(
     points: Array,
     areas: Array32,
@@ -98,7 +98,7 @@ def cross_section_centre(
     return middle if found else None
 
 
-@numba.njit(cache=True)
+@compiled()
 def section_centroid(
     points: Array,
     reached: Array32,

@@ -5,10 +5,10 @@ Luminance is left out, because it changes most with the light.
 
 from functools import cache
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Array, Image, Labels, Mask
 
@@ -52,7 +52,7 @@ def count_chroma(
     return counts.reshape(2, BINS, BINS)
 
 
-@numba.njit(cache=True)
+@compiled()
 def count_colours(
     image: Image,
     region: tuple[int, int, int, int],
@@ -80,7 +80,7 @@ def count_colours(
                     counts[int(hand[v, u]), chroma] += 1
 
 
-@numba.njit(cache=True, inline="always")
+@compiled(inline="always")
 def colour_index(image: Image, y: int, x: int) -> int:
     """Return the index of the quantised colour of a pixel of an RGB image (H, W, 3)."""
     return (int(image[y, x, 0]) >> 3) << 10 | (int(image[y, x, 1]) >> 3) << 5 | int(image[y, x, 2]) >> 3

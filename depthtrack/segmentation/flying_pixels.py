@@ -6,9 +6,9 @@ from their tips.
 Source: Foix, Alenya and Torras, "Lock-in time-of-flight (ToF) cameras: a survey", IEEE Sensors Journal 2011.
 """
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.segmentation.options import FlyingPixelOptions
 from depthtrack.types import Depth, Mask
 
@@ -28,7 +28,7 @@ def flying_pixels(depth: Depth, focal: float, options: FlyingPixelOptions | None
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def mark_flying_pixels(depth: Depth, slope: float, out: Mask) -> None:
     """Set the flying pixels of a depth image in `out`.
 

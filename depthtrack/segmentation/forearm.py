@@ -6,10 +6,10 @@ The path from there to the palm gives its direction in 3D, even if it is foresho
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.options import ForearmOptions
 from depthtrack.segmentation.palm import Palm
@@ -98,7 +98,7 @@ def _direction(grid: Grid, palm: Palm, exits: Index, start: float) -> Array:
     return np.asarray(towards / np.linalg.norm(towards))
 
 
-@numba.njit(cache=True)
+@compiled()
 def backtrack(distance: Depth, parent: NDArray[np.int32], nodes: Index, until: float, out: Index) -> None:
     """Find the first node on the path of each node whose distance is at most `until`.
 

@@ -1,16 +1,16 @@
 """Compiled kernels of the surface grid: block means, connected surfaces and shortest paths."""
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array, Depth, Index
 
 BUCKET = 0.002
 """Width of a bucket of the shortest-path queue, metres. It affects speed, never the result."""
 
 
-@numba.njit(cache=True)
+@compiled()
 def sample_blocks(
     depth: Depth,
     region: tuple[int, int, int, int],
@@ -74,7 +74,7 @@ def sample_blocks(
             points[i * columns + j, 2] = mean
 
 
-@numba.njit(cache=True)
+@compiled()
 def label_surfaces(depth: Depth, max_jump: float, labels: NDArray[np.int32], squares: Array) -> int:
     """Label the connected surfaces of a grid and return their number.
 
@@ -112,7 +112,7 @@ def label_surfaces(depth: Depth, max_jump: float, labels: NDArray[np.int32], squ
     return count
 
 
-@numba.njit(cache=True)
+@compiled()
 def shortest_paths(
     depth: Depth,
     points: Array,

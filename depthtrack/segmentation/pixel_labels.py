@@ -1,9 +1,9 @@
 """Labels of pixels: the pixels of a frame that belong to the hand on its grid."""
 
 import cv2
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.segmentation.masks import HandMasks, dilation_radius
 from depthtrack.segmentation.morphology import bounding_box, dilated, disc, eroded
 from depthtrack.segmentation.options import OutlineOptions, SegmentationOptions
@@ -112,7 +112,7 @@ def _majority(mask: Mask, radius: int, least: int) -> Mask:
     return np.asarray(share > least)
 
 
-@numba.njit(cache=True)
+@compiled()
 def classify_pixels(
     depth: Depth,
     roi: tuple[int, int, int, int],

@@ -2,9 +2,9 @@
 
 import math
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.segmentation.options import PointCloudOptions
 from depthtrack.types import Array, Depth, Index
@@ -29,7 +29,7 @@ def point_cloud(camera: Camera, depth: Depth, options: PointCloudOptions | None 
     return points, normals
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _fit(
     depth: Depth,
     rows: Index,

@@ -6,9 +6,9 @@ gives the reach of the hand and the plane of its wrist.
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.masks import HandMasks, dilation_radius
@@ -66,7 +66,7 @@ def segment_roi(
     return HandMasks(roi.shifted(region.left, region.top), silhouette[roi.slices], readings[roi.slices])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def mark_reachable(
     depth: Depth,
     lens: tuple[float, float, float, float],

@@ -7,10 +7,10 @@ from collections import deque
 from functools import cache
 
 import cv2
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.chroma import BINS, bins_of_colours, colour_index, count_chroma
 from depthtrack.segmentation.options import SkinColourOptions
@@ -97,7 +97,7 @@ def _class_indices(darkest: float, brightest: float) -> NDArray[np.intp]:
     return np.where(bins < 0, BINS * BINS, bins)
 
 
-@numba.njit(cache=True)
+@compiled()
 def classify(
     image: Image,
     left: int,

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.grid import Grid
@@ -77,7 +77,7 @@ def _covered(mask: Labels, stride: int, share: float, blocks: Labels) -> Mask:
     return shares >= share
 
 
-@numba.njit(cache=True)
+@compiled()
 def share_of_blocks(mask: Labels, stride: int, blocks: Labels, share: Array32) -> None:
     """Compute the share of each block that a mask covers.
 

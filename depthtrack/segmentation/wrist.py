@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.segmentation.arm_breadth import bin_middles, breadth_profile, cross_section_centre
 from depthtrack.segmentation.forearm import Arm
 from depthtrack.segmentation.grid import Grid
@@ -43,7 +43,7 @@ def find_wrist(grid: Grid, palm: Palm, arm: Arm, guess: float, options: WristOpt
     return None if math.isnan(place) else place
 
 
-@numba.njit(cache=True)
+@compiled()
 def most_likely_wrist(
     profile: Array,
     visible: int,

@@ -9,12 +9,13 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import numba
 from llvmlite import ir
 from numba import types
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import intrinsic, lower_builtin, register_model
+
+from depthtrack.compilation import compiled
 
 
 class Vector(types.Type):
@@ -48,7 +49,7 @@ def kernel_part(function: Callable[..., Any]) -> Any:
 
     Counting references to them would take locked instructions at every call, longer than much of the work itself.
     """
-    return numba.njit(cache=True, _nrt=False)(function)
+    return compiled(_nrt=False)(function)
 
 
 @register_model(Vector)

@@ -6,10 +6,10 @@ are carried along to first order (see `normal_equations`).
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses
 from depthtrack.types import Array, Index
 
@@ -67,7 +67,7 @@ class FixedPoints(NamedTuple):
         return FixedPoints(body, local, target, direction.reshape(count, 3), weight)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def squared_residuals(points: FixedPoints, bodies: BodyPoses) -> float:
     """Return the weighted sum of squared residuals, m^2, with the bodies where they are now."""
     total = 0.0
@@ -84,7 +84,7 @@ def squared_residuals(points: FixedPoints, bodies: BodyPoses) -> float:
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def accumulate(points: FixedPoints, bodies: BodyPoses, centre: Array, M: Array, g: Array) -> float:
     """Add the points to the normal equations of each body; returns `squared_residuals`.
 
@@ -113,7 +113,7 @@ def accumulate(points: FixedPoints, bodies: BodyPoses, centre: Array, M: Array, 
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _offset(points: FixedPoints, bodies: BodyPoses, i: int) -> tuple[float, float, float]:
     """Return point i less its target, metres, camera frame."""
     T, x, y = bodies.T[points.body[i]], points.local[i], points.target[i]

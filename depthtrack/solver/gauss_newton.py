@@ -5,9 +5,9 @@ beyond (Bertsekas, "Projected Newton methods", SIAM J. Control and Optimization 
 decreases the energy.
 """
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses, forward_kinematics, retract
 from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.solver.normal_equations import energy, normal_equations
@@ -32,7 +32,7 @@ def minimise(problem: Problem, options: SolverOptions, start: Array) -> Solution
     return Solution.of(state.pose, outcome, trace)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: SolverState, trace: Array) -> Outcome:
     """Move `state` to a minimum of the energy.
 
@@ -102,7 +102,7 @@ def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: So
     return Outcome(status, steps, best)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def solve_each(
     problem: Problem, options: SolverOptions, targets: Array, weights: Array, poses: Array, energies: Array
 ) -> None:
@@ -127,7 +127,7 @@ def solve_each(
         energies[n] = outcome.energy
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _damp(A: Array, coordinates: Array, slope: Array, space: PostureSubspace, options: SolverOptions) -> None:
     """Add the damping to the diagonal of A, and store the slopes of the joint limit function."""
     for i in range(3):

@@ -1,12 +1,12 @@
 """Small dense systems of normal equations, compiled."""
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def hold_parameter(A: Array, b: Array, i: int) -> None:
     """Remove parameter i from the system A x = b in place.
 
@@ -21,7 +21,7 @@ def hold_parameter(A: Array, b: Array, i: int) -> None:
     b[i] = 0.0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def cholesky_solve(A: Array, b: Array) -> bool:
     """Solve A x = b in place: A (n, n) is overwritten and b (n,) becomes x.
 

@@ -10,9 +10,9 @@ n . v + ((x - centre) x n) . w.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses
 from depthtrack.solver.fixed_points import FixedPoints, accumulate, squared_residuals
 from depthtrack.types import Array
@@ -52,7 +52,7 @@ def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
     equations.centre[:] = bodies.T[0, :, 3]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> None:
     """Write the twist of body b since the residuals were added to `out` (6,).
 
@@ -71,7 +71,7 @@ def twist(equations: NormalEquations, bodies: BodyPoses, b: int, out: Array) -> 
     out[3], out[4], out[5] = (R[2, 1] - R[1, 2]) / 2, (R[0, 2] - R[2, 0]) / 2, (R[1, 0] - R[0, 1]) / 2
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def energy(equations: NormalEquations, points: FixedPoints, bodies: BodyPoses) -> float:
     """Return half the weighted sum of squared residuals, m^2, for the current bodies."""
     total, s = 0.0, np.empty(6)
@@ -85,7 +85,7 @@ def energy(equations: NormalEquations, points: FixedPoints, bodies: BodyPoses) -
     return 0.5 * (total + squared_residuals(points, bodies))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def normal_equations(
     equations: NormalEquations, points: FixedPoints, bodies: BodyPoses, H: Array, gradient: Array
 ) -> float:
@@ -155,7 +155,7 @@ def normal_equations(
     return 0.5 * total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
     """Move the reference point of the sums of a body to the centre.
 
@@ -177,7 +177,7 @@ def _shift(M: Array, g: Array, dx: float, dy: float, dz: float) -> None:
     g[5] += dx * y - dy * x
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _hinge(bodies: BodyPoses, a: int, c: Array, out: Array) -> None:
     """Write the twist (6,) at the centre `c` of a unit turn of angle a to `out`."""
     ux, uy, uz = bodies.axes[a, 0], bodies.axes[a, 1], bodies.axes[a, 2]
@@ -186,12 +186,12 @@ def _hinge(bodies: BodyPoses, a: int, c: Array, out: Array) -> None:
     out[3], out[4], out[5] = ux, uy, uz
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _apply(M: Array, s: Array, out: Array) -> None:
     for i in range(6):
         out[i] = M[i, 0] * s[0] + M[i, 1] * s[1] + M[i, 2] * s[2] + M[i, 3] * s[3] + M[i, 4] * s[4] + M[i, 5] * s[5]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _dot(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.synergies import Synergies
 from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.types import Array
@@ -52,7 +52,7 @@ class Prior(NamedTuple):
         return Prior(factor * self.precision, self.mean)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def reduced_precision(prior: Prior, space: PostureSubspace) -> Array:
     """Return the precision (l, 20) of the prior between the coordinates and the angles."""
     if space.full:
@@ -66,7 +66,7 @@ def reduced_precision(prior: Prior, space: PostureSubspace) -> Array:
     return pull
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def prior_energy(pose: Array, prior: Prior) -> float:
     """Return the energy of the prior at a pose (27,), m^2."""
     total = 0.0
@@ -78,7 +78,7 @@ def prior_energy(pose: Array, prior: Prior) -> float:
     return 0.5 * total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def add_prior(pose: Array, prior: Prior, space: PostureSubspace, pull: Array, A: Array, b: Array) -> float:
     """Add the prior to the normal equations; return its energy, m^2.
 

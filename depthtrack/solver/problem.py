@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import Chain
 from depthtrack.hand.pose import ANGLES
 from depthtrack.solver.fixed_points import FixedPoints
@@ -125,7 +125,7 @@ class Solution:
         return self.status in (SolverStatus.CONVERGED, SolverStatus.NO_PROGRESS)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def limit_gradient(x: float, low: float, high: float) -> float:
     """Return |dH/dx| of the joint limit function (Schroeder et al. 2014, Sec. IV-B).
 

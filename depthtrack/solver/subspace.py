@@ -5,9 +5,9 @@ Source: Schroeder et al. 2014, Sec. V-A.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.synergies import Synergies
 from depthtrack.types import Array
@@ -55,7 +55,7 @@ FULL = PostureSubspace(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER
 """All twenty angles within the limits of the hand."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def write_angle_step(space: PostureSubspace, pose: Array, coordinates: Array, tangent: Array) -> None:
     """Write the change of the angles that leads to `coordinates` to `tangent`."""
     for j in range(20):
@@ -68,7 +68,7 @@ def write_angle_step(space: PostureSubspace, pose: Array, coordinates: Array, ta
             tangent[6 + j] = angle - pose[7 + j]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def reduce_to_subspace(H: Array, gradient: Array, space: PostureSubspace, A: Array, b: Array) -> None:
     """Write the normal equations of the subspace to A and b: J_PC = J M, Eq. (8)."""
     B, count, size = space.basis, space.basis.shape[1], b.shape[0]

@@ -7,9 +7,9 @@ randomisation after Yasuda et al. 2010 keeps the fingers from collapsing into th
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.solver.options import SwarmOptions
 from depthtrack.types import Array
 
@@ -73,7 +73,7 @@ def minimise(
     return Optimum(own_best, own_energy, best)
 
 
-@numba.njit(cache=True)
+@compiled()
 def advance(
     position: Array,
     velocity: Array,

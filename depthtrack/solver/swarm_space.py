@@ -2,9 +2,9 @@
 
 from typing import Protocol
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import retract_unnormalised
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, tangent_between
@@ -79,7 +79,7 @@ class TangentSpace:
         return tangent_between(np.broadcast_to(self.reference, poses.shape), poses)
 
 
-@numba.njit(cache=True)
+@compiled()
 def retract_batch(reference: Array, steps: Array, poses: Array) -> None:
     """Write the poses (N, 27) reached from `reference` (27,) by steps (N, 26) to `poses`."""
     for n in range(steps.shape[0]):

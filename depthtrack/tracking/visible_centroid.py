@@ -1,12 +1,12 @@
 """The centroid of the surface that a depth map shows."""
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array, Depth
 
 
-@numba.njit(cache=True)
+@compiled()
 def visible_centroid(depth: Depth, intrinsics: tuple[float, float, float, float]) -> Array:
     """Return the mean point (3,), m, camera frame, of a depth map; NaN without any reading.
 

@@ -9,9 +9,9 @@ without cancellation. All steps before the shader use float64.
 import math
 from typing import NamedTuple, Self
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses, Chain, forward_kinematics
 from depthtrack.hand.primitives import CYLINDER, Primitives
 from depthtrack.hand.shape import HandShape
@@ -54,7 +54,7 @@ class HandTable(NamedTuple):
         )
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def place_impostors(
     poses: Array,
     hand: HandTable,
@@ -108,7 +108,7 @@ def place_impostors(
     return count
 
 
-@numba.njit(cache=True)
+@compiled()
 def _compose(B: Array, T_body_unit: Array, T: Array) -> None:
     """Write T_camera_unit = T_camera_body T_body_unit to `T`; `B` (3, 4) is T_camera_body."""
     for j in range(4):
@@ -118,7 +118,7 @@ def _compose(B: Array, T_body_unit: Array, T: Array) -> None:
         T[3, j] = w
 
 
-@numba.njit(cache=True)
+@compiled()
 def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
     """Write T_unit_camera = T_unit_body T_body_camera to `M` (4, 4).
 
@@ -132,7 +132,7 @@ def _uncompose(T_unit_body: Array, B: Array, M: Array) -> None:
             M[i, 3] -= M[i, j] * B[j, 3]
 
 
-@numba.njit(cache=True)
+@compiled()
 def _bounds(
     T: Array, is_cylinder: bool, intrinsics: tuple[float, float, float, float], tile: tuple[int, int], region: Index
 ) -> float:

@@ -1,13 +1,13 @@
 """The sums of Eq. (2) over tiles read back from the renderer, computed on the CPU."""
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.types import Array, Array32, Index
 
 
 # Reordered sums vectorise; 0 and infinity keep their IEEE behaviour.
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
+@compiled(nogil=True, error_model="numpy", fastmath={"contract", "nsz", "reassoc"})
 def sum_tiles(
     inverse_depth: Array32,
     columns: int,

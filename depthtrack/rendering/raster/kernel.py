@@ -5,9 +5,9 @@ The buffer holds 0 where nothing is drawn, so the depth test is a maximum. A val
 the sums of an empty image are computed once.
 """
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.rendering.raster import hand_constants as constants
 from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
@@ -139,7 +139,7 @@ def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, cl
     return vsum(clamped), vsum(on_silhouette), vsum(matched)
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)
+@compiled(nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
     start: int,
@@ -199,7 +199,7 @@ def _energy(pose, sums, objective):
     return depth + objective[4] * silhouette + objective[5] * crossing
 
 
-@numba.njit(cache=True, nogil=True, _nrt=False)
+@compiled(nogil=True, _nrt=False)
 def draw_pose(
     pose: Array,
     hand: Array,

@@ -2,9 +2,9 @@
 
 import math
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Mask
@@ -50,7 +50,7 @@ def shadow(depth: Array, camera: Camera, baseline: float) -> Mask:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def dropout_probability(
     is_edge: bool, incidence: float, at_edges: float, grazing_start: float, grazing_end: float
 ) -> float:
@@ -63,7 +63,7 @@ def dropout_probability(
     return max(grazing, at_edges if is_edge else 0.0)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], out: Array) -> None:
     fx, fy, cx, cy = intrinsics
     for v in range(depth.shape[0]):
@@ -76,7 +76,7 @@ def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, floa
             out[v, u] = math.acos(min(max(cosine, 0.0), 1.0))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
     height, width = depth.shape
     for v in range(height):
@@ -92,7 +92,7 @@ def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
                     break
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None:
     height, width = depth.shape
     inverse = np.empty(width)

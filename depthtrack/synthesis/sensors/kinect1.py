@@ -17,9 +17,9 @@ An infrared projector and an infrared camera triangulate depth.
 import math
 from dataclasses import dataclass, field
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
@@ -66,7 +66,7 @@ class Kinect1:
         return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def axial_noise(z: float, theta: float) -> float:
     """Return the axial standard deviation, metres, at depth z (m) and incidence theta (rad).
 
@@ -78,7 +78,7 @@ def axial_noise(z: float, theta: float) -> float:
     return sigma
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def lateral_noise(theta: float) -> float:
     """Return the lateral standard deviation of a silhouette, pixels, at incidence theta (rad).
 
@@ -87,7 +87,7 @@ def lateral_noise(theta: float) -> float:
     return 0.8 + 0.035 * theta / (math.pi / 2 - min(theta, 1.5))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _read(
     depth: Array,
     theta: Array,

@@ -14,9 +14,9 @@
 import math
 from dataclasses import dataclass, field
 
-import numba
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import normal_noise
@@ -54,7 +54,7 @@ class Kinect2:
         return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def axial_noise(z: float, theta: float) -> float:
     """Return the axial standard deviation, metres, at depth z (m) and incidence theta (rad).
 
@@ -64,7 +64,7 @@ def axial_noise(z: float, theta: float) -> float:
     return (1.5 - 0.5 * z + 0.3 * z * z + grazing) * 1e-3
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _read(
     depth: Array,
     theta: Array,
@@ -89,7 +89,7 @@ def _read(
                 out[v, u] = z
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _mixed(depth: Array, v: int, u: int, z: float, share: float) -> float:
     """Return a flying pixel's depth: the mean of two surfaces, weighted by area and 1 / z^2."""
     height, width = depth.shape

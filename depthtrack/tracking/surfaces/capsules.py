@@ -7,10 +7,10 @@ computed together, which the compiler vectorises.
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.capsules import compiled_nearest_ball
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
@@ -97,7 +97,7 @@ class CapsuleSurface:
         choose(cloud, self._capsules, self._posed, self._distances, rendered, limits, correspondences)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def pose_capsules(capsules: Capsules, bodies: BodyPoses, posed: PosedCapsules) -> None:
     """Write the capsules of a posed hand to `posed`."""
     for k in range(capsules.body.shape[0]):
@@ -109,7 +109,7 @@ def pose_capsules(capsules: Capsules, bodies: BodyPoses, posed: PosedCapsules) -
                 posed.axis[k, i] += T[i, j] * capsules.axis[k, j]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@compiled(nogil=True, fastmath=True)
 def measure(points: Array, capsules: Capsules, posed: PosedCapsules, out: Distances) -> None:
     """Write the distances of points to all capsules to `out`.
 
@@ -146,7 +146,7 @@ def measure(points: Array, capsules: Capsules, posed: PosedCapsules, out: Distan
             which[i] = number if nearer else which[i]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def choose(
     cloud: PointCloud,
     capsules: Capsules,
@@ -180,7 +180,7 @@ def choose(
                     k, distance = j, distances.each[j, i]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsules, k: int, x: Array, n: Array) -> None:
     """Write the point of capsule k closest to point i, and its normal, to row i of `x` and `n`.
 
@@ -211,7 +211,7 @@ def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsule
         x[i, j] += radius * n[i, j]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _hidden(x: Array, i: int, rendered: RenderedHand) -> bool:
     """Return whether the rendered hand hides row i of x (N, 3)."""
     fx, fy, cx, cy = rendered.lens

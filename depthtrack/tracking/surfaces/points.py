@@ -7,10 +7,10 @@ of the image. The search visits the cells around an observed point until no othe
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
@@ -110,7 +110,7 @@ class PointSurface:
         resolve_bodies(self._points, self._posed, visible, correspondences)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def pose_points(points: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
     """Write the posed points and normals to `posed`, by linear blend skinning."""
     A = np.empty((16, 12))
@@ -144,7 +144,7 @@ def pose_points(points: SurfacePoints, bodies: BodyPoses, posed: Posed) -> None:
             posed.n[v, i] *= length
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def cells_over(points: Array, size: float, margin: float) -> Cells:
     """Return the cells that cover the image of points and a margin around it.
 
@@ -168,7 +168,7 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
     return Cells(low_u - around, low_v - around, side, rows, columns)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def sort_visible(posed: Posed, cells: Cells, tolerance: float) -> Visible:
     """Return the visible points, sorted by cell.
 
@@ -209,7 +209,7 @@ def sort_visible(posed: Posed, cells: Cells, tolerance: float) -> Visible:
     return visible
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def resolve_bodies(points: SurfacePoints, posed: Posed, visible: Visible, correspondences: Correspondences) -> None:
     """Replace the rows of visible points in `correspondences.body` by bodies; write `x` and `n`.
 
