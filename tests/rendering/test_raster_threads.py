@@ -6,6 +6,7 @@ import threading
 import numpy as np
 import pytest
 
+from depthtrack.geometry.camera import PRESETS
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
@@ -44,7 +45,8 @@ def test_the_number_of_threads_does_not_change_the_energies(
             for target in targets:
                 one.set_target(target)
                 many.set_target(target)
-                np.testing.assert_array_equal(one.score(poses[:count]), many.score(poses[:count]))
+                for _ in range(3):
+                    np.testing.assert_array_equal(one.score(poses[:count]), many.score(poses[:count]))
                 assert one.score(poses[:count]).shape == (count,)
 
 
@@ -70,9 +72,40 @@ def test_a_scorer_that_is_not_closed_ends_its_threads(poses: np.ndarray, targets
     assert_ends(own)
 
 
-def test_a_small_batch_starts_no_thread(poses: np.ndarray, targets: list[Target]) -> None:
+def test_the_threads_start_with_the_first_large_batch(poses: np.ndarray, targets: list[Target]) -> None:
     before = raster_threads()
     with RasterScorer(HandShape(), threads=2) as scorer:
         scorer.set_target(targets[0])
-        scorer.score(poses[:64])
+        scorer.score(poses[:1])
+        scorer.score(poses[:8])
         assert raster_threads() <= before
+        scorer.score(poses[:64])
+        assert raster_threads() - before
+
+
+def test_a_single_pose_of_a_large_image_starts_no_thread(poses: np.ndarray) -> None:
+    before = raster_threads()
+    with RasterScorer(HandShape(), threads=2) as scorer:
+        scorer.set_target(Target.blank(PRESETS["kinect1"]))
+        scorer.score(poses[:1])
+        assert raster_threads() <= before
+
+
+def test_a_scorer_of_one_thread_starts_none(poses: np.ndarray, targets: list[Target]) -> None:
+    before = raster_threads()
+    with RasterScorer(HandShape()) as scorer:
+        scorer.set_target(targets[1])
+        scorer.score(poses)
+        assert raster_threads() <= before
+
+
+def test_all_results_are_those_of_one_thread(poses: np.ndarray, targets: list[Target]) -> None:
+    with RasterScorer(HandShape()) as one, RasterScorer(HandShape(), threads=2) as many:
+        for target in targets:
+            one.set_target(target)
+            many.set_target(target)
+            for expected, found in zip(one.evaluate(poses), many.evaluate(poses), strict=True):
+                np.testing.assert_array_equal(expected, found)
+            for name, expected in vars(one.terms(poses)).items():
+                np.testing.assert_array_equal(expected, getattr(many.terms(poses), name))
+            np.testing.assert_array_equal(one.render(poses[0]), many.render(poses[0]))

@@ -13,6 +13,7 @@ from depthtrack.rendering.raster import quadrics as q
 from depthtrack.rendering.raster.posing import set_up
 from depthtrack.rendering.raster.spans import find_spans
 from depthtrack.rendering.raster.tiles import TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH
+from depthtrack.rendering.raster.work_queue.queue import complete, pop
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import (
     estimated_reciprocal,
@@ -142,8 +143,9 @@ def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, cl
 @compiled(nogil=True, _nrt=False)
 def score_poses(
     poses: Array,
-    start: int,
-    stop: int,
+    tickets: Index,
+    thread: int,
+    spin_limit: int,
     hand: Array,
     camera: Array,
     observed: Array32,
@@ -160,22 +162,26 @@ def score_poses(
     sums: Array,
     energies: Array,
 ) -> None:
-    """Score poses `start` to `stop` of a batch (Oikonomidis et al. 2011, Eq. 1 and 2).
+    """Score the poses of a batch that `tickets` assigns to this thread.
 
     poses: (B, 27) metres, quaternion, radians, camera frame.
+    tickets, thread, spin_limit: see `queue.pop`, which also states when this returns.
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     silhouette: 0 or 1, tiled.
     empty: (3,) sums of Eq. (2) for an empty image.
     objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
-    sums, energies: (B, 3) and (B,), written.
+    sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
 
-    Concurrent calls may score other poses of the same batch if each has its own workspace. It holds `scratch` and
-    `table` (see `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
+    Other threads call this with the same batch, each with its own workspace. It holds `scratch` and `table` (see
+    `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
     `low` and `high` have one element a tile column: the number of tile rows, and -1.
     """
     match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
-    for n in range(start, stop):
+    while True:
+        n = pop(tickets, thread, spin_limit)
+        if n < 0:
+            break
         tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
         clamped, on_silhouette, matched = _compare(
             observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth
@@ -184,6 +190,7 @@ def score_poses(
         sums[n, 1] = on_silhouette
         sums[n, 2] = empty[2] + matched - on_silhouette
         energies[n] = _energy(poses[n], sums[n], objective)
+        complete(tickets, thread)
 
 
 @kernel_part
