@@ -55,6 +55,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DepthtrackError as error:
         print(f"depthtrack {name}: {error}", file=sys.stderr)
         return 2
+    except ImportError as error:
+        from depthtrack.cli.broken_imports import advice, failed_module
+
+        module = failed_module(error)
+        if module is None:
+            raise
+        print(f"depthtrack {name}: {advice(module, str(error))}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print(f"depthtrack {name}: interrupted", file=sys.stderr)
         return 130

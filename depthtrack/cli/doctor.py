@@ -28,10 +28,15 @@ class Command:
         from dataclasses import asdict
         from json import dumps
 
-        from depthtrack.rendering.doctor import SystemInfo, examine
+        from depthtrack.cli.broken_imports import advice, broken_imports
 
         if not 0 < self.time_limit <= 3600:
             raise InputError(f"--time-limit must lie between 0 and 3600 seconds, found {self.time_limit:g}")
+        if broken := broken_imports():
+            raise DepthtrackError("\n".join(advice(module, reason) for module, reason in broken.items()))
+
+        from depthtrack.rendering.doctor import SystemInfo, examine
+
         machine = SystemInfo.here()
         outcomes = examine(
             self.time_limit,
