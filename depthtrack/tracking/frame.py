@@ -1,6 +1,7 @@
 """The frame that a tracker works on, and the renderers and fitters that its stages share."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -94,8 +95,10 @@ class FrameContext:
     restarted: bool = False
     surface: SurfaceName | None = None
 
-    def __post_init__(self) -> None:
-        self.random = self.new_random()
+    @cached_property
+    def random(self) -> np.random.Generator:
+        """Random numbers of the frame, which the stages share."""
+        return self.new_random()
 
     def new_random(self) -> np.random.Generator:
         """Return the frame's random numbers from their start."""

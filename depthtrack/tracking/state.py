@@ -5,6 +5,7 @@ It depends on the estimates alone, so that a run can be resumed.
 
 from collections import deque
 from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 
@@ -46,14 +47,14 @@ class TrackState:
 
         most_energy: multiple of `Objective.clamp`.
         """
-        return confidence < least_confidence or energy > max(
-            most_energy * self._clamp, self._thresholds.lost_ratio * self.median_energy
-        )
+        if confidence < least_confidence:
+            return True
+        return energy > most_energy * self._clamp and energy > self._thresholds.lost_ratio * self.median_energy
 
     @property
     def median_energy(self) -> float:
         """Median energy of the last trusted poses; infinity before the first one."""
-        return float(np.median(self._energies)) if self._energies else np.inf
+        return median(self._energies) if self._energies else np.inf
 
     def is_elevated(self, energy: float, ratio: float) -> bool:
         """Return whether an energy exceeds `ratio` times the median energy; always at ratio 0."""
@@ -103,6 +104,6 @@ class TrackState:
         limits = self._thresholds
         if self.pose is None or self._confidence < limits.guide_confidence:
             return None
-        if self.energy > max(limits.energy * self._clamp, limits.guide_ratio * self.median_energy):
+        if self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy:
             return None
         return retract(self.pose, self.velocity)

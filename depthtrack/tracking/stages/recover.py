@@ -116,10 +116,12 @@ class RecoverLocally:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         best, options = candidates[0], self.options
+        if best.energy <= options.good_energy * frame.clamp:
+            return candidates
         doubtful = frame.state.is_beyond(best.energy, best.confidence, options.doubt_energy, options.doubt_confidence)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
         due = due and frame.state.is_elevated(best.energy, options.elevated_ratio)
-        if best.energy <= options.good_energy * frame.clamp or not (due or doubtful):
+        if not (due or doubtful):
             return candidates
         search, spread = self.search, options
         if self.routine is not None and not doubtful:
