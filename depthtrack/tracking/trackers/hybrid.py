@@ -30,13 +30,14 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     in_turn = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
     fingers = replace(in_turn, options=replace(config.fingers, turns=1, usual_turns=1))
     start: list[Stage] = [SearchGlobally(search, config.search), chosen, fingers]
+    elsewhere: list[Stage] = [SearchGlobally(search, replace(config.search, attempts=1)), chosen, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
             chosen,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
             SwarmProposals(config.proposals, fit),
-            RecoverLocally(near, config.recovery, elsewhere=start, routine=routine),
+            RecoverLocally(near, config.recovery, elsewhere=elsewhere, routine=routine),
             in_turn,
         ],
         start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
