@@ -39,6 +39,10 @@ _HYBRID_RECOVERY = replace(_FIT_RECOVERY, elevated_ratio=1.1)
 """Its conditions of a local search."""
 _HYBRID_FINGERS = replace(_FIT_FINGERS, turns=2, usual_turns=6, shift_iterations=3)
 """Its search of single fingers."""
+_HYBRID_LOCAL_FITS = FitSearchOptions(
+    (FitRound(32, None, 3, coarse=True), FitRound(12, None, 4), FitRound(4, None, 8), FitRound(1, None, 12))
+)
+"""Surface fits of its local search."""
 _ROUTINE_FITS = FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 4), FitRound(1, None, 8)))
 """Surface fits of its routine local search."""
 
@@ -128,7 +132,7 @@ class HybridConfig:
         advanced=True,
     )
     local_search: FitSearchOptions = option(
-        _LOCAL_FITS,
+        _HYBRID_LOCAL_FITS,
         "Surface fits of a local search",
         advanced=True,
     )
