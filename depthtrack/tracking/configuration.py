@@ -43,7 +43,7 @@ _HYBRID_LOCAL_FITS = FitSearchOptions(
     (FitRound(32, None, 3, coarse=True), FitRound(12, None, 4), FitRound(4, None, 8), FitRound(1, None, 12))
 )
 """Surface fits of its local search."""
-_ROUTINE_FITS = FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 4), FitRound(1, None, 8)))
+_ROUTINE_FITS = FitSearchOptions((FitRound(8, None, 3, coarse=True), FitRound(2, None, 4), FitRound(1, None, 6)))
 """Surface fits of its routine local search."""
 
 

@@ -123,7 +123,7 @@ class RecoveryOptions:
         5, "Search locally in every n-th frame if its energy is elevated; 0 only in doubtful frames", unit="frames"
     )
     proposals: int = option(4000, "Poses near the last one that a local search scores")
-    routine_proposals: int = option(500, "Poses that it scores in a frame that is not doubtful, if it is smaller there")
+    routine_proposals: int = option(300, "Poses that it scores in a frame that is not doubtful, if it is smaller there")
     elevated_ratio: float = option(
         0.0, "Multiple of the track's median energy above which an energy is elevated; 0: any is"
     )
