@@ -49,8 +49,10 @@ def fit_jointly(
 ) -> JointFit:
     """Return the sizes and poses that fit all views best.
 
-    poses: (V, 27) to start from; values: (35,) sizes to start from; free: the sizes that may change; exact: build the
-    skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale throughout.
+    poses: (V, 27) to start from.
+    values: (35,) sizes to start from.
+    free: the sizes that may change.
+    exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale.
     """
     options = options or JointFitOptions()
     soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale

@@ -15,8 +15,10 @@ from depthtrack.types import Array
 def nearest_ball(along: Array, across: Array, taper: float, length: float) -> Array:
     """Return the position on the axis, metres from its start, of the ball nearest to points.
 
-    along: metres along the axis from its start; across: metres from the axis; taper: radius lost per metre of axis, in
-    -1 to 1; length: metres.
+    along: metres along the axis from its start.
+    across: metres from the axis.
+    taper: radius lost per metre of axis, -1 to 1.
+    length: metres.
     """
     t = along - across * taper / np.sqrt(1.0 - taper * taper)
     return np.minimum(np.maximum(t, 0.0), length)

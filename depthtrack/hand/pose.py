@@ -29,7 +29,9 @@ POSE_NAMES = ("x", "y", "z", "qw", "qx", "qy", "qz", *ANGLE_NAMES)
 def make_pose(position: ArrayLike, quaternion: ArrayLike, angles: ArrayLike) -> Array:
     """Return the pose (..., 27) of a position, an orientation and finger angles.
 
-    position: (..., 3) metres, camera frame; quaternion: (..., 4), any length except zero; angles: (..., 20) radians.
+    position: (..., 3) metres, camera frame.
+    quaternion: (..., 4), any length except zero.
+    angles: (..., 20) radians.
     """
     parts = [np.asarray(part, dtype=np.float64) for part in (position, normalised(quaternion), angles)]
     batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))

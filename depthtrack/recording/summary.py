@@ -30,7 +30,8 @@ class RecordingSummary:
     """Properties of a recording.
 
     frames, frames_read: listed frames, and those read for this summary.
-    duration: seconds. rate: frames a second; None for a single frame.
+    duration: seconds.
+    rate: frames per second; None for a single frame.
     field_of_view: (horizontal, vertical), radians.
     depth_percentiles: metres by percentile of the readings; None without a reading.
     missing: share of pixels without a reading.

@@ -69,7 +69,7 @@ class Surface(Protocol):
     ) -> None:
         """Write the closest visible points of the hand to `correspondences`.
 
-        pose: (27,), in which `bodies` are placed already; min_normal_cosine: smallest cosine between the normal of the
-        surface and the observed one.
+        pose: (27,), in which `bodies` are placed already.
+        min_normal_cosine: smallest cosine between the normals of surface and observation.
         """
         ...

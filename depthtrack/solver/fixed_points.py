@@ -86,9 +86,11 @@ def squared_residuals(points: FixedPoints, bodies: BodyPoses) -> float:
 
 @compiled(nogil=True)
 def accumulate(points: FixedPoints, bodies: BodyPoses, centre: Array, M: Array, g: Array) -> float:
-    """Add the points to the normal equations of each body; returns `squared_residuals`.
+    """Add the points to the normal equations of each body; return `squared_residuals`.
 
-    centre: (3,) metres, camera frame, to which twists refer; M: (16, 6, 6) sums of a a^T; g: (16, 6) sums of a e.
+    centre: (3,) metres, camera frame, to which twists refer.
+    M: (16, 6, 6) sums of a a^T.
+    g: (16, 6) sums of a e.
     """
     a, total = np.empty(6), 0.0
     for i in range(points.body.shape[0]):

@@ -108,7 +108,10 @@ def solve_each(
 ) -> None:
     """Fit the points of the problem to each row of targets; `poses` change in place.
 
-    targets: (B, N, 3) metres, camera frame; weights: (B, N); poses: (B, 27) within the limits; energies: (B,) m^2, out.
+    targets: (B, N, 3) metres, camera frame.
+    weights: (B, N).
+    poses: (B, 27) within the limits.
+    energies: (B,) m^2, output.
     """
     bodies = BodyPoses(np.empty((16, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
     trace, count = np.empty(options.iterations + 1), problem.space.lower.shape[0]

@@ -27,10 +27,12 @@ from depthtrack.types import Array
 class PointFitOptions:
     """Iterations, damping and tolerances of a fit to points.
 
-    iterations: largest number of Gauss-Newton steps. damping: lambda of Schroeder et al. 2014, Eq. (4), m^2/rad^2; so
-    small that it only keeps angles that no point constrains at their start. pose_damping: the same for the global
-    pose, see `SolverOptions`. energy_tolerance, energy_floor: the fit ends after a step that decreases the energy by a
-    smaller share, or by fewer m^2 (1e-17 is a few nanometres). halvings: lengths tried for a step.
+    iterations: largest number of Gauss-Newton steps.
+    damping: lambda of Schroeder et al. 2014, Eq. (4), m^2/rad^2. It only keeps angles without a point at their start.
+    pose_damping: the same for the global pose, see `SolverOptions`.
+    energy_tolerance: the fit ends after a step that decreases the energy by a smaller share.
+    energy_floor: the fit ends after a step that decreases the energy by less, m^2; 1e-17 is a few nanometres.
+    halvings: lengths tried for a step.
     """
 
     iterations: int = 60

@@ -24,9 +24,11 @@ from depthtrack.types import Array
 class SolverStatus(IntEnum):
     """Reason why the solver stopped.
 
-    CONVERGED: the last step, or the decrease of the energy by it, fell below its tolerance. NO_PROGRESS: no halved step
-    decreased the energy. ITERATION_LIMIT: all iterations were used. SINGULAR: the damped normal equations were not
-    positive definite, so that the residuals and the damping leave a parameter undetermined.
+    CONVERGED: the last step, or the decrease of the energy by it, fell below its tolerance.
+    NO_PROGRESS: no halved step decreased the energy.
+    ITERATION_LIMIT: all iterations were used.
+    SINGULAR: the damped normal equations were not positive definite. The residuals and the damping leave a parameter
+        undetermined.
     """
 
     CONVERGED = 0
@@ -48,12 +50,15 @@ class Problem(NamedTuple):
 class SolverOptions(NamedTuple):
     """Iterations, damping and tolerances of the solver.
 
-    iterations: largest number of steps. posture_damping: lambda of Eq. (4) on each finger angle or synergy, m^2/rad^2.
-    pose_damping: damping of the translation (unitless), and a hundredfold smaller one of the rotation (m^2/rad^2); it
-    only keeps the system solvable. avoid_limits: increase the damping towards the limits (Schroeder et al. 2014,
-    Sec. IV-B). step_tolerance: the solver stops after a step whose largest element is smaller, m or rad.
-    energy_tolerance: it stops after a step that decreases the energy by a smaller share. energy_floor: it stops after
-    a step that decreases the energy by less, m^2. halvings: lengths tried for a step, each half of the one before.
+    iterations: largest number of steps.
+    posture_damping: lambda of Eq. (4) on each finger angle or synergy, m^2/rad^2.
+    pose_damping: damping of the translation (unitless). That of the rotation (m^2/rad^2) is a hundredth. It only keeps
+        the system solvable.
+    avoid_limits: increase the damping towards the limits (Schroeder et al. 2014, Sec. IV-B).
+    step_tolerance: the solver stops after a step whose largest element is smaller, m or rad.
+    energy_tolerance: the solver stops after a step that decreases the energy by a smaller share.
+    energy_floor: the solver stops after a step that decreases the energy by less, m^2.
+    halvings: lengths tried for a step, each half of the one before.
     """
 
     iterations: int

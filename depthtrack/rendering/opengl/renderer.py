@@ -166,7 +166,9 @@ class Renderer:
     ) -> tuple[int, int]:
         """Reduce each block of 4 x 4 texels of the tiles to one texel with a program.
 
-        tiles: (columns, rows). size: (width, height) of a tile in `source`, texels.
+        tiles: (columns, rows).
+        size: (width, height) of a tile in `source`, texels.
+
         Returns the size of a tile in `target`, whose framebuffer stays bound.
         """
         blocks = -(-size[0] // _BLOCK), -(-size[1] // _BLOCK)

@@ -152,7 +152,8 @@ def write_cones(table, k, hand, camera, bounds, p, a):
 def write_general(table, hand, camera, scratch, x, y, z, p):
     """Write the palm cylinder, its caps and the thumb's ellipsoid, a lane each.
 
-    x, y, z: axes of their bodies, unit; p: origins of their bodies, metres. Both in the camera frame.
+    x, y, z: axes of their bodies, unit, camera frame.
+    p: origins of their bodies, metres, camera frame.
     """
     c0, c1, c2 = (
         _load(hand, 8 * constants.GENERAL_CENTRE),
