@@ -115,12 +115,19 @@ class SurfaceFitOptions:
         "skin", "Surface to fit: the skin mesh, tapered cylinders with round ends, or the 37 rendered primitives"
     )
     subsample: int = option(3, "Use every n-th point of the cloud", source=f"{_SCHROEDER}, Sec. VI-B")
+    max_points: int = option(0, "Most points used; a larger cloud is subsampled more. 0: no limit", unit="points")
     icp: IcpOptions = option(IcpOptions(), "Iterative closest points")
     sampling: SurfaceOptions = option(SurfaceOptions(), "Points of the surface", advanced=True)
 
     def __post_init__(self) -> None:
         if not 1 <= self.subsample <= 1000:
             raise InputError(f"subsample must be between 1 and 1000, found {self.subsample}")
+        if self.max_points < 0:
+            raise InputError(f"max_points must not be negative, found {self.max_points}")
+
+    def step(self, count: int) -> int:
+        """Return n such that every n-th of `count` points is used."""
+        return max(self.subsample, math.ceil(count / self.max_points)) if self.max_points else self.subsample
 
 
 def constriction(cognitive: float, social: float) -> float:

@@ -113,7 +113,7 @@ class HybridConfig:
     name: ClassVar[str] = "hybrid"
 
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(max_points=3500), "Surface fit of each frame")
     predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
     retry_ratio: float = option(
         1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
