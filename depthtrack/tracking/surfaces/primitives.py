@@ -25,11 +25,12 @@ def primitive_points(shape: HandShape, spacing: float) -> SurfacePoints:
     parts = [sample_primitive(int(kind), T) for kind, T in zip(primitives.kinds, primitives.T_body_unit, strict=True)]
     local, normals = (np.concatenate([part[i] for part in parts]) for i in range(2))
     owner = np.repeat(np.arange(len(parts)), [len(points) for points, _ in parts])
-    hidden = np.ones(len(local), np.bool_)
+    hidden = np.arange(len(local))
     for angles in POSTURES.values():
         T = model.transforms(make_pose(np.zeros(3), (1, 0, 0, 0), angles))
-        hidden &= inside_others(primitives, T, local, owner)
-    local, normals, bodies = local[~hidden], normals[~hidden], primitives.bodies[owner[~hidden]]
+        hidden = hidden[inside_others(primitives, T, local[hidden], owner[hidden])]
+    local, normals, owner = (np.delete(each, hidden, axis=0) for each in (local, normals, owner))
+    bodies = primitives.bodies[owner]
     T_rest_body = model.transforms(make_pose(np.zeros(3), (1, 0, 0, 0), POSTURES["open"]))
     R, t = T_rest_body[bodies, :3, :3], T_rest_body[bodies, :3, 3]
     rest = np.einsum("nij,nj->ni", R, local) + t
@@ -69,17 +70,18 @@ def sample_primitive(kind: int, T: Array) -> tuple[Array, Array]:
 def inside_others(primitives: Primitives, T: Array, local: Array, owner: Index) -> Mask:
     """Return which points (N, 3) of the primitives `owner` (N,) lie inside another one.
 
-    T: (16, 4, 4) frames of the bodies. local: points in the frames of their bodies, metres.
+    T: (16, 4, 4) frames of the bodies.
+    local: points in the frames of their bodies, metres.
     """
     homogeneous = np.column_stack([local, np.ones(len(local))])
     points = np.einsum("nij,nj->ni", T[primitives.bodies[owner]], homogeneous)
     inside = np.zeros(len(local), np.bool_)
     for number, placed in enumerate(primitives.transforms(T)):
-        unit = points @ np.linalg.inv(placed).T
-        unit = unit[:, :3] / unit[:, 3:]
+        rows = np.flatnonzero(~inside & (owner != number))
+        x, y, z, w = np.linalg.inv(placed) @ points[rows].T
         if primitives.kinds[number] == SPHERE:
-            within = np.linalg.norm(unit, axis=1) < INSIDE
+            within = x * x + y * y + z * z < (INSIDE * w) ** 2
         else:
-            within = (np.hypot(unit[:, 0], unit[:, 1]) < INSIDE) & (unit[:, 2] > 0) & (unit[:, 2] < 1)
-        inside |= within & (owner != number)
+            within = (x * x + y * y < (INSIDE * w) ** 2) & (z * w > 0) & (z * w < w * w)
+        inside[rows[within]] = True
     return inside
