@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except DepthtrackError as error:
-        print(f"depthtrack {name}: {error}", file=sys.stderr)
+        _print_error(name, str(error))
         return 2
     except ImportError as error:
         from depthtrack.cli.broken_imports import advice, failed_module
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         module = failed_module(error)
         if module is None:
             raise
-        print(f"depthtrack {name}: {advice(module, str(error))}", file=sys.stderr)
+        _print_error(name, advice(module, str(error)))
         return 2
     except KeyboardInterrupt:
         print(f"depthtrack {name}: interrupted", file=sys.stderr)
@@ -72,8 +72,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         # A full disk or a missing permission: the reason of the system is enough.
-        print(f"depthtrack {name}: {error.filename or 'input or output'}: {error.strerror or error}", file=sys.stderr)
+        _print_error(name, f"{error.filename or 'input or output'}: {error.strerror or error}")
         return 2
+
+
+def _print_error(name: str, message: str) -> None:
+    """Print the error of a command; control characters of file names and arguments are escaped."""
+    text = f"depthtrack {name}: {message}"
+    shown = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+    print(shown.encode(errors="backslashreplace").decode(), file=sys.stderr)
 
 
 def _run(name: str, arguments: list[str]) -> int:

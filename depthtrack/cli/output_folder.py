@@ -6,10 +6,13 @@ from depthtrack.errors import InputError
 
 
 def check_output_folder(path: Path, option: str = "-o") -> None:
-    """Check that `path` is a folder or does not exist.
+    """Check that `path` is a folder without a recording, or does not exist.
 
     Raises:
-        InputError: if `path` is a file.
+        InputError: if `path` or the folder that contains it is a file, or if it holds a recording.
     """
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{option} must be a folder, found the file {path}: choose another name")
+    for folder in (path, *path.parents):
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"{option} must be a folder, found the file {folder}: choose another name")
+    if (path / "depth.txt").exists():
+        raise InputError(f"{option} must not be the folder of a recording, found {path}: choose another name")

@@ -72,8 +72,11 @@ class TrackCommand:
         check_output_folder(self.out)
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
+        if self.threads is not None and self.threads < 1:
+            raise InputError(f"--threads must be at least 1, found {self.threads}")
+        tracker = self.tracker_config  # checked before the recording is opened
         sequence = self._open()
-        configuration = self._configuration(sequence)
+        configuration = self._configuration(sequence, tracker)
         with (
             TrackingRun(configuration, sequence, self.threads or usable_cores()) as run,
             counter(len(run), leave=True) as shown,
@@ -89,7 +92,7 @@ class TrackCommand:
         repeated = None if self.config is None else _load(self.config).camera_model()
         return self.recording.open(repeated)
 
-    def _configuration(self, sequence: "Recording") -> "RunConfiguration":
+    def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
         from depthtrack.tracking.run import configure
 
         repeated = None if self.config is None else _load(self.config)
@@ -100,7 +103,7 @@ class TrackCommand:
         return configure(
             self.recording.path,
             sequence,
-            self.tracker_config,
+            tracker,
             hand,
             self.segmentation_options,
             start=self.start,

@@ -52,3 +52,7 @@ class ScoringOptions:
         None, "Longest side of the region that hypotheses are rendered at; the sensor's own if absent", unit="px"
     )
     objective: Objective = option(Objective(), "Objective function", advanced=True)
+
+    def __post_init__(self) -> None:
+        if self.resolution is not None and self.resolution < 1:
+            raise InputError(f"the resolution must be at least 1 pixel, found {self.resolution}")

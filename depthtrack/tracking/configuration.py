@@ -1,8 +1,10 @@
 """The configuration of each tracker; needs no numpy, so that `--help` stays fast."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
+from depthtrack.errors import InputError
 from depthtrack.options import option
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, SurfaceFitOptions, SwarmOptions
@@ -47,6 +49,16 @@ _ROUTINE_FITS = FitSearchOptions((FitRound(8, None, 3, coarse=True), FitRound(2,
 """Surface fits of its routine local search."""
 
 
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 2**63:
+        raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {seed}")
+
+
+def _check_predictions(shares: tuple[float, ...]) -> None:
+    if not shares or not all(map(math.isfinite, shares)):
+        raise InputError(f"predictions must be one or more finite numbers, such as 0 0.5 1, found {shares}")
+
+
 @dataclass(frozen=True)
 class PsoConfig:
     """PSO tracker: a swarm of rendered hypotheses per frame (after Oikonomidis et al. 2011)."""
@@ -69,6 +81,9 @@ class PsoConfig:
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
+
+    def __post_init__(self) -> None:
+        _check_seed(self.seed)
 
 
 @dataclass(frozen=True)
@@ -104,6 +119,10 @@ class IkConfig:
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
+
+    def __post_init__(self) -> None:
+        _check_seed(self.seed)
+        _check_predictions(self.predictions)
 
 
 @dataclass(frozen=True)
@@ -142,6 +161,10 @@ class HybridConfig:
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
 
+    def __post_init__(self) -> None:
+        _check_seed(self.seed)
+        _check_predictions(self.predictions)
+
 
 @dataclass(frozen=True)
 class Oikonomidis2011Config:
@@ -163,6 +186,9 @@ class Oikonomidis2011Config:
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
 
+    def __post_init__(self) -> None:
+        _check_seed(self.seed)
+
 
 @dataclass(frozen=True)
 class Schroeder2014Config:
@@ -183,6 +209,9 @@ class Schroeder2014Config:
     )
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
+
+    def __post_init__(self) -> None:
+        _check_seed(self.seed)
 
 
 DEFAULT_TRACKER = "hybrid"

@@ -77,3 +77,41 @@ def test_a_file_in_place_of_the_output_folder_is_rejected(
     assert main([part.format(recording=recording) for part in arguments] + [option, str(file)]) == 2
     assert f"{option} must be a folder, found the file {file}" in capsys.readouterr().err
     assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--seed", "-1"], "seed must be"),
+        (["--seed", str(2**63)], "seed must be"),
+        (["--predictions"], "predictions must be"),
+        (["--predictions", "nan"], "predictions must be"),
+        (["--scoring.resolution", "0"], "resolution must be"),
+        (["--threads", "0"], "--threads must be"),
+    ],
+)
+def test_a_value_out_of_range_leaves_no_folder(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["track", str(tmp_path / "absent"), "-o", str(tmp_path / "run"), *arguments]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_is_not_written_into_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "depth.txt").write_text("")
+    assert main(["track", str(tmp_path), "-o", str(tmp_path)]) == 2
+    assert "folder of a recording" in capsys.readouterr().err
+
+
+def test_an_output_below_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["track", str(tmp_path), "-o", str(tmp_path / "file" / "run")]) == 2
+    assert f"found the file {tmp_path / 'file'}" in capsys.readouterr().err
+
+
+def test_control_characters_are_escaped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(tmp_path / "no\x1b[31mname\x07")]) == 2
+    error = capsys.readouterr().err
+    assert "\\x1b[31mname\\x07" in error
+    assert "\x1b" not in error
