@@ -70,7 +70,10 @@ class RunWriter(Closing):
             raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
         folder.mkdir(parents=True, exist_ok=True)
         if started:
-            check_same(read_configuration(folder), configuration, folder)
+            before = read_configuration(folder)
+            check_same(before, configuration, folder)
+            if before.get("on_damage") != configuration.get("on_damage"):
+                write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
             _rewrite(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
             kept = _read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
@@ -249,11 +252,15 @@ def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
     """Check that a run is resumed with its configuration, except threads, versions and machine.
 
+    A run that refuses damaged frames may go on without them: the frames before are the same.
+
     Raises:
         InputError: if another entry differs; it names the first one.
     """
     # The tracker first, since its options follow from it.
     for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
+        if key == "on_damage" and wanted.get(key) == "skip":
+            continue
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             name, before, now = _first_difference(key, found.get(key), wanted.get(key))
             raise InputError(

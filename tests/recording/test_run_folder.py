@@ -89,6 +89,16 @@ def test_a_run_resumes_only_with_its_own_options(tmp_path: Path) -> None:
     RunWriter(tmp_path / "run", {**CONFIGURATION, "threads": 1}, STAGES, resume=True).close()
 
 
+def test_a_run_goes_on_without_damaged_frames(tmp_path: Path) -> None:
+    """It may not return to their refusal, which would have ended it earlier."""
+    refuse, skip = ({**CONFIGURATION, "on_damage": choice} for choice in ("refuse", "skip"))
+    for configuration in (refuse, skip):
+        RunWriter(tmp_path / "run", configuration, STAGES, resume=True).close()
+        assert Run.load(tmp_path / "run").configuration == configuration
+    with pytest.raises(InputError, match="on_damage"):
+        RunWriter(tmp_path / "run", refuse, STAGES, resume=True)
+
+
 def test_resuming_an_empty_folder_begins_a_run(tmp_path: Path) -> None:
     write(tmp_path / "run", 3, resume=True)
     assert len(Run.load(tmp_path / "run").index) == 3
