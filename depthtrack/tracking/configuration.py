@@ -37,6 +37,10 @@ _FIT_FINGERS = FingerOptions(resolution=96, stop_early=False)
 """Search of single fingers."""
 _HYBRID_SEARCH = replace(_GLOBAL_FITS, good_ratio=1.2)
 """Global search of the hybrid tracker. A track's median energy states what a good one is."""
+_DOUBT_FITS = FitSearchOptions(
+    (FitRound(32, 8, 3, coarse=True), FitRound(12, None, 4), FitRound(4, None, 8), FitRound(1, None, 12))
+)
+"""Surface fits of its global search in a doubtful frame."""
 _HYBRID_RECOVERY = replace(_FIT_RECOVERY, elevated_ratio=1.1)
 """Its conditions of a local search."""
 _HYBRID_FINGERS = replace(_FIT_FINGERS, turns=2, usual_turns=6, shift_iterations=3)
@@ -132,7 +136,10 @@ class HybridConfig:
     name: ClassVar[str] = "hybrid"
 
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(max_points=3500), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    search_points: int = option(
+        3500, "Most points that the fits of searches use; 0: no limit", unit="points", advanced=True
+    )
     predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
     retry_ratio: float = option(
         1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
@@ -145,6 +152,9 @@ class HybridConfig:
         advanced=True,
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    doubt_search: FitSearchOptions = option(
+        _DOUBT_FITS, "Surface fits of the global search of a doubtful frame", advanced=True
+    )
     recovery: RecoveryOptions = option(
         _HYBRID_RECOVERY,
         "Local re-initialisation",

@@ -25,12 +25,14 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     """
     fit = SurfaceFit(config.fit)
     chosen = FitChosenSurface(config.surface_choice, fit)
-    search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
-    routine = FitSearch(config.routine_search, config.fit)
-    in_turn = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
+    sparse = replace(config.fit, max_points=config.search_points)
+    search, near = FitSearch(config.fit_search, sparse), FitSearch(config.local_search, sparse)
+    routine = FitSearch(config.routine_search, sparse)
+    in_turn = RefineFingers(near, config.recovery, config.fingers, refit=sparse)
     fingers = replace(in_turn, options=replace(config.fingers, turns=1, usual_turns=1))
     start: list[Stage] = [SearchGlobally(search, config.search), chosen, fingers]
-    elsewhere: list[Stage] = [SearchGlobally(search, replace(config.search, attempts=1)), chosen, fingers]
+    doubt = FitSearch(config.doubt_search, sparse)
+    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), chosen, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
