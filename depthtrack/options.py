@@ -142,3 +142,13 @@ def _forbid_extras(kind: Any, configuration: Any) -> None:
         for part in (nested, *getattr(nested, "__args__", ())):
             if dataclasses.is_dataclass(part) and "__pydantic_config__" not in vars(part):
                 _forbid_extras(part, configuration)
+
+
+def check_seed(seed: int) -> None:
+    """Check the seed of random numbers.
+
+    Raises:
+        InputError: if it is not within 0 to 2^63 - 1.
+    """
+    if not 0 <= seed < 2**63:
+        raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {seed}")

@@ -14,6 +14,7 @@ from depthtrack import __version__
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
+from depthtrack.options import check_seed
 from depthtrack.recording.writer import SequenceWriter
 from depthtrack.synthesis.backdrop import Backdrop
 from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
@@ -70,8 +71,7 @@ class Synthesis:
             raise InputError(f"skin flips must lie between 0 and 100 %, found {self.skin_flips * 100:g} %")
         if not 1 <= self.rate <= 1000:
             raise InputError(f"the frame rate must lie between 1 and 1000 Hz, found {self.rate:g} Hz")
-        if not 0 <= self.seed < 2**63:
-            raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {self.seed}")
+        check_seed(self.seed)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from depthtrack.errors import InputError
-from depthtrack.options import option
+from depthtrack.options import check_seed, option
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, SurfaceFitOptions, SwarmOptions
 from depthtrack.tracking.options import (
@@ -53,11 +53,6 @@ _ROUTINE_FITS = FitSearchOptions((FitRound(8, None, 3, coarse=True), FitRound(2,
 """Surface fits of its routine local search."""
 
 
-def _check_seed(seed: int) -> None:
-    if not 0 <= seed < 2**63:
-        raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {seed}")
-
-
 def _check_predictions(shares: tuple[float, ...]) -> None:
     if not shares or not all(map(math.isfinite, shares)):
         raise InputError(f"predictions must be one or more finite numbers, such as 0 0.5 1, found {shares}")
@@ -87,7 +82,7 @@ class PsoConfig:
     seed: int = option(0, "Seed of the random numbers")
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
+        check_seed(self.seed)
 
 
 @dataclass(frozen=True)
@@ -125,7 +120,7 @@ class IkConfig:
     seed: int = option(0, "Seed of the random numbers")
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
+        check_seed(self.seed)
         _check_predictions(self.predictions)
 
 
@@ -172,8 +167,10 @@ class HybridConfig:
     seed: int = option(0, "Seed of the random numbers")
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
+        check_seed(self.seed)
         _check_predictions(self.predictions)
+        if self.search_points < 0:
+            raise InputError(f"search_points must not be negative, found {self.search_points}")
 
 
 @dataclass(frozen=True)
@@ -197,7 +194,7 @@ class Oikonomidis2011Config:
     seed: int = option(0, "Seed of the random numbers")
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
+        check_seed(self.seed)
 
 
 @dataclass(frozen=True)
@@ -221,7 +218,7 @@ class Schroeder2014Config:
     seed: int = option(0, "Seed of the random numbers")
 
     def __post_init__(self) -> None:
-        _check_seed(self.seed)
+        check_seed(self.seed)
 
 
 DEFAULT_TRACKER = "hybrid"

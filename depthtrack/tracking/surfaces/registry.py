@@ -1,11 +1,13 @@
 """The surfaces of a hand that points are matched to, by name."""
 
+from functools import lru_cache
+
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.solver.correspondences import Surface
 from depthtrack.solver.options import SurfaceName, SurfaceOptions
 from depthtrack.tracking.surfaces.capsules import CapsuleSurface
-from depthtrack.tracking.surfaces.points import PointSurface
+from depthtrack.tracking.surfaces.points import PointSurface, SurfacePoints
 from depthtrack.tracking.surfaces.primitives import primitive_points
 from depthtrack.tracking.surfaces.skin import skin_points
 
@@ -24,5 +26,10 @@ def make_surface(
     """
     if name == "cylinders":
         return CapsuleSurface(hand, create_scorer(renderer, hand), options)
-    points = skin_points(hand, options.spacing) if name == "skin" else primitive_points(hand, options.spacing)
-    return PointSurface(points, options)
+    return PointSurface(_points(name, hand, options.spacing), options)
+
+
+@lru_cache(maxsize=8)
+def _points(name: SurfaceName, hand: HandShape, spacing: float) -> SurfacePoints:
+    """Return the points of a surface, which the fitters of a tracker share."""
+    return skin_points(hand, spacing) if name == "skin" else primitive_points(hand, spacing)

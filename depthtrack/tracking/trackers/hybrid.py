@@ -25,7 +25,8 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     """
     fit = SurfaceFit(config.fit)
     chosen = FitChosenSurface(config.surface_choice, fit)
-    sparse = replace(config.fit, max_points=config.search_points)
+    limits = [limit for limit in (config.fit.max_points, config.search_points) if limit > 0]
+    sparse = replace(config.fit, max_points=min(limits, default=0))
     search, near = FitSearch(config.fit_search, sparse), FitSearch(config.local_search, sparse)
     routine = FitSearch(config.routine_search, sparse)
     in_turn = RefineFingers(near, config.recovery, config.fingers, refit=sparse)
