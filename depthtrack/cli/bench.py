@@ -21,7 +21,7 @@ class _Benchmark:
     """Duration of the measurement for each row. The table gives the best and the median call."""
     json: bool = False
     """Print JSON instead of a table."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    out: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
     """Also write the JSON to a file."""
 
     def _measure(self, benchmark: "ModuleType", plan: Any) -> None:

@@ -36,7 +36,7 @@ class Command:
     """Hand file to write."""
     side: Literal["auto", "right", "left"] = "auto"
     """Side of the hand; `auto` tries both."""
-    hand: Annotated[Path | None, tyro.conf.arg(metavar="RIG.glb")] = None
+    hand: Annotated[Path | None, stated_default(metavar="RIG.glb")] = None
     """Rigged mesh (.glb, .gltf), or hand file that refers to one, to scale to the recording."""
     picture: Annotated[Path | None, stated_default(metavar="FILE.png")] = None
     """Picture of the hand before and after calibration to write (default: beside the hand file)."""

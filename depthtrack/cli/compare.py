@@ -31,7 +31,7 @@ class Command:
     table per tracker: [label], tracker = "ik", and its options."""
     repeats: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Runs per tracker and recording, each with another seed."""
-    equal_time: Annotated[float | None, tyro.conf.arg(metavar="MS")] = None
+    equal_time: Annotated[float | None, stated_default(metavar="MS")] = None
     """CPU milliseconds per median frame for every tracker. The work of each is chosen by timing some frames. A search
     after a loss takes extra time. The report warns if even the least work takes longer."""
     seed: int = 0
@@ -41,7 +41,7 @@ class Command:
 
     jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    scheduler: Annotated[str | None, stated_default(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers track instead (extra: sweep). Each worker
     needs one thread, and the recordings and DIR under the same paths."""
     json: bool = False

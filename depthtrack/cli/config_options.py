@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import tyro
 
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.options import Parameter, parameters, to_data, with_options
 
@@ -57,7 +58,7 @@ def _annotation(parameter: Parameter, prefix: str, hidden: bool) -> Any:
     )
     path = parameter.path.replace("_", "-")
     aliases = (f"--{prefix}{path}",) if "." in path and flag != path else ()
-    argument = tyro.conf.arg(name=prefix + flag, aliases=aliases, help=f"{parameter.meaning}{unit}.{source}")
+    argument = stated_default(name=prefix + flag, aliases=aliases, help=f"{parameter.meaning}{unit}.{source}")
     kind = parameter.kind if _is_plain(parameter.kind) else str
     if parameter.advanced and hidden:
         return Annotated[kind, tyro.conf.Suppress, argument]

@@ -29,7 +29,7 @@ class Command:
     ground truth.
     """
 
-    path: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="PATH")] = None
+    path: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="PATH")] = None
     """Your own recording."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
     """Folder to write to. The same folder continues an interrupted demo."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,20 +26,20 @@ class Command:
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
     """Run folders from `depthtrack track`."""
-    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the runs, if it was moved, or of the predictions."""
     residuals: bool = True
     """Segment every frame again for the metrics without ground truth. This takes most of the time."""
     json: bool = False
     """Print JSON instead of a table: an object for one run, an array for several."""
-    report: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    report: Annotated[Path | None, stated_default(metavar="DIR")] = None
     """Also write report.html, results.csv and results.json to this folder."""
 
-    predictions: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
+    predictions: Annotated[Path | None, stated_default(metavar="FILE.txt")] = None
     """Prediction file of a public benchmark: one line per frame, with u v d of each joint in pixels and millimetres."""
-    labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE.txt")] = None
+    labels: Annotated[Path | None, stated_default(metavar="FILE.txt")] = None
     """True joints of the same frames in the same format, instead of --sequence."""
-    benchmark: Annotated[Literal["nyu", "icvl", "msra"] | None, tyro.conf.arg(metavar="nyu|icvl|msra")] = None
+    benchmark: Annotated[Literal["nyu", "icvl", "msra"] | None, stated_default(metavar="nyu|icvl|msra")] = None
     """Benchmark that defines the joints, their order and the camera of both files."""
 
     def run(self) -> None:

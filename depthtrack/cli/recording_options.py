@@ -24,9 +24,9 @@ class RecordingOptions:
 
     path: tyro.conf.Positional[Path]
     """The recording: a sequence folder, or a plain TUM RGB-D folder with a camera given below."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    camera: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
     """Camera in place of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
-    camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
+    camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor or of the TUM RGB-D benchmark, in place of the recording's own."""
     fx: Pixels = None
     """Horizontal focal length. Replaces that of the file or preset, or defines a camera together with --depth-scale."""
@@ -36,7 +36,7 @@ class RecordingOptions:
     """Column of the principal point (default: the centre of the image)."""
     cy: Pixels = None
     """Row of the principal point (default: the centre of the image)."""
-    depth_scale: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
+    depth_scale: Annotated[float | None, stated_default(metavar="METRES")] = None
     """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame: stop with an error, or skip and count it."""

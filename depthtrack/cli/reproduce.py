@@ -27,7 +27,7 @@ class Command:
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
     """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; or `list` to print the
     names."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = None
+    out: Annotated[Path | None, stated_default(aliases=("-o",), metavar="DIR")] = None
     """Folder to write to."""
     quick: bool = False
     """Run a coarse version with fewer cells and repetitions and swarms at 96 pixels. A figure then takes two minutes on
@@ -40,14 +40,14 @@ class Command:
     """Measurements of the swarm per cell, each with another seed (default: as many as in the paper)."""
     resolution: Annotated[int | None, stated_default(metavar="PIXELS")] = None
     """Longest side of the rendered hypotheses of the swarm (default: the resolution of the sensor)."""
-    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    frames: Annotated[int | None, stated_default(metavar="N")] = None
     """Use only the first N frames of the motion."""
-    synergies: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH")] = None
+    synergies: Annotated[str | None, stated_default(metavar="NAME|PATH")] = None
     """Synergies in place of those of each figure: the name of a set, as leap, or of a motion, as signs; a .json from
     `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
     jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    scheduler: Annotated[str | None, stated_default(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""
     json: bool = False
     """Print the summaries as a JSON array."""

@@ -41,7 +41,7 @@ class SegmentCommand:
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts
     )
-    tracker: TrackerName | None = None
+    tracker: Annotated[TrackerName | None, stated_default()] = None
     """Tracker whose predictions guide the segmentation, as in `depthtrack track`. This is slower but finds the wrist
     more reliably."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)

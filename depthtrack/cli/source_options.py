@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 class SourceOptions:
     """Frames to track, and the hand, skin colours and camera of all recordings."""
 
-    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    frames: Annotated[int | None, stated_default(metavar="N")] = None
     """Track only the first N frames of each recording."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    camera: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
     """Camera of recordings without one."""
-    camera_preset: Annotated[PresetName | None, tyro.conf.arg(metavar="kinect1|kinect2|realsense|tum")] = None
+    camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor, for recordings without one."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame: stop with an error, or skip and count it."""

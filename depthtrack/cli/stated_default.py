@@ -1,4 +1,4 @@
-"""Options with a default that their help describes in words."""
+"""Options whose default is absent, or described in words by their help."""
 
 from typing import Any
 
@@ -6,9 +6,9 @@ import tyro
 
 
 def stated_default(**properties: Any) -> Any:
-    """Return `tyro.conf.arg(**properties)` for an option whose help ends with "(default: ...)".
+    """Return `tyro.conf.arg(**properties)` for an option that is absent by default.
 
-    The help then shows no second default for an empty value, such as None.
+    Its help shows no empty value, such as None, as the default. It may end with "(default: ...)" itself.
     """
     return tyro.conf.arg(help_behavior_hint=_shown, **properties)
 

@@ -76,7 +76,7 @@ class Info:
 
     file: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.json")] = "leap"
     """File from `fit`, or the name of an included set: leap, leap-grasps."""
-    picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
+    picture: Annotated[Path | None, stated_default(metavar="FILE.png")] = None
     """Picture to write: the hand from -2 to +2 standard deviations along each of the first components."""
     components: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 4
     """Number of components in the picture."""

@@ -24,7 +24,7 @@ class Command:
 
     motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")]
     """Name of a motion, or path of a .toml file like those in `sequences/`; `list` prints the names."""
-    out: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")] = None
+    out: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="OUT")] = None
     """Folder to write. An existing folder needs --overwrite."""
 
     sensor: Literal["ideal", "kinect1", "kinect2", "realsense"] = "ideal"

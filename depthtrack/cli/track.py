@@ -38,12 +38,12 @@ class TrackCommand:
     tracker: TrackerName
     """Tracker: ik fits a surface to the point cloud, pso renders hypotheses, hybrid does both; the others are those of
     the papers."""
-    config: Annotated[Path | None, tyro.conf.arg(metavar="RUN.json")] = None
+    config: Annotated[Path | None, stated_default(metavar="RUN.json")] = None
     """Configuration to repeat: the run.json of a run, or its folder."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)
     start: Literal["auto", "truth"] = "auto"
     """Start with a search, or from the recording's true pose of its first frame."""
-    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    frames: Annotated[int | None, stated_default(metavar="N")] = None
     """Track only the first N frames."""
     resume: bool = False
     """Continue the run that the folder holds."""

@@ -7,6 +7,7 @@ from typing import Annotated
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Command:
     """Folder of images, or a recording."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")]
     """Model to write."""
-    masks: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="MASKS")] = None
+    masks: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="MASKS")] = None
     """Folder of masks; leave it out for a recording."""
 
     def run(self) -> None:

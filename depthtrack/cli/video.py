@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 
@@ -21,7 +22,7 @@ class Command:
     """Run folder from `depthtrack track`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT.mp4")]
     """Video to write."""
-    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the run, if it was moved."""
     height: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 360
     """Height of each of the four views."""

@@ -15,13 +15,13 @@ class ViewOptions:
     """Content to show and files to write."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sheet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
+    sheet: Annotated[Path | None, stated_default(metavar="FILE.png|.jpg")] = None
     """Contact sheet to write, with evenly spaced frames of the recording."""
-    strip: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png|.jpg")] = None
+    strip: Annotated[Path | None, stated_default(metavar="FILE.png|.jpg")] = None
     """Strip of close-ups to write: one column per frame, with colour, depth, hand and skeleton below each other."""
-    video: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mp4")] = None
+    video: Annotated[Path | None, stated_default(metavar="FILE.mp4")] = None
     """Video of the whole recording to write."""
-    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE.rrd")] = None
+    rrd: Annotated[Path | None, stated_default(metavar="FILE.rrd")] = None
     """File of the interactive viewer to write (rerun FILE.rrd opens it)."""
     web: bool = False
     """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
@@ -36,5 +36,5 @@ class ViewOptions:
     codec: Literal["quick", "web"] = "quick"
     """Video encoding: "quick" for video players; "web" also for browsers, but it takes much longer."""
 
-    sequence: Annotated[Path | None, tyro.conf.arg(metavar="PATH")] = None
+    sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the run, if it was moved."""
