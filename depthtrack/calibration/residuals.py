@@ -39,9 +39,8 @@ class CalibrationView:
 
     def __init__(self, observation: Observation) -> None:
         self.observation = observation
-        every = max(1, round(len(observation.points) / _POINTS))
-        pick = slice(every // 2, None, every)
-        self.points, self.normals = observation.points[pick], observation.normals[pick]
+        every = max(1, round(observation.reading_count / _POINTS))
+        self.points, self.normals = observation.subsampled_cloud(every)
         self.beyond = _beyond(observation.silhouette)
         """(h, w) signed distance to the silhouette in pixels, negative inside."""
         slope = np.stack([np.gradient(self.beyond, axis=axis) for axis in (0, 1)])

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.rendering.target import Target
 from depthtrack.segmentation.options import PointCloudOptions
@@ -41,13 +43,24 @@ class Observation(Target):
     @property
     def points(self) -> Array:
         """Points (N, 3) of the visible hand in metres, camera frame, row by row of the region."""
-        return self._cloud[0]
+        return self.subsampled_cloud(1)[0]
 
     @property
     def normals(self) -> Array:
         """Unit normals (N, 3) of the points, towards the camera."""
-        return self._cloud[1]
+        return self.subsampled_cloud(1)[1]
 
     @cached_property
-    def _cloud(self) -> tuple[Array, Array]:
-        return point_cloud(self.camera, self.depth, self.cloud_options)
+    def reading_count(self) -> int:
+        """Number of pixels with a reading, and of `points`."""
+        return int(np.count_nonzero(self.depth))
+
+    def subsampled_cloud(self, every: int) -> tuple[Array, Array]:
+        """Return every n-th point (N, 3) and its normal, from the middle of the first n."""
+        if every not in self._clouds:
+            self._clouds[every] = point_cloud(self.camera, self.depth, self.cloud_options, every)
+        return self._clouds[every]
+
+    @cached_property
+    def _clouds(self) -> dict[int, tuple[Array, Array]]:
+        return {}

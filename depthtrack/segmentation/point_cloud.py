@@ -10,10 +10,13 @@ from depthtrack.segmentation.options import PointCloudOptions
 from depthtrack.types import Array, Depth, Index
 
 
-def point_cloud(camera: Camera, depth: Depth, options: PointCloudOptions | None = None) -> tuple[Array, Array]:
+def point_cloud(
+    camera: Camera, depth: Depth, options: PointCloudOptions | None = None, every: int = 1
+) -> tuple[Array, Array]:
     """Return the points and unit normals of a depth map, row by row.
 
     depth: (h, w), metres; 0 without a reading.
+    every: step between the pixels that give a point (Schroeder et al. 2014, Sec. VI-B).
     points: (N, 3), metres, camera frame.
     normals: (N, 3), towards the camera.
 
@@ -22,29 +25,42 @@ def point_cloud(camera: Camera, depth: Depth, options: PointCloudOptions | None 
     the normal is the line of sight.
     """
     options = options or PointCloudOptions()
-    rows, columns = np.nonzero(depth)
-    points, normals = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+    pixels = _every_reading(depth, every, len(range(every // 2, np.count_nonzero(depth), every)))
+    points, normals = np.empty((len(pixels), 3)), np.empty((len(pixels), 3))
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
-    _fit(depth, rows, columns, intrinsics, options.sample_spacing, options.same_surface, points, normals)
+    _fit(depth, pixels, intrinsics, options.sample_spacing, options.same_surface, points, normals)
     return points, normals
+
+
+@compiled(nogil=True)
+def _every_reading(depth: Depth, every: int, count: int) -> Index:
+    """Return row and column (count, 2) of every n-th pixel with a reading."""
+    pixels, wait, n = np.empty((count, 2), np.int64), every // 2, 0
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
+            if depth[v, u] != 0.0:
+                if wait == 0:
+                    pixels[n, 0], pixels[n, 1] = v, u
+                    n, wait = n + 1, every
+                wait -= 1
+    return pixels
 
 
 @compiled(nogil=True)
 def _fit(
     depth: Depth,
-    rows: Index,
-    columns: Index,
+    pixels: Index,
     intrinsics: tuple[float, float, float, float],
     spacing: int,
     same_surface: float,
     points: Array,
     normals: Array,
 ) -> None:
-    """Write points and normals of the pixels at `rows` and `columns` (N,)."""
+    """Write points and normals of pixels, row and column (N, 2)."""
     fx, fy, cx, cy = intrinsics
     height, width = depth.shape
-    for n in range(rows.shape[0]):
-        v, u = rows[n], columns[n]
+    for n in range(pixels.shape[0]):
+        v, u = pixels[n, 0], pixels[n, 1]
         z = np.float64(depth[v, u])
         x, y = (u - cx) / fx, (v - cy) / fy
         points[n, 0], points[n, 1], points[n, 2] = x * z, y * z, z

@@ -51,19 +51,26 @@ def segment_roi(
     lens = (camera.fx, camera.fy, camera.cx - region.left, camera.cy - region.top)
     kinds = np.empty(depth.shape, dtype=np.uint8)
     mark_reachable(depth, lens, prior.centre, reach, prior.wrist.point, prior.wrist.normal, kinds)
-    readings, silhouette = kinds == READING, kinds == READING
+    readings = kinds == READING
+    if not readings.any():
+        return None
+    radius, margin = dilation_radius(camera, options.outline), options.roi.margin * camera.fx / float(prior.centre[2])
+    # The closing below needs twice its radius around the readings.
+    near = bounding_box(readings, max(2 * radius + 1, round(margin)))
+    readings, missing = readings[near.slices], kinds[near.slices] == MISSING
+    silhouette = readings
     if skin is not None and frame.colour is not None:
-        coloured = skin.find(frame.colour, region, np.ones((1, 1), np.uint8), max(depth.shape)) > 0
-        radius = dilation_radius(camera, options.outline)
-        readings &= dilated(coloured, radius)
+        found = skin.find(frame.colour, region, np.ones((1, 1), np.uint8), max(depth.shape))
+        coloured = found[near.slices] > 0
+        readings = readings & dilated(coloured, radius)
         # Skin without a reading counts in gaps between readings only: outside them, shadows can have its colour.
-        silhouette = readings | (coloured & closed(readings, radius) & (kinds == MISSING))
+        silhouette = readings | (coloured & closed(readings, radius) & missing)
     silhouette = without_small_components(silhouette, options.roi.small_component)
-    readings &= silhouette
+    readings = readings & silhouette
     if np.count_nonzero(readings) < options.roi.least_readings:
         return None
-    roi = bounding_box(silhouette, round(options.roi.margin * camera.fx / float(prior.centre[2])))
-    return HandMasks(roi.shifted(region.left, region.top), silhouette[roi.slices], readings[roi.slices])
+    roi, whole = bounding_box(silhouette, round(margin)), near.shifted(region.left, region.top)
+    return HandMasks(roi.shifted(whole.left, whole.top), silhouette[roi.slices], readings[roi.slices])
 
 
 @compiled(nogil=True)

@@ -25,10 +25,7 @@ class PointCloud(NamedTuple):
 
         every: step between the kept points (Schroeder et al. 2014, Sec. VI-B).
         """
-        pick = slice(every // 2, None, every)
-        return PointCloud(
-            np.ascontiguousarray(observation.points[pick]), np.ascontiguousarray(observation.normals[pick])
-        )
+        return PointCloud(*observation.subsampled_cloud(every))
 
 
 class Correspondences(NamedTuple):

@@ -17,7 +17,7 @@ from depthtrack.solver.gauss_newton import solve
 from depthtrack.solver.normal_equations import NormalEquations, clear
 from depthtrack.solver.options import IcpOptions
 from depthtrack.solver.prior import Prior
-from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradient
+from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradients
 from depthtrack.solver.residuals import add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.types import Array
@@ -71,8 +71,7 @@ class IcpFitter:
         pose[ANGLES] = subspace.angles(coordinates)
         for _ in range(options.rigid_iterations if align else 0):
             self._align(pose)
-        slope = np.array([limit_gradient(*c) for c in zip(coordinates, subspace.lower, subspace.upper, strict=True)])
-        state = SolverState(pose, coordinates, slope)
+        state = SolverState(pose, coordinates, limit_gradients(coordinates, subspace.lower, subspace.upper))
         problem = Problem(self._chain, self._equations, self._points, pull, subspace)
         solver = SolverOptions(
             options.gn_iterations, options.damping * share, options.pose_damping, options.avoid_limits

@@ -44,10 +44,11 @@ class NormalEquations(NamedTuple):
         return NormalEquations(np.zeros((n, 6, ROW)), np.zeros(n), np.zeros((n, 3, 4)), np.zeros(3))
 
 
+@compiled(nogil=True)
 def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
     """Remove all residuals, and refer those to come to the bodies where they are now."""
-    equations.sums.fill(0.0)
-    equations.e.fill(0.0)
+    equations.sums[:] = 0.0
+    equations.e[:] = 0.0
     equations.T[:] = bodies.T
     equations.centre[:] = bodies.T[0, :, 3]
 

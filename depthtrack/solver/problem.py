@@ -89,8 +89,7 @@ class SolverState(NamedTuple):
         start = np.array(pose, dtype=np.float64)
         coordinates = space.project(start[ANGLES])
         start[ANGLES] = space.angles(coordinates)
-        slope = np.array([limit_gradient(*c) for c in zip(coordinates, space.lower, space.upper, strict=True)])
-        return SolverState(start, coordinates, slope)
+        return SolverState(start, coordinates, limit_gradients(coordinates, space.lower, space.upper))
 
 
 class Outcome(NamedTuple):
@@ -138,3 +137,12 @@ def limit_gradient(x: float, low: float, high: float) -> float:
     """
     room = max((high - x) * (x - low), 1e-9)
     return (high - low) ** 2 * abs(2 * x - high - low) / (room * room)
+
+
+@compiled(nogil=True)
+def limit_gradients(x: Array, low: Array, high: Array) -> Array:
+    """Return `limit_gradient` of each coordinate (l,)."""
+    out = np.empty(x.shape[0])
+    for i in range(x.shape[0]):
+        out[i] = limit_gradient(x[i], low[i], high[i])
+    return out

@@ -66,7 +66,7 @@ class Toolkit:
             self._fitters[options] = IcpFitter(self.hand, surface, options.icp)
         fitter = self._fitters[options]
         if self._targets.get(options) is not observation:
-            fitter.set_target(observation, options.step(len(observation.points)))
+            fitter.set_target(observation, options.step(observation.reading_count))
             self._targets[options] = observation
         return fitter
 

@@ -85,3 +85,13 @@ def test_another_surface_does_not_bend_the_normal() -> None:
 def test_an_empty_map_has_no_points() -> None:
     points, normals = point_cloud(CAMERA, np.zeros(CAMERA.shape, np.float32))
     assert points.shape == normals.shape == (0, 3)
+
+
+def test_a_subsampled_cloud_is_part_of_the_whole_one() -> None:
+    depth = np.random.default_rng(5).uniform(0.4, 0.42, (20, 30)).astype(np.float32)
+    depth[3:7, 4:9] = 0
+    camera = Camera(30, 20, 500.0, 500.0, 15.0, 10.0)
+    whole = point_cloud(camera, depth)
+    for every in (2, 3, 7):
+        for all_rows, some in zip(whole, point_cloud(camera, depth, every=every), strict=True):
+            np.testing.assert_array_equal(some, all_rows[every // 2 :: every])

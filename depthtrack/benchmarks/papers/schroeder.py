@@ -84,7 +84,7 @@ def track_motion(
             else:
                 estimates.append(tracker.track(observation))
             seconds.append(process_time() - begun)
-            points.append(len(observation.points))
+            points.append(observation.reading_count)
     hand, poses = HandModel(observed.hand), np.array([estimate.pose for estimate in estimates])
     angles = angle_error(poses, observed.poses)
     degrees, endpoints = angles.statistics(), endpoint_error(hand, poses, hand, observed.poses).statistics()

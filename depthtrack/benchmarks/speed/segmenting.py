@@ -138,7 +138,7 @@ def measure(shot: Shot, use_colour: bool, seconds: float) -> SegmentRow:
         observation = segmenter.segment(frame)
         if observation is None:
             raise InputError(f"{shot.name}: frame {frame.index} shows no hand: give a recording with a hand")
-        points.append(len(observation.points))
+        points.append(observation.reading_count)
         if truth is not None:
             overlaps.append(silhouette_iou(observation.whole_mask(frame.depth.shape), truth))
     end = perf_counter() + seconds

@@ -16,6 +16,7 @@ from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
+from depthtrack.simd.vectors import kernel_part
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
 from depthtrack.tracking.surfaces.capsule_fit import Capsules, fitted_capsules
@@ -146,7 +147,7 @@ def measure(points: Array, capsules: Capsules, posed: PosedCapsules, out: Distan
             which[i] = number if nearer else which[i]
 
 
-@compiled(nogil=True)
+@kernel_part
 def choose(
     cloud: PointCloud,
     capsules: Capsules,
@@ -180,7 +181,7 @@ def choose(
                     k, distance = j, distances.each[j, i]
 
 
-@compiled(nogil=True)
+@kernel_part
 def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsules, k: int, x: Array, n: Array) -> None:
     """Write the point of capsule k closest to point i, and its normal, to row i of `x` and `n`.
 
@@ -211,7 +212,7 @@ def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsule
         x[i, j] += radius * n[i, j]
 
 
-@compiled(nogil=True)
+@kernel_part
 def _hidden(x: Array, i: int, rendered: RenderedHand) -> bool:
     """Return whether the rendered hand hides row i of x (N, 3)."""
     fx, fy, cx, cy = rendered.lens

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
+from depthtrack.simd.vectors import kernel_part
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
@@ -104,10 +105,29 @@ class PointSurface:
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        pose_points(self._points, bodies, self._posed)
-        visible = sort_visible(self._posed, self._cells, self._options.hidden_depth)
-        closest_vertices(cloud, visible, self._cells, self._max_distance, min_normal_cosine, correspondences.body)
-        resolve_bodies(self._points, self._posed, visible, correspondences)
+        limits = (self._options.hidden_depth, self._max_distance, min_normal_cosine)
+        match_points(self._points, bodies, self._posed, self._cells, cloud, limits, correspondences)
+
+
+@compiled(nogil=True)
+def match_points(
+    points: SurfacePoints,
+    bodies: BodyPoses,
+    posed: Posed,
+    cells: Cells,
+    cloud: PointCloud,
+    limits: tuple[float, float, float],
+    correspondences: Correspondences,
+) -> None:
+    """Write the closest visible points to `correspondences`, and the posed points to `posed`.
+
+    limits: `sort_visible`'s tolerance, largest distance (m), smallest cosine between the normals.
+    """
+    tolerance, max_distance, min_normal_cosine = limits
+    pose_points(points, bodies, posed)
+    visible = sort_visible(posed, cells, tolerance)
+    closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, correspondences.body)
+    resolve_bodies(points, posed, visible, correspondences)
 
 
 @compiled(nogil=True)
@@ -209,7 +229,7 @@ def sort_visible(posed: Posed, cells: Cells, tolerance: float) -> Visible:
     return visible
 
 
-@compiled(nogil=True)
+@kernel_part
 def resolve_bodies(points: SurfacePoints, posed: Posed, visible: Visible, correspondences: Correspondences) -> None:
     """Replace the rows of visible points in `correspondences.body` by bodies; write `x` and `n`.
 
