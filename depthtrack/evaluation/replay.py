@@ -128,6 +128,7 @@ def estimate_of(run: Run, row: int) -> Estimate:
         float(run.confidence[row]),
         run.status[row],
         {stage: float(values[row]) for stage, values in run.stage_ms.items() if row < len(values)},
+        float(run.timestamps[row]),
     )
 
 

@@ -1,6 +1,7 @@
-"""Run folders from before `run.json` had a format version.
+"""Run folders of earlier layouts of `run.json`.
 
-They hold flat options of the trackers pso and ik.
+Those without a format version hold flat options of the trackers pso and ik. Those of format 2 count the memory of a
+track in frames.
 """
 
 from collections.abc import Mapping
@@ -26,12 +27,39 @@ _NAMES = {
     "seed": ("seed",),
 }
 """Place of each flat option among today's; options that kept their default then are absent or null."""
+_RATE = 30.0
+"""Frames per second of the recordings that the memory of format 2 was meant for."""
 _PAPERS = {"pso": "oikonomidis2011", "ik": "schroeder2014"}
 _REPLACED = ("variant", "finish", "skin_model", "synergies_sha256", *_NAMES)
 
 
-def upgraded(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the contents of an earlier `run.json` in today's layout.
+def upgraded(fields: Mapping[str, Any], where: str) -> Mapping[str, Any]:
+    """Return the contents of a `run.json` in today's layout.
+
+    Raises:
+        InputError: if those versions had no such tracker.
+    """
+    if "format" not in fields:
+        return _nested(fields, where)
+    return _with_seconds(fields) if fields["format"] == 2 else fields
+
+
+def _with_seconds(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the contents of format 2 with the memory of a track in seconds."""
+    options = fields.get("options")
+    thresholds = options.get("thresholds") if isinstance(options, dict) else None
+    if not isinstance(options, dict) or not isinstance(thresholds, dict):
+        return {**fields, "format": 3}
+    rest = {name: value for name, value in thresholds.items() if name != "memory_frames"}
+    frames = thresholds.get("memory_frames")
+    memory = {"memory": frames / _RATE} if isinstance(frames, int) else {}
+    # Those versions followed the last pose after any pause.
+    options = {**options, "thresholds": {**rest, **memory, "longest_gap": "inf"}}
+    return {**fields, "format": 3, "options": options}
+
+
+def _nested(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return flat options in today's layout.
 
     Options that could be set from Python only were not stored; they are assumed to be the defaults.
 
@@ -50,7 +78,7 @@ def upgraded(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
         options["refine"] = True
     rest = {key: value for key, value in fields.items() if key not in _REPLACED}
     segmentation = {"skin_model": fields.get("skin_model")}
-    return {**rest, "format": 2, "tracker": name, "options": options, "segmentation": segmentation}
+    return {**rest, "format": 3, "tracker": name, "options": options, "segmentation": segmentation}
 
 
 def _set(options: dict[str, Any], path: tuple[str, ...], value: Any) -> None:

@@ -105,6 +105,11 @@ class FrameContext:
         return frame_generator(self.seed, self.observation.frame_index)
 
     @property
+    def motion(self) -> Array:
+        """Predicted step (26,) from the last pose to this frame, in the tangent space."""
+        return self.state.motion_until(self.observation.timestamp)
+
+    @property
     def clamp(self) -> float:
         """Unit of energies in options: see `Objective.clamp`."""
         return self.tools.scoring.objective.clamp

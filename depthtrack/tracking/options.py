@@ -36,7 +36,10 @@ class TrackingThresholds:
     guide_confidence: float = option(0.6, "Least confidence of a pose that guides the segmentation")
     guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
     median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
-    memory_frames: int = option(15, "Frames after a loss in which the hand is searched near its last pose")
+    memory: float = option(0.5, "Time after a loss in which the hand is searched near its last pose", unit="s")
+    longest_gap: float = option(
+        0.3, "Time without a pose after which a start competes with the last pose, and no motion is predicted", unit="s"
+    )
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,8 @@ class Pipeline:
             self._tracker.restore([known])
             estimate = known
         elif observation is None:
-            self._tracker.restore([ABSENT])
-            estimate = ABSENT
+            estimate = replace(ABSENT, timestamp=frame.timestamp)
+            self._tracker.restore([estimate])
         elif self._start_pose is not None:
             estimate = self._tracker.start(observation, self._start_pose)
         else:
@@ -85,7 +85,9 @@ class NoTracker:
 
     name = "none"
     stages: tuple[str, ...] = ()
-    predicted_pose: Array | None = None
+
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        return None
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         return ABSENT
@@ -129,7 +131,7 @@ def segment(
 ) -> tuple[Observation | None, float]:
     """Return the observation of a frame near the prediction, and the time in milliseconds."""
     begun = clock()
-    observation = segmenter.segment(frame, roi_prior(model, guide.predicted_pose))
+    observation = segmenter.segment(frame, roi_prior(model, guide.predicted_pose(frame.timestamp)))
     return observation, 1e3 * (clock() - begun)
 
 
@@ -159,4 +161,4 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
 
 def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
     """Return the estimates that a run folder holds."""
-    return [Estimate(row.pose, row.energy, row.confidence, row.status) for row in rows]
+    return [Estimate(row.pose, row.energy, row.confidence, row.status, timestamp=row.timestamp) for row in rows]

@@ -26,7 +26,7 @@ from depthtrack.tracking.configuration import (
 )
 from depthtrack.tracking.earlier_runs import upgraded
 
-FORMAT = 2
+FORMAT = 3
 """Version of the layout of `run.json`; runs without it were written before the options were nested."""
 
 LONGEST_PATH = 1024
@@ -99,8 +99,7 @@ class RunConfiguration:
         Raises:
             InputError: if an entry is missing or malformed; the message names `where`.
         """
-        if "format" not in fields:
-            fields = upgraded(fields, where)
+        fields = upgraded(fields, where)
         if fields["format"] != FORMAT:
             raise InputError(f"{where}: expected format {FORMAT}, found {fields['format']!r:.40}: update depthtrack")
         name = fields.get("tracker")

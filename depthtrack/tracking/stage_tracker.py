@@ -45,38 +45,47 @@ class StageTracker:
         """Start on this frame: refine a pose (27,), or search if there is none."""
         self._state.forget_last()
         if pose is None:
-            return self._run(self._stages.start, self._frame(observation), Status.STARTED)
-        return self._run(self._stages.refine, self._frame(observation, checked_pose(pose)), Status.STARTED)
+            return self._estimate(observation, {Status.STARTED: self._stages.start})
+        return self._estimate(observation, {Status.STARTED: self._stages.refine}, checked_pose(pose))
 
     def track(self, observation: Observation) -> Estimate:
-        """Follow the hand into the next frame; search if the track is lost or there is none."""
+        """Follow the hand into the next frame; search if the track is lost or there is none.
+
+        After a pause, a search competes with the last pose.
+        """
         if self._state.pose is None:
-            return self._run(self._stages.start, self._frame(observation), Status.STARTED)
-        return self._run(self._stages.follow, self._frame(observation), Status.TRACKED)
+            return self._estimate(observation, {Status.STARTED: self._stages.start})
+        rival = {Status.STARTED: self._stages.start} if self._state.is_stale(observation.timestamp) else {}
+        return self._estimate(observation, {Status.TRACKED: self._stages.follow} | rival)
 
     def restore(self, estimates: Sequence[Estimate]) -> None:
         """Update the state with estimates as if they had been made now."""
         self._state.restore(estimates)
 
-    @property
-    def predicted_pose(self) -> Array | None:
-        """Linear prediction (27,) of the next pose; None if it must not guide the segmentation."""
-        return self._state.predicted_pose
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        """Return the pose (27,) predicted for `timestamp` (s); None for no ROI prior."""
+        return self._state.predicted_pose(timestamp)
 
     def close(self) -> None:
         """Free the renderers."""
         self._tools.close()
 
-    def _frame(self, observation: Observation, pose: Array | None = None) -> FrameContext:
-        return FrameContext(observation, self._tools, self._state, self._seed, pose)
+    def _estimate(
+        self, observation: Observation, lists: dict[Status, Sequence[Stage]], pose: Array | None = None
+    ) -> Estimate:
+        """Return the best estimate of some lists of stages, by the status that each implies.
 
-    def _run(self, stages: Sequence[Stage], frame: FrameContext, status: Status) -> Estimate:
+        pose: (27,) given by the user.
+        """
         clock = StageClock(self.stages)
-        self._tools.set_target(frame.observation)
+        self._tools.set_target(observation)
         clock.lap("target")
-        candidates: list[Candidate] = []
-        for stage in stages:
-            candidates = stage(frame, candidates)
-            clock.lap(stage.name)
-        status = Status.STARTED if frame.restarted else status
-        return self._state.commit(*candidates[0], status, clock.milliseconds)
+        found: list[tuple[Candidate, Status]] = []
+        for status, stages in lists.items():
+            frame, candidates = FrameContext(observation, self._tools, self._state, self._seed, pose), list[Candidate]()
+            for stage in stages:
+                candidates = stage(frame, candidates)
+                clock.lap(stage.name)
+            found.append((candidates[0], Status.STARTED if frame.restarted else status))
+        best, status = min(found, key=lambda pair: pair[0].energy)
+        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp)

@@ -3,6 +3,7 @@
 It depends on the estimates alone, so that a run can be resumed.
 """
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from statistics import median
@@ -15,15 +16,18 @@ from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
+_SAME_TIME = 1e-6
+"""Seconds: rounding of time stamps."""
+_ROUNDED = 0.01
+"""Relative difference between the durations of two steps that counts as none."""
+
 
 class TrackState:
-    """Last pose, velocity and energy of a track.
+    """Last pose, motion and energy of a track.
 
     pose: (27,) last pose, None if there is nothing to follow.
-    velocity: (26,) last step in the tangent space.
     energy: energy of the last pose.
-    last_trusted: (27,) last trusted pose; None after `memory_frames` without one, half a second in which a hand
-        hardly turns over.
+    last_trusted: (27,) last trusted pose; None after `memory` seconds without one, in which a hand hardly turns over.
     """
 
     def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
@@ -31,10 +35,10 @@ class TrackState:
         self._confidence = 0.0
         self._energies: deque[float] = deque(maxlen=thresholds.median_frames)
         self.pose: Array | None = None
-        self.velocity = np.zeros(26)
         self.energy = np.inf
         self.last_trusted: Array | None = None
-        self._frames_lost = 0
+        self._time = math.nan
+        self._motion, self._duration = np.zeros(26), math.nan
 
     def is_lost(self, energy: float, confidence: float) -> bool:
         """Return whether a pose with this energy and confidence is not trusted."""
@@ -61,11 +65,17 @@ class TrackState:
         return ratio == 0 or energy > ratio * self.median_energy
 
     def commit(
-        self, pose: Array, energy: float, confidence: float, status: Status, stage_ms: dict[str, float]
+        self,
+        pose: Array,
+        energy: float,
+        confidence: float,
+        status: Status,
+        stage_ms: dict[str, float],
+        timestamp: float = math.nan,
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted."""
         trusted = not self.is_lost(energy, confidence)
-        estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms)
+        estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms, timestamp)
         self.update(estimate)
         return estimate
 
@@ -81,29 +91,43 @@ class TrackState:
 
     def update(self, estimate: Estimate) -> None:
         """Update the state with the estimate of the next frame."""
+        elapsed = estimate.timestamp - self._time
         if estimate.pose is None or estimate.status is Status.LOST:
-            self.pose, self.velocity = None, np.zeros(26)
-            self._frames_lost += 1
-            if self._frames_lost > self._thresholds.memory_frames:
+            self.pose, self._motion = None, np.zeros(26)
+            if elapsed > self._thresholds.memory + _SAME_TIME:
                 self.last_trusted = None
             return
         if self.pose is not None and estimate.status is Status.TRACKED:
-            self.velocity = tangent_between(self.pose, estimate.pose)
+            self._motion, self._duration = tangent_between(self.pose, estimate.pose), elapsed
         else:
-            self.velocity = np.zeros(26)
+            self._motion, self._duration = np.zeros(26), math.nan
         self.pose, self.energy, self._confidence = estimate.pose, estimate.energy, estimate.confidence
-        self.last_trusted, self._frames_lost = estimate.pose, 0
+        self.last_trusted, self._time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 
-    @property
-    def predicted_pose(self) -> Array | None:
-        """Linear prediction (27,) if the last pose may guide the segmentation, else None.
+    def is_stale(self, timestamp: float) -> bool:
+        """Return whether the last pose is too old at `timestamp` (s) to be followed without a rival."""
+        return timestamp - self._time > self._thresholds.longest_gap + _SAME_TIME
+
+    def motion_until(self, timestamp: float) -> Array:
+        """Return the step (26,) that continues the last motion until `timestamp` (s).
+
+        It is in the tangent space, and zero if the last pose is too old.
+        """
+        if self.is_stale(timestamp):
+            return np.zeros(26)
+        share = (timestamp - self._time) / self._duration if self._duration > 0 else 1.0
+        # Rounded time stamps must not change a steady motion.
+        return self._motion * share if abs(share - 1) > _ROUNDED else self._motion
+
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        """Return the linear prediction (27,) for `timestamp` (s); None for no ROI prior.
 
         A wrong pose must not guide the segmentation: it would select the pixels that agree with it.
         """
         limits = self._thresholds
-        if self.pose is None or self._confidence < limits.guide_confidence:
+        if self.pose is None or self._confidence < limits.guide_confidence or self.is_stale(timestamp):
             return None
         if self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy:
             return None
-        return retract(self.pose, self.velocity)
+        return retract(self.pose, self.motion_until(timestamp))

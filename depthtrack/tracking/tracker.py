@@ -1,5 +1,6 @@
 """The tracker protocol: start on a frame, then one call per frame."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -20,6 +21,7 @@ class Estimate:
     confidence: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
     status: tracked, started, lost or absent.
     stage_ms: milliseconds spent in each stage of the tracker.
+    timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
     """
 
     pose: Array | None
@@ -27,9 +29,10 @@ class Estimate:
     confidence: float
     status: Status
     stage_ms: dict[str, float] = field(default_factory=dict)
+    timestamp: float = math.nan
 
 
-ABSENT = Estimate(None, float("nan"), 0.0, Status.ABSENT)
+ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)
 """Estimate of a frame without a hand."""
 
 
@@ -43,9 +46,8 @@ class Guide(Protocol):
         """
         ...
 
-    @property
-    def predicted_pose(self) -> Array | None:
-        """Predicted pose (27,) of the next frame; None if it must not guide the segmentation."""
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        """Return the pose (27,) predicted for `timestamp` (s); None for no ROI prior."""
         ...
 
 

@@ -126,7 +126,9 @@ def test_the_work_grows_with_the_size() -> None:
 class Idle:
     """Tracker that sleeps."""
 
-    name, stages, predicted_pose = "idle", ("wait", "work"), None
+    name, stages = "idle", ("wait", "work")
+
+    def predicted_pose(self, timestamp: float) -> None: ...
 
     def start(self, observation: Any, pose: Any = None) -> Estimate:
         time.sleep(0.03)

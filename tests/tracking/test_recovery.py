@@ -126,9 +126,9 @@ def test_opposite_finger_shifts_cancel(made: Synthesiser) -> None:
 @pytest.mark.parametrize(("frames", "kept"), [(15, True), (16, False)])
 def test_the_last_trusted_pose_is_kept_for_half_a_second(made: Synthesiser, frames: int, kept: bool) -> None:
     state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
-    state.commit(pose, 5.0, 0.9, Status.TRACKED, {})
-    for _ in range(frames):
-        lost = state.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {})
+    state.commit(pose, 5.0, 0.9, Status.TRACKED, {}, 0.0)
+    for index in range(1, frames + 1):
+        lost = state.commit(made.poses[50], 90.0, 0.1, Status.TRACKED, {}, index / 30)
         assert lost.status is Status.LOST
         assert state.pose is None
     assert (state.last_trusted is pose) == kept
@@ -201,13 +201,13 @@ def test_a_pose_of_unusual_energy_gives_no_prediction(made: Synthesiser) -> None
     state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
     for _ in range(5):
         state.commit(pose, 16.0, 0.8, Status.TRACKED, {})
-        assert state.predicted_pose is not None
+        assert state.predicted_pose(0.0) is not None
     state.commit(pose, 22.0, 0.8, Status.TRACKED, {})
     assert state.pose is not None
-    assert state.predicted_pose is None
+    assert state.predicted_pose(0.0) is None
     state.commit(pose, 18.0, 0.55, Status.TRACKED, {})
     assert state.pose is not None
-    assert state.predicted_pose is None
+    assert state.predicted_pose(0.0) is None
 
 
 class _Levels:
@@ -263,6 +263,24 @@ def test_a_restored_tracker_continues_after_a_loss_with_the_same_bits(made: Synt
     poses, poses_again = (np.array([estimate.pose for estimate in some]) for some in (estimates[2:], again))
     assert np.array_equal(poses, poses_again)
     assert endpoint_error(MODEL, poses, MODEL, made.poses[[22, 23]]).values.max() < 10
+
+
+def test_a_pose_is_followed_for_a_time_and_not_for_a_number_of_frames(made: Synthesiser) -> None:
+    thresholds = TrackingThresholds(memory=0.5, longest_gap=0.3)
+    state = TrackState(thresholds, 40.0)
+    for index in (0, 1):
+        state.commit(made.poses[index], 5.0, 0.9, Status.TRACKED, {}, index / 30)
+    step = state.motion_until(2 / 30)
+    np.testing.assert_allclose(state.motion_until(4 / 30), 3 * step)
+    np.testing.assert_array_equal(state.motion_until(2 / 30 + 1e-6), step)  # rounded time stamps
+    assert state.predicted_pose(0.3) is not None
+    assert not state.is_stale(1 / 30 + 0.3)
+    assert state.is_stale(0.5)
+    assert state.predicted_pose(0.5) is None
+    assert not state.motion_until(0.5).any()
+    for seconds, known in ((0.2, True), (0.5, True), (0.6, False)):
+        state.commit(made.poses[2], 99.0, 0.1, Status.TRACKED, {}, seconds)
+        assert (state.last_trusted is not None) == known
 
 
 @pytest.mark.parametrize(("name", "recovers"), [("ik", 1), ("pso", 1), ("schroeder2014", 0), ("oikonomidis2011", 0)])

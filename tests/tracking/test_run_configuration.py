@@ -1,6 +1,7 @@
 """Configuration of a run: JSON round trip, repeated runs, and earlier run folders."""
 
 import json
+import math
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -52,7 +53,7 @@ def _other(parameter: Parameter) -> Any:
     if isinstance(value, int):
         return max(1, value - 1) if value > 1 else value + 1
     if isinstance(value, float):
-        return 0.9 * value + 0.001
+        return 0.9 * value + 0.001 if math.isfinite(value) else 1.0
     if isinstance(value, tuple) and value and isinstance(value[0], float):
         return tuple(0.9 * part + 0.001 for part in value)
     assert isinstance(value, tuple), parameter
@@ -102,7 +103,7 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
     ("change", "expected"),
     [
         ({"tracker": "magic"}, "no tracker 'magic'"),
-        ({"format": 99}, "expected format 2"),
+        ({"format": 99}, "expected format 3"),
         ({"options": {"colour": "red"}}, "colour"),
         ({"options": {"seed": "many"}}, "seed"),
         ({"frames": -1}, "whole number"),
@@ -197,3 +198,10 @@ def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_pa
         assert configuration["options"]["retry_ratio"] == 1.4
         assert (stored["roi"]["margin"], stored["grid"]["max_jump"], stored["wrist_margin"]) == (0.05, 0.02, 0.01)
         assert stored["use_colour"] == use_colour
+
+
+def test_a_run_of_format_2_keeps_its_memory_in_seconds() -> None:
+    options = {"thresholds": {"memory_frames": 30, "energy": 0.5}}
+    fields = {"format": 2, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": options}
+    thresholds = RunConfiguration.from_fields(fields, "run.json").tracker.thresholds
+    assert (thresholds.memory, thresholds.energy, thresholds.longest_gap) == (1.0, 0.5, math.inf)

@@ -6,6 +6,7 @@ from depthtrack.tracking.configuration import TrackerConfig
 _OFF = {
     "thresholds.confidence": 0.0,
     "thresholds.energy": float("inf"),
+    "thresholds.longest_gap": float("inf"),
     "recovery.every": 0,
     "recovery.accept_finger": 0.0,
     "recovery.doubt_confidence": 0.0,

@@ -30,9 +30,8 @@ class CpuTimed:
     def restore(self, estimates: Sequence[Estimate]) -> None:
         self._tracker.restore(estimates)
 
-    @property
-    def predicted_pose(self) -> Array | None:
-        return self._tracker.predicted_pose
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        return self._tracker.predicted_pose(timestamp)
 
     def close(self) -> None:
         self._tracker.close()

@@ -20,7 +20,7 @@ class Predict:
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         last = frame.state.pose
         assert last is not None
-        ahead = within_limits(retract(last, np.outer(self.shares, frame.state.velocity)))
+        ahead = within_limits(retract(last, np.outer(self.shares, frame.motion)))
         frame.predictions = frame.evaluate(ahead)
         return frame.predictions
 

@@ -67,7 +67,7 @@ class Swarm:
     """Follow the last pose by one swarm.
 
     space: "parameters" for the 27 raw parameters of the paper, or "tangent" for the 26-dimensional tangent space.
-    widen: weight of the hand's velocity in the spread of "tangent".
+    widen: weight of the hand's motion in the spread of "tangent".
 
     The first generation of "parameters" surrounds the last pose. That of "tangent" surrounds three poses in equal
     parts: the last pose, its linear prediction, and the last pose moved onto the observed hand.
@@ -95,10 +95,10 @@ class Swarm:
 
     def _first_generation(self, frame: FrameContext, last: Array) -> Array:
         """Return perturbations (N, 27) of the last pose and of two predictions."""
-        centres, velocity = np.tile(last, (self.options.particles, 1)), frame.state.velocity
-        centres[1::3] = retract(last, velocity)
+        centres, motion = np.tile(last, (self.options.particles, 1)), frame.motion
+        centres[1::3] = retract(last, motion)
         centres[2::3, POSITION] += observed_drift(frame, last)
-        return self._perturbed(frame, centres, np.hypot(np.repeat(self.spread, [3, 3, 20]), self.widen * velocity))
+        return self._perturbed(frame, centres, np.hypot(np.repeat(self.spread, [3, 3, 20]), self.widen * motion))
 
     def _perturbed(self, frame: FrameContext, centres: Array, spread: Array) -> Array:
         steps = frame.random.standard_normal((len(centres), 26)) * spread

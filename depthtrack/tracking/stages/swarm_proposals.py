@@ -32,7 +32,7 @@ class SwarmProposals:
         assert last is not None
         space = TangentSpace(best.pose)
         centres = np.tile(best.pose, (options.swarm.particles, 1))
-        centres[1::3] = retract(last, frame.state.velocity)
+        centres[1::3] = retract(last, frame.motion)
         centres[2::3] = last
         steps = frame.random.standard_normal((len(centres), 26)) * np.repeat(options.spread, [3, 3, 20])
         steps[:3] = 0  # the centres themselves take part

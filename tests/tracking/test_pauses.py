@@ -1,0 +1,51 @@
+"""After a pause, a start competes with the last pose."""
+
+from contextlib import closing
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
+from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
+from depthtrack.tracking.registry import create_tracker, tracker_config
+
+
+@pytest.fixture(scope="module")
+def made() -> Synthesiser:
+    return Synthesiser(Synthesis(motion="everyday", model="skin", frames=20))
+
+
+def turned(frame: Frame, degrees: float) -> Frame:
+    """Return the frame with its image turned about its centre."""
+    height, width = frame.depth.shape
+    turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1)
+    return replace(frame, depth=cv2.warpAffine(frame.depth, turn, (width, height), flags=cv2.INTER_NEAREST))
+
+
+def track(made: Synthesiser, name: str, frames: list[Frame]) -> list[TrackedFrame]:
+    hand = made.options.hand
+    with closing(create_tracker(tracker_config(name), hand)) as tracker:
+        pipeline = Pipeline(tracker, Segmenter(None), hand)
+        return [pipeline.step(frame) for frame in frames]
+
+
+@pytest.mark.parametrize("name", ["ik", "hybrid", pytest.param("pso", marks=pytest.mark.slow)])
+def test_a_hand_that_turned_during_a_pause_is_found(made: Synthesiser, name: str) -> None:
+    shown = Frame(0, 0.0, made[0].depth.astype(np.float32), None, made.sensor.camera)
+    later = replace(turned(shown, 90), index=1, timestamp=5.0)
+    both = track(made, name, [shown, later])
+    alone = track(made, name, [later])
+    assert [each.estimate.status for each in both] == [Status.STARTED] * 2
+    assert both[1].estimate.energy < 1.5 * alone[0].estimate.energy
+
+
+def test_a_hand_that_stayed_during_a_pause_is_followed(made: Synthesiser) -> None:
+    depth = made[0].depth.astype(np.float32)
+    frames = [Frame(index, 2.0 * index, depth, None, made.sensor.camera) for index in range(3)]
+    energies = [each.estimate.energy for each in track(made, "ik", frames)]
+    assert max(energies) < 1.1 * energies[0]
