@@ -10,6 +10,13 @@ import numpy as np
 
 from depthtrack.compilation import compiled
 from depthtrack.recording.sequence import Frame
+from depthtrack.segmentation.continuing_surfaces import (
+    BEYOND_WRIST,
+    MISSING,
+    OUTSIDE,
+    READING,
+    without_continuing_surfaces,
+)
 from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.masks import HandMasks, dilation_radius
 from depthtrack.segmentation.morphology import bounding_box, closed, dilated, without_small_components
@@ -17,9 +24,6 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Depth, Labels
-
-OUTSIDE, READING, MISSING = 0, 1, 2
-"""Kinds of pixels: outside the hand's reach; a reading within it; no reading, but within it at the palm's depth."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,8 @@ def segment_roi(
     lens = (camera.fx, camera.fy, camera.cx - region.left, camera.cy - region.top)
     kinds = np.empty(depth.shape, dtype=np.uint8)
     mark_reachable(depth, lens, prior.centre, reach, prior.wrist.point, prior.wrist.normal, kinds)
-    readings = kinds == READING
+    limits = (options.grid.max_jump, options.roi.border_share)
+    readings = without_continuing_surfaces(depth, kinds, kinds == READING, camera.fx, *limits)
     if not readings.any():
         return None
     radius, margin = dilation_radius(camera, options.outline), options.roi.margin * camera.fx / float(prior.centre[2])
@@ -90,7 +95,7 @@ def mark_reachable(
     centre: (3,) of the palm, metres, camera frame.
     reach: metres.
     wrist, towards_arm: (3,) point, metres, and unit normal of the wrist's plane, camera frame.
-    out: (h, w) output: OUTSIDE, READING or MISSING.
+    out: (h, w) output: one of the kinds of `continuing_surfaces`.
     """
     fx, fy, cx, cy = lens
     for v in range(depth.shape[0]):
@@ -102,5 +107,5 @@ def mark_reachable(
             x, y = (u - cx) / fx * z, (v - cy) / fy * z
             dx, dy, dz = x - centre[0], y - centre[1], z - centre[2]
             beyond = (x - wrist[0]) * towards_arm[0] + (y - wrist[1]) * towards_arm[1] + (z - wrist[2]) * towards_arm[2]
-            near = dx * dx + dy * dy + dz * dz < reach * reach and beyond < 0.0
-            out[v, u] = kind if near else OUTSIDE
+            near = dx * dx + dy * dy + dz * dz < reach * reach
+            out[v, u] = OUTSIDE if not near else kind if beyond < 0.0 else BEYOND_WRIST

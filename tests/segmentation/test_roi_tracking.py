@@ -9,9 +9,10 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame
+from depthtrack.segmentation.continuing_surfaces import BEYOND_WRIST, OUTSIDE, READING
 from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.segmentation.roi_tracking import READING, RoiPrior, mark_reachable, segment_roi
+from depthtrack.segmentation.roi_tracking import RoiPrior, mark_reachable, segment_roi
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.skin_colour import SkinColourModel
@@ -71,9 +72,10 @@ def test_reach_kernel_equals_the_definition(seed: int) -> None:
     mark_reachable(depth, (camera.fx, camera.fy, camera.cx, camera.cy), centre, 0.15, wrist, axis, kinds)
     v, u = np.mgrid[: camera.height, : camera.width]
     points = camera.unproject(np.stack([u, v], axis=-1), np.where(depth > 0, depth, centre[2]))
-    near = (np.linalg.norm(points - centre, axis=-1) < 0.15) & ((points - wrist) @ axis < 0)
-    np.testing.assert_array_equal(kinds > 0, near)
-    np.testing.assert_array_equal(kinds == READING, near & (depth > 0))
+    near, before = np.linalg.norm(points - centre, axis=-1) < 0.15, (points - wrist) @ axis < 0
+    np.testing.assert_array_equal(kinds == OUTSIDE, ~near)
+    np.testing.assert_array_equal(kinds == BEYOND_WRIST, near & ~before)
+    np.testing.assert_array_equal(kinds == READING, near & before & (depth > 0))
 
 
 def test_a_prior_without_readings_gives_no_hand(made: Synthesiser) -> None:

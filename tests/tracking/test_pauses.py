@@ -24,7 +24,8 @@ def turned(frame: Frame, degrees: float) -> Frame:
     """Return the frame with its image turned about its centre."""
     height, width = frame.depth.shape
     turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), degrees, 1)
-    return replace(frame, depth=cv2.warpAffine(frame.depth, turn, (width, height), flags=cv2.INTER_NEAREST))
+    depth = cv2.warpAffine(frame.depth, turn, (width, height), flags=cv2.INTER_NEAREST)
+    return replace(frame, depth=depth.astype(np.float32))
 
 
 def track(made: Synthesiser, name: str, frames: list[Frame]) -> list[TrackedFrame]:

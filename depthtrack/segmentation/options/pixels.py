@@ -19,6 +19,11 @@ class RoiOptions:
     )
     nearest_centre: float = option(0.05, "Smallest depth of a predicted palm", unit="m", advanced=True)
     least_readings: int = option(30, "Smallest number of depth readings of a hand", unit="pixels", advanced=True)
+    border_share: float = option(
+        0.5,
+        "Longest border between a hand's surface and readings beyond its reach, in square roots of the surface's area",
+        advanced=True,
+    )
     small_component: float = option(
         0.02, "Share of the largest component's area below which a component is noise", advanced=True
     )
