@@ -69,7 +69,7 @@ def test_03_a_measured_hand_is_tracked(
     """The measurement takes a minute. Its tests are in tests/calibration."""
     hand, nothing = dt.HandShape(scale=1.05), np.zeros((0, 27))
     calibration = dt.Calibration(hand, {"palm width": Measured(82.0, 1.5, 0.9)}, None, 3.0, 2.0, (), nothing, nothing)
-    monkeypatch.setattr("depthtrack.api.measuring.calibrate_views", lambda *_: calibration)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", lambda *_: calibration)
     run = example(3).main(recording, str(tmp_path / "hand.json"), str(tmp_path / "run"))
     assert "palm width         82.0 mm" in capsys.readouterr().out
     assert run.configuration["hand"] == hand.to_fields()

@@ -10,8 +10,10 @@ from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
+from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.registry import tracker_config
+from depthtrack.tracking.side_choice import choose_side
 
 Recording = Sequence | Path | str
 """A recording, or its path."""
@@ -83,6 +85,27 @@ def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShap
     if recording is not None:
         return chosen_hand(as_recording(recording), None if hand is None else str(hand))
     return HandShape() if hand is None else load_hand(Path(hand))
+
+
+def tracked_hand(
+    hand: Hand,
+    recording: Sequence,
+    segmentation: SegmentationOptions | None = None,
+    threads: int = 1,
+    frames: int | None = None,
+) -> HandShape:
+    """Return the hand to track a recording with.
+
+    It is `open_hand` of `hand`; if that is absent, the average adult's hand of the side that fits better.
+
+    frames: number of first frames that show the side; all if absent.
+
+    Raises:
+        InputError: the file holds no hand, the recording has no sizes, or no frame shows a hand.
+    """
+    if hand is not None:
+        return open_hand(hand, recording)
+    return HandShape(side=choose_side(recording, segmentation, threads, frames).side)
 
 
 def as_config(tracker: str | TrackerConfig) -> TrackerConfig:

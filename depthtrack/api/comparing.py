@@ -1,7 +1,7 @@
 """Compare trackers on the same recordings."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from depthtrack.api.choices import Recording, on_damage_of, path_of
@@ -12,9 +12,11 @@ from depthtrack.evaluation.compare.running import Source
 from depthtrack.evaluation.compare.specs import TrackerSpec, read_specs
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.workers import chosen_workers
+from depthtrack.machine import usable_cores
 from depthtrack.recording.hand_choice import TRUTH
 from depthtrack.report.build import write_report
 from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.side_choice import choose_side
 
 
 def compare(
@@ -34,7 +36,8 @@ def compare(
     The runs are in `out`/runs; complete ones are kept if the same comparison is made again.
 
     trackers: names with options, such as "ik:icp_iterations=3", or configurations by label.
-    hand: path of a hand file or rigged mesh, or "truth"; the average adult's right hand if absent.
+    hand: path of a hand file or rigged mesh, or "truth". If absent, the average adult's hand of the side that fits
+        each recording better.
     frames: number of frames to track of each recording; all if absent.
     repeats: runs per tracker and recording, with seeds from `seed` on.
     equal_ms: CPU milliseconds a frame that each tracker may take; its work is chosen to fit.
@@ -75,6 +78,11 @@ def comparison_table(evaluations: Sequence[Evaluation]) -> str:
 def _source(recording: Recording, hand: str | None, frames: int | None) -> Source:
     """Return the recording as workers open it, with its camera and treatment of damage."""
     if isinstance(recording, Path | str):
-        return Source(str(Path(recording).resolve()), hand=hand, frames=frames)
-    path, camera = str(path_of(recording).resolve()), asdict(recording.camera)
-    return Source(path, camera, on_damage_of(recording), hand, frames=frames)
+        source = Source(str(Path(recording).resolve()), hand=hand, frames=frames)
+    else:
+        path, camera = str(path_of(recording).resolve()), asdict(recording.camera)
+        source = Source(path, camera, on_damage_of(recording), hand, frames=frames)
+    if hand is not None:
+        return source
+    choice = choose_side(source.open(), source.segmentation, usable_cores(), frames)
+    return replace(source, side=choice.side)

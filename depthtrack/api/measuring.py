@@ -8,6 +8,7 @@ from depthtrack.calibration.calibrate import calibrate as calibrate_views
 from depthtrack.calibration.pose_search import Progress, ScorerFactory
 from depthtrack.calibration.rig_calibration import RigCalibration
 from depthtrack.calibration.rig_calibration import calibrate_rig as calibrate_rig_on_views
+from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.calibration.views import choose_views
 from depthtrack.hand.shape import Side
 from depthtrack.machine import usable_cores
@@ -31,7 +32,7 @@ def calibrate(
 
     Best on a few seconds of one bare hand that turns, opens and closes.
 
-    side: "right" or "left"; both are tried if absent.
+    side: "right" or "left"; if absent, both are tracked over the recording, and the one that fits better is kept.
     segmentation: how the hand is found in a frame.
     seed: equal seeds give equal hands.
     threads: threads of the renderer, one per core if absent; the hand does not depend on it.
@@ -46,8 +47,10 @@ def calibrate(
         depthtrack.track("my-hand", calibration.hand, out="my-run")
     """
     sequence = as_recording(recording)
-    views = _views(sequence, segmentation, progress)
-    return calibrate_views(views, _scorers(threads), side, seed, f"calibrated on {sequence.name}", progress)
+    views, source = _views(sequence, segmentation, progress), f"calibrated on {sequence.name}"
+    if side is None:
+        return calibrate_either_side(sequence, views, _scorers(threads), segmentation, seed, source, progress)
+    return calibrate_views(views, _scorers(threads), side, seed, source, progress)
 
 
 def calibrate_rig(

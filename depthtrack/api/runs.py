@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import overload
 
-from depthtrack.api.choices import Hand, Recording, as_config, as_recording, on_damage_of, open_hand, path_of
+from depthtrack.api.choices import Hand, Recording, as_config, as_recording, on_damage_of, path_of, tracked_hand
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
 from depthtrack.evaluation.replay import Replay, run_hand
@@ -63,7 +63,8 @@ def track(
 ) -> Iterator[TrackedFrame] | Run:
     """Track the hand of a recording; the poses are those of `depthtrack track`.
 
-    hand: a hand, the path of a hand file or rigged mesh, or "truth"; the average adult's right hand if absent.
+    hand: a hand, the path of a hand file or rigged mesh, or "truth". If absent, the average adult's hand of the side
+        that fits better in up to 160 frames.
     tracker: name or configuration of a tracker: see `tracker_config`.
     out: run folder to write; without it, frames are yielded as they are tracked.
     resume: continue the run that `out` holds.
@@ -84,18 +85,18 @@ def track(
             print(each.frame.timestamp, each.estimate.status, each.estimate.pose)
         run = depthtrack.track("my-hand", "hand.json", out="my-run")
     """
-    sequence = as_recording(recording)
+    sequence, threads = as_recording(recording), threads or usable_cores()
     configuration = configure(
         path_of(sequence),
         sequence,
         as_config(tracker),
-        open_hand(hand, sequence),
+        tracked_hand(hand, sequence, segmentation, threads, frames),
         segmentation,
         start=start,
         frames=frames,
         on_damage=on_damage_of(sequence),
     )
-    run = TrackingRun(configuration, sequence, threads or usable_cores())
+    run = TrackingRun(configuration, sequence, threads)
     if out is None:
         return _tracked(run)
     with run:

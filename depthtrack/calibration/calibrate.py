@@ -1,4 +1,4 @@
-"""Calibration of a hand from a recording: side, scale, and sizes of fingers and palm.
+"""Calibration of a hand of one side from views: scale, and sizes of fingers and palm.
 
 Poses are searched in a few views with hands of several scales, and the best scale is kept. From there poses and all
 sizes are optimised jointly. The poses are then searched again with the hand that was found, since some of the first
@@ -38,13 +38,13 @@ class Calibration:
     """Calibrated hand and the quality of its fit.
 
     measured: each length and width by name.
-    side_margin: extra energy of the other side, a share, None if the side was given.
+    side_margin: share by which the other side costs more, see `sides`; None if only one side was calibrated.
     before_mm, after_mm: median distance of the observed points to the skin, of the average hand at its best and of this
         hand.
     observations: the views.
     poses: (V, 27) of `hand` in them.
     poses_before: (V, 27) of the average hand.
-    sure_margin: extra energy from which on the side is sure.
+    sure_margin: margin from which on the side is sure.
     """
 
     hand: HandShape
@@ -74,7 +74,7 @@ class Calibration:
 def calibrate(
     observations: Sequence[Observation],
     scorer: ScorerFactory,
-    side: Side | None = None,
+    side: Side = "right",
     seed: int = 0,
     source: str = "calibrated",
     progress: Progress | None = None,
@@ -84,7 +84,6 @@ def calibrate(
 
     observations: most open hands first, see `views.choose_views`.
     scorer: makes the scorer of a hand.
-    side: both are tried by default.
     progress: called with a description of the current stage, and the completed share.
 
     Equal observations, seed and energies give an equal hand.
@@ -95,39 +94,32 @@ def calibrate(
     report = progress or (lambda stage, share: None)
     options = options or CalibrationOptions()
     searcher = PoseSearcher(list(observations), scorer, seed, options)
-    sides: tuple[Side, ...] = ("right", "left") if side is None else (side,)
-    begun = {}
-    for n, tried in enumerate(sides):
-        report(f"scale of a {tried} hand", 0.4 * n / len(sides))
-        begun[tried] = _initialise(searcher, tried)
-    chosen = min(sides, key=lambda s: begun[s][1].energies.mean())
-    values, found = begun[chosen]
+    report(f"scale of a {side} hand", 0.0)
+    values, found = _initialise(searcher, side)
     found.check_hand(options.hand_like)
-    before = _refined(searcher, found.poses, np.zeros(COUNT), chosen)
+    before = _refined(searcher, found.poses, np.zeros(COUNT), side)
     views, joint = searcher.views, options.joint
 
     def fit(chosen_views: Index, poses: Array, values: Array, iterations: int, exact: bool = False) -> JointFit:
         picked = [views[i] for i in chosen_views]
-        return fit_jointly(picked, poses, values, chosen, iterations, exact=exact, options=joint)
+        return fit_jointly(picked, poses, values, side, iterations, exact=exact, options=joint)
 
-    report("fingers and palm", 0.5)
+    report("fingers and palm", 0.6)
     first = found.best(options.good_views)
     fitted = fit(first, found.poses[first], values, 8)
-    report("fingers and palm with better poses", 0.7)
-    found = searcher.improve(hand_of(fitted.values, chosen), found.poses)
+    report("fingers and palm with better poses", 0.65)
+    found = searcher.improve(hand_of(fitted.values, side), found.poses)
     good = found.best(options.good_views)
     fitted = fit(good, found.poses[good], fitted.values, 6)
-    report("confidence", 0.95)
+    report("confidence", 0.9)
     fitted = fit(good, fitted.poses, fitted.values, 4, exact=True)
     values = with_usual_proportions(fitted.values)
-    after = _refined(searcher, found.poses, values, chosen)
-    energies = {s: float(begun[s][1].energies.mean()) for s in sides}
-    margin = None if side is not None else max(energies.values()) / min(energies.values()) - 1
+    after = _refined(searcher, found.poses, values, side)
     report("done", 1.0)
     return Calibration(
-        hand_of(values, chosen, source),
+        hand_of(values, side, source),
         _measured(values, fitted.covariance),
-        margin,
+        None,
         1000 * float(np.median(before.distances[good])),
         1000 * float(np.median(after.distances[good])),
         tuple(searcher.observations[i] for i in good),

@@ -38,9 +38,9 @@ class JointFitOptions:
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """Search for side, scale and poses, and the acceptance of a result."""
+    """Search for scale and poses, and the acceptance of a result."""
 
-    first: int = option(4, "Views with the most open hands, on which side and scale are tried")
+    first: int = option(4, "Views with the most open hands, on which scales are tried")
     tried_scales: tuple[float, ...] = option((0.76, 0.9, 1.06, 1.24), "Scales of the average hand that are tried")
     likely: int = option(6, "Poses of each of those views that get sizes of their own")
     crossed: int = option(6, "Sizes that are tried on the other views")
@@ -51,5 +51,5 @@ class CalibrationOptions:
         "Agreement of silhouettes below which no hand was found",
         source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
     )
-    sure_margin: float = option(0.02, "Share by which the energy of the other side is higher if the side is certain")
+    sure_margin: float = option(0.1, "Share by which the other side costs more if the side is certain")
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")

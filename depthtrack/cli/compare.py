@@ -59,7 +59,7 @@ class Command:
         from depthtrack.evaluation.compare.specs import read_specs
 
         return Comparison(
-            sources=tuple(map(self.recordings.source, self.sequences)),
+            sources=tuple(self.recordings.with_side(self.recordings.source(each)) for each in self.sequences),
             specs=tuple(read_specs(self.trackers)),
             repeats=self.repeats,
             seed=self.seed,

@@ -67,9 +67,9 @@ class Command:
         """Return the user's recording with its measured hand, or with the hand of --hand."""
         source, file = self.recordings.source(path), self.out / f"hand-of-{path.resolve().name}.json"
         if source.hand is not None or not self.calibrate:
-            return source
+            return self.recordings.with_side(source)
         if not file.exists() and not _measure_hand(source, file):
-            return source
+            return self.recordings.with_side(source)
         return replace(source, hand=str(file.resolve()))
 
     def _synthesised(self) -> "tuple[Source, ...]":

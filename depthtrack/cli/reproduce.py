@@ -25,8 +25,8 @@ class Command:
     """
 
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
-    """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; or `list` to print the
-    names."""
+    """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; `crossmodel` for hands
+    that the trackers do not know; or `list` to print the names."""
     out: Annotated[Path | None, stated_default(aliases=("-o",), metavar="DIR")] = None
     """Folder to write to."""
     quick: bool = False
@@ -45,6 +45,10 @@ class Command:
     synergies: Annotated[str | None, stated_default(metavar="NAME|PATH")] = None
     """Synergies in place of those of each figure: the name of a set, as leap, or of a motion, as signs; a .json from
     `depthtrack synergies fit`; or recorded postures, which fig7 then approximates."""
+    rig: Annotated[tuple[Path, ...], stated_default(metavar="RIG.glb ...")] = ()
+    """Rigged meshes for `crossmodel` (default: hands drawn from the prior of sizes)."""
+    split: Literal["tuning", "report"] = "report"
+    """Seeds of `crossmodel`: those that thresholds are tuned on, or those of reported figures."""
     jobs: Annotated[int | None, stated_default(metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, stated_default(metavar="ADDRESS")] = None
@@ -71,6 +75,8 @@ class Command:
             resolution=self.resolution,
             frames=self.frames,
             synergies=self.synergies,
+            rigs=tuple(map(str, self.rig)),
+            split=self.split,
         )
         if "list" in self.figures:
             for experiment in experiments:

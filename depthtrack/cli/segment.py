@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from depthtrack.evaluation.segmentation import SegmentedFrame
+    from depthtrack.hand.shape import HandShape
     from depthtrack.recording import Sequence
     from depthtrack.tracking.tracker import Tracker
 
@@ -65,23 +66,25 @@ class SegmentCommand:
         options = self.segmentation_options
         sequence = self.recording.open()
         segmenter = Segmenter.for_sequence(sequence, options)
+        choice = None if self.tracker is None else self.hands.choose_side(sequence, options)
+        hand = self.hands.chosen(sequence, choice)
         folder = self.out or Path(f"{sequence.name}-segmented")
         check_output_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        with self._tracker(sequence) as tracker:
-            results = segment_sequence(sequence, segmenter, tracker, self.hands.chosen(sequence))
+        with self._tracker(hand) as tracker:
+            results = segment_sequence(sequence, segmenter, tracker, hand)
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
         print(dumps(report, indent=2) if self.json else _text(report))
 
-    def _tracker(self, sequence: "Sequence") -> "AbstractContextManager[Tracker | None]":
+    def _tracker(self, hand: "HandShape") -> "AbstractContextManager[Tracker | None]":
         from contextlib import closing, nullcontext
 
         from depthtrack.tracking.registry import create_tracker, tracker_config
 
         if self.tracker is None:
             return nullcontext()
-        return closing(create_tracker(tracker_config(self.tracker), self.hands.chosen(sequence)))
+        return closing(create_tracker(tracker_config(self.tracker), hand))
 
     def _written(
         self, sequence: "Sequence", results: "Iterator[SegmentedFrame]", folder: Path

@@ -1,6 +1,6 @@
 """Options of the commands that track several recordings."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -49,8 +49,19 @@ class SourceOptions:
             hand=hand if hand in (None, "truth") else str(Path(hand).resolve()),
             skin_model=None if skin_model is None else str(skin_model.resolve()),
             frames=self.frames,
-            side=self.hands.side,
+            side=self.hands.given_side,
         )
+
+    def with_side(self, source: "Source") -> "Source":
+        """Return a source with the side of its hand, which is found if nothing states it.
+
+        Raises:
+            InputError: if the recording is unusable, or no frame shows a hand.
+        """
+        if source.hand is not None or source.side is not None:
+            return source
+        choice = self.hands.choose_side(source.open(), source.segmentation, frames=self.frames)
+        return source if choice is None else replace(source, side=choice.side)
 
     def _camera(self) -> dict[str, Any] | None:
         from dataclasses import asdict

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -19,8 +20,10 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 
 if TYPE_CHECKING:
+    from depthtrack.hand.shape import HandShape
     from depthtrack.recording.sequence import Sequence as Recording
     from depthtrack.tracking.run_configuration import RunConfiguration
+    from depthtrack.tracking.side_choice import SideChoice
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,8 @@ class TrackCommand:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
         tracker = self.tracker_config  # checked before the recording is opened
         sequence = self._open()
-        configuration = self._configuration(sequence, tracker)
+        choice = None if self._stored is not None else self._choose_side(sequence)
+        configuration = self._configuration(sequence, tracker, choice)
         with (
             TrackingRun(configuration, sequence, self.threads or usable_cores()) as run,
             counter(len(run), leave=True) as shown,
@@ -85,21 +89,44 @@ class TrackCommand:
             for each in run.write(self.out, resume=self.resume):
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
-        self._report(sequence)
+        self._report(sequence, choice)
 
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
         repeated = None if self.config is None else _load(self.config).camera_model()
         return self.recording.open(repeated)
 
-    def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
+    @cached_property
+    def _stored(self) -> "HandShape | None":
+        """Hand of the run that is repeated or resumed, unless another one is given."""
+        if self.hands != HandOptions():
+            return None
+        if self.config is not None:
+            return _load(self.config).hand_shape(str(self.config))
+        if not (self.resume and (self.out / "run.json").exists()):
+            return None
+        from depthtrack.recording.run_folder import read_configuration
+        from depthtrack.tracking.run_configuration import RunConfiguration
+
+        where = str(self.out / "run.json")
+        return RunConfiguration.from_fields(read_configuration(self.out), where).hand_shape(where)
+
+    def _choose_side(self, sequence: "Recording") -> "SideChoice | None":
+        choice = self.hands.choose_side(sequence, self.segmentation_options, self.threads, self.frames)
+        if choice is not None:
+            other = "left" if choice.side == "right" else "right"
+            print(
+                f"a {choice.side} hand: a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames",
+                flush=True,
+            )
+        return choice
+
+    def _configuration(
+        self, sequence: "Recording", tracker: TrackerConfig, choice: "SideChoice | None"
+    ) -> "RunConfiguration":
         from depthtrack.tracking.run import configure
 
-        repeated = None if self.config is None else _load(self.config)
-        if repeated is not None and self.hands == HandOptions():
-            hand = repeated.hand_shape(str(self.config))
-        else:
-            hand = self.hands.chosen(sequence)
+        hand = self._stored or self.hands.chosen(sequence, choice)
         return configure(
             self.recording.path,
             sequence,
@@ -111,7 +138,7 @@ class TrackCommand:
             on_damage=self.recording.on_damage,
         )
 
-    def _report(self, sequence: "Recording") -> None:
+    def _report(self, sequence: "Recording", choice: "SideChoice | None") -> None:
         from depthtrack.recording.run_folder import read_rows
 
         rows = read_rows(self.out)
@@ -119,7 +146,7 @@ class TrackCommand:
             f"{self.out}: {len(rows)} frames, {sum(not row.status.is_trusted for row in rows)} without a trusted pose"
         )
         print(f"errors and timing:  depthtrack evaluate {self.out}")
-        if self.config is None and (note := self.hands.note(sequence, self.recording.path)) is not None:
+        if self._stored is None and (note := self.hands.note(sequence, self.recording.path, choice)) is not None:
             print(note)
 
 

@@ -20,6 +20,8 @@ from depthtrack.evaluation.metrics import (
     jitter,
     joint_errors,
     stage_times,
+    visible_and_hidden,
+    visible_points,
 )
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.evaluation.residuals import run_residuals
@@ -27,7 +29,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
 from depthtrack.tracking.run_configuration import RunConfiguration
-from depthtrack.types import Array
+from depthtrack.types import Array, Mask
 
 FrameProgress = Callable[[Iterable[ReplayedFrame]], Iterable[ReplayedFrame]]
 """Wraps the replayed frames, as a progress bar does."""
@@ -110,8 +112,10 @@ def evaluate_run(
 def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | None = None) -> Evaluation:
     """Return the evaluation of an opened run; see `evaluate_run`."""
     run, model = replay.run, HandModel(replay.hand)
-    points, truth_metrics = _pose_errors(run, model, replay.sequence.ground_truth)
+    true_points, points, truth_metrics = _pose_errors(run, model, replay.sequence.ground_truth)
     metrics = [*truth_metrics]
+    if points is not None and (visible := _visible(replay, true_points)) is not None:
+        metrics += visible_and_hidden(points, visible)
     if residuals:
         replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
         metrics += run_residuals(replayed, replay.surface(), len(run.index)).metrics()
@@ -129,23 +133,39 @@ def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | N
     )
 
 
+def _visible(replay: Replay, points: Array) -> Mask | None:
+    """Return which true points (T, P) are visible; None if the recording has no exact depth."""
+    found = np.zeros(points.shape[:2], dtype=np.bool_)
+    for row, index in enumerate(map(int, replay.run.index)):
+        depth = replay.sequence.exact_depth(index)
+        if depth is None:
+            return None
+        found[row] = visible_points(points[row], depth, replay.sequence.camera)
+    return found
+
+
 def _pose_errors(
     run: Run, model: HandModel, truth: GroundTruth | None
-) -> tuple[PointErrors | None, tuple[Metric, ...]]:
-    """Return errors relative to true poses if the recording has them, else to joints."""
+) -> tuple[Array, PointErrors | None, tuple[Metric, ...]]:
+    """Return the true points (T, P, 3), and the errors relative to poses or joints."""
+    nothing = np.empty((0, 0, 3)), None, ()
     if truth is None:
-        return None, ()
+        return nothing
     rows = [truth.at(float(t)) for t in run.timestamps]
     if truth.poses is not None:
         true_poses = _select_rows(truth.poses, rows)
         true_model = model if truth.hand is None else HandModel(truth.hand)
-        points = endpoint_errors(model, run.poses, true_model, true_poses)
-        added = added_jitter(model.endpoints(run.poses), true_model.endpoints(true_poses), run.timestamps)
-        return points, (points.mean(), points.largest(), angle_error(run.poses, true_poses), added)
+        points, true_points = (
+            endpoint_errors(model, run.poses, true_model, true_poses),
+            true_model.endpoints(true_poses),
+        )
+        added = added_jitter(model.endpoints(run.poses), true_points, run.timestamps)
+        return true_points, points, (points.mean(), points.largest(), angle_error(run.poses, true_poses), added)
     if truth.joints is not None:
-        points = joint_errors(model, run.poses, _select_rows(truth.joints, rows))
-        return points, (points.mean(), points.largest())
-    return None, ()
+        joints = _select_rows(truth.joints, rows)
+        points = joint_errors(model, run.poses, joints)
+        return joints, points, (points.mean(), points.largest())
+    return nothing
 
 
 def _select_rows(values: Array, rows: list[int | None]) -> Array:

@@ -32,6 +32,12 @@ def body_of(finger: int, phalanx: int) -> int:
     return 1 + 3 * finger + phalanx
 
 
+KEYPOINT_BODIES = np.array(
+    [0, *(body_of(finger, phalanx) for finger in range(5) for phalanx in (0, 0, 1, 2))], dtype=np.int64
+)
+"""(21,) body that each keypoint is fixed to. A joint belongs to the bone before it, which alone moves it."""
+
+
 def _moves() -> Mask:
     """Return (16, 20) whether an angle moves a body."""
     moves = np.zeros((BODY_COUNT, 20), dtype=np.bool_)

@@ -10,16 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel, body_of
+from depthtrack.hand.kinematics import KEYPOINT_BODIES, KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import POSE_SIZE, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.solver.point_fit import PointFitOptions, aligned_poses, fit_points_each
 from depthtrack.types import Array, Mask
-
-KEYPOINT_BODIES = np.array(
-    [0, *(body_of(finger, phalanx) for finger in range(5) for phalanx in (0, 0, 1, 2))], dtype=np.int64
-)
-"""(21,) body that each keypoint is fixed to. A joint belongs to the bone before it, which alone moves it."""
 
 IN_PALM = np.array([0, 1, 5, 9, 13, 17])
 """Wrist and base joints: they move with the palm alone."""

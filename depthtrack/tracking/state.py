@@ -114,9 +114,10 @@ class TrackState:
 
         It is in the tangent space, and zero if the last pose is too old.
         """
-        if self.is_stale(timestamp):
+        elapsed = timestamp - self._time
+        if self.is_stale(timestamp) or elapsed > self._thresholds.memory:
             return np.zeros(26)
-        share = (timestamp - self._time) / self._duration if self._duration > 0 else 1.0
+        share = elapsed / self._duration if self._duration > 0 else 1.0
         # Rounded time stamps must not change a steady motion.
         return self._motion * share if abs(share - 1) > _ROUNDED else self._motion
 

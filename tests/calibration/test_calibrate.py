@@ -24,7 +24,7 @@ from depthtrack.cli.calibrate import _text
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
@@ -34,7 +34,6 @@ from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.solver.keypoints import KEYPOINT_BODIES
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.registry import create_tracker
@@ -81,7 +80,7 @@ def made() -> Synthesiser:
 
 @pytest.fixture(scope="module")
 def calibration(made: Synthesiser) -> Calibration:
-    return calibrate([observe(made, i) for i in range(5, 355, 80)], RasterScorer)
+    return calibrate([observe(made, i) for i in range(5, 355, 80)], RasterScorer, "right")
 
 
 def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:

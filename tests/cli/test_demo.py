@@ -63,12 +63,12 @@ def test_the_hand_of_a_users_recording_is_calibrated_once_and_used(
     """The calibration itself is replaced."""
     calls: list[int] = []
 
-    def measured(observations: Sequence[Observation], *_: Any) -> SimpleNamespace:
+    def measured(sequence: object, observations: Sequence[Observation], *_: Any) -> SimpleNamespace:
         calls.append(len(observations))
         hand = HandShape(scale=1.07)
         return SimpleNamespace(hand=hand, to_json=hand.to_json)
 
-    monkeypatch.setattr("depthtrack.api.measuring.calibrate_views", measured)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", measured)
     monkeypatch.setattr("depthtrack.api.measuring.choose_views", lambda *_: [None] * 5)
     for _ in range(2):
         assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0

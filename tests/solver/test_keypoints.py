@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 from depthtrack.calibration.keypoint_calibration import shape_from_keypoints, side_of
 from depthtrack.errors import InputError
 from depthtrack.geometry.alignment import rigid_alignment
-from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
+from depthtrack.hand.kinematics import KEYPOINT_BODIES, KEYPOINT_NAMES, HandModel
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, make_pose, retract, tangent_between
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.solver.keypoints import KEYPOINT_BODIES, fit_poses
+from depthtrack.solver.keypoints import fit_poses
 
 SIDES: tuple[Side, Side] = ("right", "left")
 MIDDLE_ABDUCTION = ANGLE_NAMES.index("middle_mcp_abduction")

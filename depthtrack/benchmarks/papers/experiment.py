@@ -24,6 +24,8 @@ class ExperimentOptions:
     resolution: longest side of the region of interest, pixels; None for the sensor's, or QUICK_RESOLUTION if quick.
     frames: number of first frames of the motion; None for all.
     synergies: name for `synergy_sources.load_source`; None for the synergies of the experiment.
+    rigs: paths of rigged meshes; hands are drawn at random if there are none.
+    split: seeds that thresholds are tuned on, or those that figures are reported for.
     """
 
     quick: bool = False
@@ -33,6 +35,8 @@ class ExperimentOptions:
     resolution: int | None = None
     frames: int | None = None
     synergies: str | None = None
+    rigs: tuple[str, ...] = ()
+    split: Literal["tuning", "report"] = "report"
 
     @property
     def side(self) -> int | None:

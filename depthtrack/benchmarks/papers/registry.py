@@ -21,15 +21,17 @@ EXPERIMENTS = {
     "schroeder-10": f"{_HERE}.schroeder_10",
     "schroeder-11": f"{_HERE}.schroeder_11",
     "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
+    "crossmodel": "depthtrack.benchmarks.crossmodel.experiment",
 }
-"""Modules with an `EXPERIMENT`, by the first author of the paper and the figure or section."""
+"""Modules with an `EXPERIMENT`; those of papers by the first author and the figure or section."""
+_FIGURES = [name for name in EXPERIMENTS if "-" in name]
 
-PAPERS = tuple(dict.fromkeys(name.partition("-")[0] for name in EXPERIMENTS))
+PAPERS = tuple(dict.fromkeys(name.partition("-")[0] for name in _FIGURES))
 """Names of the papers: their first authors."""
 
 SHORT_NAMES = {
     tail if tail.startswith("sec") else f"fig{tail}": name
-    for name, tail in ((name, name.rpartition("-")[2]) for name in EXPERIMENTS)
+    for name, tail in ((name, name.rpartition("-")[2]) for name in _FIGURES)
 }
 """Full names by figure or section, which differ between the papers."""
 
@@ -41,7 +43,7 @@ def load_experiment(name: str) -> Experiment:
 
 
 def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Return the experiments of full names, short names, authors, or `all`; each once.
+    """Return experiments by full name, short name, author, or `all` of the papers.
 
     Raises:
         InputError: if a name is unknown.
@@ -50,12 +52,14 @@ def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
     for name in names:
         full = SHORT_NAMES.get(name, name)
         if name == "all" or name in PAPERS:
-            found += [each for each in EXPERIMENTS if name == "all" or each.startswith(f"{name}-")]
+            found += [each for each in _FIGURES if name == "all" or each.startswith(f"{name}-")]
         elif full in EXPERIMENTS:
             found.append(full)
         else:
             known = ", ".join(f"{short} ({full})" for short, full in SHORT_NAMES.items())
-            raise InputError(f"there is no figure '{name}': choose all, {', '.join(PAPERS)}, or some of {known}")
+            raise InputError(
+                f"there is no figure '{name}': choose all, {', '.join(PAPERS)}, crossmodel, or some of {known}"
+            )
     return [load_experiment(name) for name in dict.fromkeys(found)]
 
 

@@ -6,6 +6,7 @@ A row is NaN if the frame has no pose, no ground truth, or no observed hand.
 from depthtrack.evaluation.metrics.jitter import added_jitter, jitter
 from depthtrack.evaluation.metrics.losses import Loss, Losses, find_losses
 from depthtrack.evaluation.metrics.metric import Metric
+from depthtrack.evaluation.metrics.offsets import without_offsets
 from depthtrack.evaluation.metrics.points import (
     PointErrors,
     angle_error,
@@ -16,6 +17,7 @@ from depthtrack.evaluation.metrics.points import (
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
 from depthtrack.evaluation.metrics.success import SuccessCurve
 from depthtrack.evaluation.metrics.timing import frame_time, stage_times
+from depthtrack.evaluation.metrics.visibility import visible_and_hidden, visible_points
 
 __all__ = [
     "Loss",
@@ -36,4 +38,7 @@ __all__ = [
     "joint_errors",
     "silhouette_iou",
     "stage_times",
+    "visible_and_hidden",
+    "visible_points",
+    "without_offsets",
 ]

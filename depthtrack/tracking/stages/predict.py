@@ -20,7 +20,8 @@ class Predict:
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         last = frame.state.pose
         assert last is not None
-        ahead = within_limits(retract(last, np.outer(self.shares, frame.motion)))
+        shares = self.shares if frame.motion.any() else self.shares[:1]
+        ahead = within_limits(retract(last, np.outer(shares, frame.motion)))
         frame.predictions = frame.evaluate(ahead)
         return frame.predictions
 

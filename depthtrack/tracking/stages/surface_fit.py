@@ -62,7 +62,8 @@ class RetryPredictions:
         satisfied = self.ratio * frame.state.energy + self.margin * frame.clamp
         if candidates[0].energy <= satisfied:
             return candidates
-        candidates = by_energy([*candidates, *self.fit.fitted(frame, frame.predictions[1:])])
+        if others := frame.predictions[1:]:
+            candidates = by_energy([*candidates, *self.fit.fitted(frame, others)])
         if candidates[0].energy <= satisfied:
             return candidates
         return by_energy([*candidates, *self.fit.fitted(frame, candidates[:1], effort=2)])

@@ -1,0 +1,1 @@
+"""Cross-model benchmark: synthetic hands that differ from the trackers' own."""

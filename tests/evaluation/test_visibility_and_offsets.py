@@ -1,0 +1,58 @@
+"""Errors of visible and hidden points, and errors without constant offsets."""
+
+import numpy as np
+
+from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, visible_points, without_offsets
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.synthesis.generate import Synthesis, Synthesiser
+
+CAMERA = Camera(40, 30, 50.0, 50.0, 20.0, 15.0)
+
+
+def test_a_point_behind_a_surface_or_outside_the_image_is_hidden() -> None:
+    depth = np.zeros(CAMERA.shape, dtype=np.float32)
+    depth[:, :20] = 0.5
+    points = np.array([[-0.05, 0, 0.51], [-0.05, 0, 0.55], [0.05, 0, 0.9], [5, 0, 0.5], [np.nan] * 3])
+    assert visible_points(points, depth, CAMERA).tolist() == [True, False, True, False, False]
+
+
+def test_the_joints_of_an_open_hand_are_visible_and_those_of_a_fist_are_not() -> None:
+    made = Synthesiser(Synthesis(motion="everyday", model="skin"))
+    shares = []
+    for index in (0, 330):
+        shown = made[index]
+        shares.append(visible_points(shown.joints, shown.exact_depth.astype(np.float32), made.sensor.camera).mean())
+    assert shares[0] == 1
+    assert shares[1] < 1
+
+
+def test_errors_are_split_by_visibility() -> None:
+    model, poses = HandModel(HandShape()), Synthesiser(Synthesis(frames=2)).poses
+    joints = model.keypoints(poses)
+    joints[:, 8] += [0.01, 0, 0]
+    visible = np.ones((2, 21), dtype=np.bool_)
+    visible[1, 8] = False
+    shown, hidden = visible_and_hidden(joint_errors(model, poses, joints), visible)
+    np.testing.assert_allclose(shown.values, [10 / 21, 0], atol=1e-9)
+    np.testing.assert_allclose(hidden.values, [np.nan, 10], atol=1e-9)
+    assert (shown.name, hidden.name) == ("visible_joint_error_mm", "hidden_joint_error_mm")
+
+
+def test_joints_of_another_hand_differ_by_constant_offsets_alone() -> None:
+    made = Synthesiser(Synthesis(motion="signs", frames=60))
+    ours = HandModel(HandShape())
+    joints = ours.keypoints(made.poses)
+    R = ours.transforms(made.poses)[:, 0, :3, :3]
+    joints[:, 0] += np.einsum("tab,b->ta", R, [0.002, -0.004, 0.003])  # another wrist, fixed to the palm
+    found = without_offsets(ours, made.poses, joints)
+    np.testing.assert_allclose(found, joints, atol=1e-9)
+    moved = made.poses.copy()
+    moved[7] = np.nan
+    assert np.isnan(without_offsets(ours, moved, joints)[7]).all()
+
+
+def test_a_hand_that_is_never_known_stays_unknown() -> None:
+    unknown = np.full((3, 27), np.nan)
+    assert np.isnan(without_offsets(HandModel(HandShape()), unknown, np.zeros((3, 21, 3)))).all()

@@ -1,0 +1,81 @@
+"""The side of a hand, from tracks of both sides."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from depthtrack.calibration import sides
+from depthtrack.calibration.sides import calibrate_either_side
+from depthtrack.cli import main
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording import SequenceWriter, open_sequence
+from depthtrack.recording.run_folder import Run
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking.configuration import HybridConfig
+from depthtrack.tracking.run_configuration import RunConfiguration
+from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
+
+OPTIONS = SideOptions(stretches=2, stretch_frames=3, tracker=HybridConfig())
+
+
+def recorded(folder: Path, side: Side) -> Path:
+    """Write a recording of a hand whose side is not stated."""
+    made = Synthesiser(Synthesis(motion="everyday", model="skin", hand=HandShape(side=side), frames=40))
+    write_recording(made, folder)
+    (folder / "hand.json").unlink()
+    return folder
+
+
+def test_frames_are_spread_over_the_recording() -> None:
+    assert SideOptions(stretches=3, stretch_frames=2).frames(11) == [0, 1, 4, 5, 9, 10]
+    assert SideOptions(stretches=3, stretch_frames=20).frames(5) == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_side_is_found_and_its_hand_tracked(tmp_path: Path, side: Side, capsys: pytest.CaptureFixture[str]) -> None:
+    path = recorded(tmp_path / "recording", side)
+    choice = choose_side(open_sequence(path), options=OPTIONS)
+    assert (choice.side, choice.sure, choice.frames) == (side, True, 6)
+    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik"]) == 0
+    assert f"a {side} hand: a " in capsys.readouterr().out
+    run = Run.load(tmp_path / "run")
+    assert RunConfiguration.of(run).hand_shape().side == side
+    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik", "--resume"]) == 0
+
+
+def test_a_recording_without_a_hand_is_refused(tmp_path: Path) -> None:
+    made = Synthesiser(Synthesis(frames=1))
+    with SequenceWriter(tmp_path / "empty", made.sensor.camera) as writer:
+        for index in range(3):
+            writer.append(index / 30, np.zeros(made.sensor.camera.shape, np.float32))
+    with pytest.raises(InputError, match="no hand was found in 3 frames"):
+        choose_side(open_sequence(tmp_path / "empty"), options=OPTIONS)
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.MonkeyPatch, sure: bool) -> None:
+    from dataclasses import dataclass
+
+    @dataclass(frozen=True)
+    class Measured:
+        hand: HandShape
+        after_mm: float
+        side_margin: float | None = None
+
+    tried = list[Side]()
+
+    def calibrate(views: object, scorer: object, side: Side, *rest: object) -> Measured:
+        tried.append(side)
+        return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side])
+
+    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.3, sure, 10))
+    monkeypatch.setattr(sides, "calibrate", calibrate)
+    energies = {"right": np.array([11.0]), "left": np.array([10.0])}
+    monkeypatch.setattr(sides, "energies_of_sides", lambda *rest, **more: energies)
+    found = calibrate_either_side(None, [], None)  # type: ignore[arg-type]
+    assert tried == (["left"] if sure else ["right", "left"])
+    assert found.hand.side == ("left" if sure else "right")
+    assert found.side_margin == pytest.approx(0.3 if sure else 2 * 10 / 11 - 1)
