@@ -99,7 +99,7 @@ class PoseSearcher:
                 tried = [_search_once(scorer, o, generator, _SEARCH)[0] for _ in range(attempts)]
                 tried += [] if known is None else evaluate(scorer, known[n][None])
                 best.append(by_energy(tried)[0])
-        energies, agreements = ([getattr(one, name) for one in best] for name in ("energy", "confidence"))
+        energies, agreements = ([getattr(one, name) for one in best] for name in ("energy", "agreement"))
         return Found(poses_of(best), np.array(energies), np.array(agreements))
 
 

@@ -12,7 +12,7 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.evaluate import Evaluation
-    from depthtrack.evaluation.metrics import Metric, SuccessCurve
+    from depthtrack.evaluation.metrics import Metric, Reliability, SuccessCurve
     from depthtrack.evaluation.predictions import PredictionEvaluation
 
 
@@ -106,6 +106,8 @@ def _text(evaluation: "Evaluation") -> str:
         lines.append("  (the recording has neither true poses nor true joints)")
     else:
         lines.append(_success_text(evaluation.success))
+    if evaluation.reliability is not None:
+        lines.append(_reliability_text(evaluation.reliability))
     return "\n".join(lines)
 
 
@@ -136,6 +138,13 @@ def _compiled(time: "Metric") -> bool:
 def _success_text(success: "SuccessCurve") -> str:
     shares = ", ".join(f"{100 * success.within(mm):.0f} % within {mm} mm" for mm in (10, 20, 30, 40))
     return f"  largest error of a frame: {shares}; area under the curve {success.auc:.3f}"
+
+
+def _reliability_text(reliability: "Reliability") -> str:
+    text = f"  confidence: {100 * reliability.good:.0f} % of {reliability.frames} frames have no error over 20 mm"
+    if reliability.auroc is not None:
+        text += f", area under the ROC curve {reliability.auroc:.2f}"
+    return text
 
 
 def _row(name: str, metric: "Metric") -> str:

@@ -90,7 +90,7 @@ class Command:
             folder = self.out / experiment.name
             done.append(reproduce(experiment, options, folder, workers, _bar(experiment.name)))
             if not self.json:
-                print(_as_text(done[-1], folder))
+                print(_as_text(done[-1], experiment.reference, folder))
         if self.json:
             print(dumps([each.to_json() for each in done], indent=2))
 
@@ -99,10 +99,10 @@ def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterab
     return lambda rows, total, reused: bar(rows, "cell", total, name, reused)
 
 
-def _as_text(done: "Reproduction", folder: Path) -> str:
+def _as_text(done: "Reproduction", reference: str, folder: Path) -> str:
     from depthtrack.text_table import aligned
 
-    lines = [("", "paper, from its text", "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
+    lines = [("", reference, "ours"), *((c.what, c.paper, c.ours_text) for c in done.comparisons)]
     reused = f"{done.reused} of them reused, " if done.reused else ""
     time = f"{done.seconds:.0f} s ({done.cell_seconds:.0f} s in all workers)"
     return "\n".join(

@@ -11,6 +11,7 @@ from depthtrack.evaluation.metrics import (
     Losses,
     Metric,
     PointErrors,
+    Reliability,
     SuccessCurve,
     added_jitter,
     angle_error,
@@ -43,6 +44,7 @@ class Evaluation:
     metrics: metrics with one value per frame, in the order to print; first those that need ground truth.
     points: errors of endpoints or annotated joints; None without ground truth.
     success: curve of the frames below each error; None without ground truth.
+    reliability: of the confidence; None without ground truth or without a confidence.
     losses: losses that the tracker reported.
     ms_per_frame: milliseconds per frame.
     stage_ms: milliseconds per frame of each stage.
@@ -54,6 +56,7 @@ class Evaluation:
     metrics: tuple[Metric, ...]
     points: PointErrors | None
     success: SuccessCurve | None
+    reliability: Reliability | None
     losses: Losses
     ms_per_frame: Metric
     stage_ms: dict[str, Metric]
@@ -89,6 +92,7 @@ class Evaluation:
             **{metric.name: metric.statistics() for metric in self.metrics},
             **({} if self.points is None else {f"finger_{self.points.metric}": fingers}),
             **({} if self.success is None else self.success.to_json()),
+            **({} if self.reliability is None else {"confidence": self.reliability.to_json()}),
             "ms_per_frame": self.ms_per_frame.statistics(),
             "stage_ms": {stage: metric.statistics() for stage, metric in self.stage_ms.items()},
         }
@@ -127,6 +131,7 @@ def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | N
         metrics=tuple(metrics),
         points=points,
         success=None if points is None else SuccessCurve.of(points),
+        reliability=None if points is None else Reliability.of(run.confidence, points.largest().values),
         losses=find_losses(run.status, run.timestamps),
         ms_per_frame=frame_time(run.stage_ms, len(run.index)),
         stage_ms=stage_times(run.stage_ms, len(run.index)),

@@ -125,10 +125,12 @@ def estimate_of(run: Run, row: int) -> Estimate:
     return Estimate(
         pose if np.isfinite(pose).all() else None,
         float(run.energy[row]),
-        float(run.confidence[row]),
+        float(run.agreement[row]),
         run.status[row],
         {stage: float(values[row]) for stage, values in run.stage_ms.items() if row < len(values)},
         float(run.timestamps[row]),
+        float(run.confidence[row]),
+        tuple(map(float, run.visibility[row])),
     )
 
 

@@ -9,9 +9,18 @@ from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import replace_atomically
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.recording.ground_truth import JOINTS_HEADER
+from depthtrack.recording.run_folder import VISIBILITY_COLUMNS
 
-HEADER = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES, *JOINTS_HEADER[1:])
-"""Columns: the 27 pose values, then x, y, z of each keypoint, named as in a recording's `joints.csv`."""
+HEADER = (
+    *("index", "timestamp", "status", "energy", "agreement", "confidence"),
+    *VISIBILITY_COLUMNS,
+    *POSE_NAMES,
+    *JOINTS_HEADER[1:],
+)
+"""Columns: figures of a run's row, the 27 pose values, then x, y, z of each keypoint.
+
+Keypoints are named as in a recording's `joints.csv`.
+"""
 
 
 def write(track: JointTrack, path: Path) -> None:
@@ -24,15 +33,9 @@ def write(track: JointTrack, path: Path) -> None:
         table = csv.writer(file)
         table.writerow(HEADER)
         for row, index in enumerate(track.index):
-            numbers = [*track.poses[row], *track.keypoints[row].ravel()]
-            table.writerow(
-                [
-                    int(index),
-                    float(track.timestamps[row]),
-                    track.status[row],
-                    *(_cell(x) for x in (track.energy[row], track.confidence[row], *numbers)),
-                ]
-            )
+            figures = [track.energy[row], track.agreement[row], track.confidence[row], *track.visibility[row]]
+            numbers = [*figures, *track.poses[row], *track.keypoints[row].ravel()]
+            table.writerow([int(index), float(track.timestamps[row]), track.status[row], *map(_cell, numbers)])
 
 
 def _cell(value: float) -> str:

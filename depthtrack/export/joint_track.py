@@ -17,7 +17,8 @@ class JointTrack:
     index: (T,) frame of the recording.
     timestamps: (T,) seconds.
     status: (T,) result of each frame.
-    energy, confidence: (T,) of the poses.
+    energy, agreement, confidence: (T,) of the poses, see `RunRow`.
+    visibility: (T, 5) share of each finger that is visible.
     poses: (T, 27) metres, quaternion, radians, camera frame.
     keypoints: (T, 21, 3) metres, camera frame, in MediaPipe's order.
     hand: the hand of the poses.
@@ -27,7 +28,9 @@ class JointTrack:
     timestamps: Array
     status: tuple[Status, ...]
     energy: Array
+    agreement: Array
     confidence: Array
+    visibility: Array
     poses: Array
     keypoints: Array
     hand: HandShape
@@ -36,4 +39,5 @@ class JointTrack:
     def of(cls, run: Run, hand: HandShape) -> Self:
         """Return the poses of a run with the keypoints of its hand."""
         keypoints = HandModel(hand).keypoints(run.poses)
-        return cls(run.index, run.timestamps, run.status, run.energy, run.confidence, run.poses, keypoints, hand)
+        figures = (run.energy, run.agreement, run.confidence, run.visibility)
+        return cls(run.index, run.timestamps, run.status, *figures, run.poses, keypoints, hand)

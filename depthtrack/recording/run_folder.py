@@ -1,14 +1,16 @@
 """The run folder: a tracker's result of every frame, readable after a kill at any time.
 
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
-confidence and the pose, which is empty if there is none. `timings.csv` has the milliseconds of each stage.
+agreement, confidence, visibility of each finger and the pose, which is empty if there is none. `timings.csv` has the
+milliseconds of each stage.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
 import json
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,12 +19,16 @@ import numpy as np
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines, read_text, write_atomic
-from depthtrack.hand.pose import ORIENTATION, POSE_NAMES, POSE_SIZE
+from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
 
-_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
+_EARLIER_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
+"""Columns of runs before format 3, whose confidence was the agreement of silhouettes."""
+VISIBILITY_COLUMNS = tuple(f"{finger}_visible" for finger in FINGERS)
+_COLUMNS = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
+UNKNOWN_VISIBILITY = (math.nan,) * len(FINGERS)
 _LARGEST_TABLE = 1 << 29
 """Bytes: eight hours at 30 Hz, and a bound on memory."""
 _LARGEST = 100.0
@@ -38,15 +44,20 @@ class RunRow:
 
     timestamp: seconds.
     energy: of the pose; NaN without a pose.
+    agreement: of the rendered and the observed silhouette, 0 to 1.
     pose: (27,) metres, quaternion, radians, camera frame; None if no hand was observed.
+    confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
+    visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
     """
 
     index: int
     timestamp: float
     status: Status
     energy: float
-    confidence: float
+    agreement: float
     pose: Array | None
+    confidence: float = math.nan
+    visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
 
 
 class RunWriter(Closing):
@@ -106,7 +117,8 @@ class Run:
 
     index: (T,) frame of the recording.
     timestamps: (T,) seconds.
-    energy, confidence: (T,) of the poses.
+    energy, agreement, confidence: (T,) of the poses, see `RunRow`.
+    visibility: (T, 5) of the fingers, see `RunRow`.
     poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
     stage_ms: (T,) milliseconds of each stage.
     """
@@ -117,7 +129,9 @@ class Run:
     timestamps: Array
     status: tuple[Status, ...]
     energy: Array
+    agreement: Array
     confidence: Array
+    visibility: Array
     poses: Array
     stage_ms: dict[str, Array]
 
@@ -137,7 +151,9 @@ class Run:
             np.array([row.timestamp for row in rows], dtype=np.float64),
             tuple(row.status for row in rows),
             np.array([row.energy for row in rows], dtype=np.float64),
+            np.array([row.agreement for row in rows], dtype=np.float64),
             np.array([row.confidence for row in rows], dtype=np.float64),
+            np.array([row.visibility for row in rows], dtype=np.float64).reshape(-1, len(FINGERS)),
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
         )
@@ -167,27 +183,46 @@ def read_rows(folder: Path) -> list[RunRow]:
         InputError: if a row is malformed, or holds values that no tracker writes.
     """
     path = folder / "poses.csv"
+    columns = _EARLIER_COLUMNS if _header(path) == _EARLIER_COLUMNS else _COLUMNS
     rows = []
-    for number, cells in enumerate(_read_table(path, _COLUMNS), start=2):
+    for number, cells in enumerate(_read_table(path, columns), start=2):
         try:
-            index, timestamp, status, energy, confidence, *pose = cells
-            numbers = np.array([float(x) for x in pose]) if any(pose) else None
-            if not 0 <= int(index) < MAX_FRAMES:
-                raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
-            rows.append(RunRow(int(index), float(timestamp), Status(status), float(energy), float(confidence), numbers))
+            rows.append(_row(cells))
         except (ValueError, IndexError) as error:
             raise InputError(
-                f"{path}, line {number}: expected {len(_COLUMNS)} values of a frame: {error!s:.120}"
+                f"{path}, line {number}: expected {len(columns)} values of a frame: {error!s:.120}"
             ) from error
         if (reason := _row_fault(rows[-1])) is not None:
             raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
     return rows
 
 
+def _header(path: Path) -> tuple[str, ...]:
+    """Return the names in the first line of a table."""
+    return tuple(next(read_lines(path, _LARGEST_TABLE), "").strip().split(","))
+
+
+def _row(cells: list[str]) -> RunRow:
+    """Return the row of a line's cells, of this format or the earlier one. Raises ValueError."""
+    index, timestamp, status, energy, agreement, *rest = cells
+    pose = rest[-POSE_SIZE:]
+    numbers = np.array([float(x) for x in pose]) if any(pose) else None
+    if not 0 <= int(index) < MAX_FRAMES:
+        raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
+    row = RunRow(int(index), float(timestamp), Status(status), float(energy), float(agreement), numbers)
+    if len(rest) == POSE_SIZE:
+        return row
+    confidence, *visibility = map(float, rest[:-POSE_SIZE])
+    return replace(row, confidence=confidence, visibility=tuple(visibility))
+
+
 def _row_fault(row: RunRow) -> str | None:
     """Return the reason why no tracker writes such a row; None if the row is valid."""
     if not abs(row.timestamp) < _LATEST:  # false for NaN
         return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
+    shares = np.array([row.confidence, *row.visibility])
+    if len(outside := shares[(shares < 0) | (shares > 1)]):
+        return f"confidence and visibility must be shares from 0 to 1, found {outside[0]:.6g}"
     if row.pose is None:
         return None
     if not np.all(np.abs(row.pose) <= _LARGEST):
@@ -236,7 +271,8 @@ def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
 
 def _cells(row: RunRow) -> list[str]:
     pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
-    return [str(row.index), repr(row.timestamp), row.status, repr(row.energy), repr(row.confidence), *pose]
+    shares = map(repr, (row.energy, row.agreement, row.confidence, *row.visibility))
+    return [str(row.index), repr(row.timestamp), row.status, *shares, *pose]
 
 
 def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:

@@ -27,7 +27,7 @@ class Terms:
 
     @property
     def agreement(self) -> Array:
-        """Agreement (B,) of the rendered and the observed silhouette, 0 to 1, used as confidence."""
+        """Agreement (B,) of the rendered and the observed silhouette, 0 to 1, used to trust a pose."""
         return 1 - self.silhouette
 
     @classmethod

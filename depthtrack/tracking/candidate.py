@@ -1,4 +1,4 @@
-"""Candidates of a tracker: poses with their energy and confidence."""
+"""Candidates of a tracker: poses with their energy and agreement."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -14,12 +14,12 @@ class Candidate(NamedTuple):
 
     pose: (27,) pose vector, camera frame.
     energy: E of Oikonomidis et al. 2011, Eq. (1).
-    confidence: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
+    agreement: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
     """
 
     pose: Array
     energy: float
-    confidence: float
+    agreement: float
 
 
 def evaluate(scorer: Scorer, poses: Array) -> list[Candidate]:

@@ -30,7 +30,7 @@ _LOCAL_FITS = FitSearchOptions(
 )
 """Surface fits of their local search."""
 _FIT_RECOVERY = RecoveryOptions(
-    good_energy=0.3, proposals=3000, min_angle=0.0, accept_local=0.9, doubt_confidence=0.5, doubt_energy=0.4
+    good_energy=0.3, proposals=3000, min_angle=0.0, accept_local=0.9, doubt_agreement=0.5, doubt_energy=0.4
 )
 """Conditions of their local search."""
 _FIT_FINGERS = FingerOptions(resolution=96, stop_early=False)

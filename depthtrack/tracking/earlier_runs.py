@@ -54,8 +54,15 @@ def _with_seconds(fields: Mapping[str, Any]) -> dict[str, Any]:
     frames = thresholds.get("memory_frames")
     memory = {"memory": frames / _RATE} if isinstance(frames, int) else {}
     # Those versions followed the last pose after any pause.
-    options = {**options, "thresholds": {**rest, **memory, "longest_gap": "inf"}}
+    options = {**options, "thresholds": _renamed(rest) | memory | {"longest_gap": "inf"}}
+    if isinstance(recovery := options.get("recovery"), dict):
+        options["recovery"] = _renamed(recovery)
     return {**fields, "format": 3, "options": options}
+
+
+def _renamed(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with the agreement of silhouettes by its name; it was called confidence."""
+    return {name.replace("confidence", "agreement"): value for name, value in options.items()}
 
 
 def _nested(fields: Mapping[str, Any], where: str) -> dict[str, Any]:

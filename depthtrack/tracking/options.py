@@ -28,12 +28,12 @@ class TrackingThresholds:
     The median term adapts to hands whose shape differs from the model: their energy is high in every frame.
     """
 
-    confidence: float = option(0.5, "A track with a lower confidence is lost")
+    agreement: float = option(0.5, "A track with a lower agreement is lost")
     energy: float = option(
         0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
     )
     lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
-    guide_confidence: float = option(0.6, "Least confidence of a pose that guides the segmentation")
+    guide_agreement: float = option(0.6, "Least agreement of a pose that guides the segmentation")
     guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
     median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
     memory: float = option(0.5, "Time after a loss in which the hand is searched near its last pose", unit="s")
@@ -138,7 +138,7 @@ class RecoveryOptions:
     accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
     accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
     accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
-    doubt_confidence: float = option(0.6, "A lower confidence triggers a local search")
+    doubt_agreement: float = option(0.6, "A lower agreement triggers a local search")
     doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
 
 

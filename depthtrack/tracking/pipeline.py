@@ -154,11 +154,23 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
         if number < held:
             continue
         frame, estimate = each.frame, each.estimate
-        row = RunRow(frame.index, frame.timestamp, estimate.status, estimate.energy, estimate.confidence, estimate.pose)
+        row = RunRow(
+            frame.index,
+            frame.timestamp,
+            estimate.status,
+            estimate.energy,
+            estimate.agreement,
+            estimate.pose,
+            estimate.confidence,
+            estimate.visibility,
+        )
         run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
         yield each
 
 
 def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
     """Return the estimates that a run folder holds."""
-    return [Estimate(row.pose, row.energy, row.confidence, row.status, timestamp=row.timestamp) for row in rows]
+    return [
+        Estimate(row.pose, row.energy, row.agreement, row.status, {}, row.timestamp, row.confidence, row.visibility)
+        for row in rows
+    ]

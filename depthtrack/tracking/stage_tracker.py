@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.confidence import Evidence, evidence_of, finger_visibility, fitted_model
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
@@ -32,14 +34,23 @@ class Stages:
     refine: Sequence[Stage]
 
 
+_LEAST_ENERGY = 1e-3
+"""Energy that a ratio of energies is limited to."""
+
+
 class StageTracker:
-    """Tracker with lists of stages: see `tracker.Tracker`."""
+    """Tracker with lists of stages: see `tracker.Tracker`.
+
+    evidence: figures that the confidence of the last estimate depends on.
+    """
 
     def __init__(self, name: str, stages: Stages, tools: Toolkit, thresholds: TrackingThresholds, seed: int) -> None:
         self.name, self._stages, self._tools, self._seed = name, stages, tools, seed
         self._state = TrackState(thresholds, tools.scoring.objective.clamp)
         listed = (stage.name for stage in (*stages.follow, *stages.start, *stages.refine))
-        self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed)))
+        self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed, "confidence")))
+        self._confidence = fitted_model()
+        self.evidence: Evidence | None = None
 
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         """Start on this frame: refine a pose (27,), or search if there is none."""
@@ -88,4 +99,19 @@ class StageTracker:
                 clock.lap(stage.name)
             found.append((candidates[0], Status.STARTED if frame.restarted else status))
         best, status = min(found, key=lambda pair: pair[0].energy)
-        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp)
+        self.evidence, visibility = self._evidence(best, status, observation.timestamp)
+        confidence = self._confidence(self.evidence)
+        clock.lap("confidence")
+        shares = tuple(map(float, visibility))
+        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, confidence, shares)
+
+    def _evidence(self, best: Candidate, status: Status, timestamp: float) -> tuple[Evidence, Array]:
+        """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""
+        tools, state = self._tools, self._state
+        target, rendered = tools.scorer.target, tools.scorer.render(best.pose)
+        visibility = finger_visibility(tools.model, best.pose, rendered, target.camera)
+        usual = state.median_energy if state.median_energy < np.inf else best.energy
+        ratio = float(np.log(max(best.energy, _LEAST_ENERGY) / max(usual, _LEAST_ENERGY)))
+        energy = best.energy / tools.scoring.objective.clamp
+        age = state.age(status, timestamp)
+        return evidence_of(best.pose, rendered, target, tools.hand, visibility, energy, ratio, age), visibility

@@ -11,6 +11,7 @@ from statistics import median
 import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
+from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
@@ -32,26 +33,26 @@ class TrackState:
 
     def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
         self._thresholds, self._clamp = thresholds, clamp
-        self._confidence = 0.0
+        self._agreement = 0.0
         self._energies: deque[float] = deque(maxlen=thresholds.median_frames)
         self.pose: Array | None = None
         self.energy = np.inf
         self.last_trusted: Array | None = None
-        self._time = math.nan
+        self._time, self._started = math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
 
-    def is_lost(self, energy: float, confidence: float) -> bool:
-        """Return whether a pose with this energy and confidence is not trusted."""
-        return self.is_beyond(energy, confidence, self._thresholds.energy, self._thresholds.confidence)
+    def is_lost(self, energy: float, agreement: float) -> bool:
+        """Return whether a pose with this energy and agreement is not trusted."""
+        return self.is_beyond(energy, agreement, self._thresholds.energy, self._thresholds.agreement)
 
-    def is_beyond(self, energy: float, confidence: float, most_energy: float, least_confidence: float) -> bool:
-        """Return whether the confidence is too low or the energy too high.
+    def is_beyond(self, energy: float, agreement: float, most_energy: float, least_agreement: float) -> bool:
+        """Return whether the agreement is too low or the energy too high.
 
         The energy is also compared with the median energy.
 
         most_energy: multiple of `Objective.clamp`.
         """
-        if confidence < least_confidence:
+        if agreement < least_agreement:
             return True
         return energy > most_energy * self._clamp and energy > self._thresholds.lost_ratio * self.median_energy
 
@@ -68,16 +69,23 @@ class TrackState:
         self,
         pose: Array,
         energy: float,
-        confidence: float,
+        agreement: float,
         status: Status,
         stage_ms: dict[str, float],
         timestamp: float = math.nan,
+        confidence: float = math.nan,
+        visibility: tuple[float, ...] = UNKNOWN_VISIBILITY,
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted."""
-        trusted = not self.is_lost(energy, confidence)
-        estimate = Estimate(pose, energy, confidence, status if trusted else Status.LOST, stage_ms, timestamp)
+        status = Status.LOST if self.is_lost(energy, agreement) else status
+        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, confidence, visibility)
         self.update(estimate)
         return estimate
+
+    def age(self, status: Status, timestamp: float) -> float:
+        """Return the time since the start of the track, s; 0 if a pose of this status starts one."""
+        known = status is Status.TRACKED and timestamp >= self._started
+        return timestamp - self._started if known else 0.0
 
     def restore(self, estimates: Sequence[Estimate]) -> None:
         """Update the state with the estimates of earlier frames."""
@@ -101,7 +109,8 @@ class TrackState:
             self._motion, self._duration = tangent_between(self.pose, estimate.pose), elapsed
         else:
             self._motion, self._duration = np.zeros(26), math.nan
-        self.pose, self.energy, self._confidence = estimate.pose, estimate.energy, estimate.confidence
+            self._started = estimate.timestamp
+        self.pose, self.energy, self._agreement = estimate.pose, estimate.energy, estimate.agreement
         self.last_trusted, self._time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 
@@ -127,7 +136,7 @@ class TrackState:
         A wrong pose must not guide the segmentation: it would select the pixels that agree with it.
         """
         limits = self._thresholds
-        if self.pose is None or self._confidence < limits.guide_confidence or self.is_stale(timestamp):
+        if self.pose is None or self._agreement < limits.guide_agreement or self.is_stale(timestamp):
             return None
         if self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy:
             return None

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
@@ -18,18 +19,22 @@ class Estimate:
 
     pose: (27,) pose vector, None if no hand was observed.
     energy: E of Oikonomidis et al. 2011, Eq. (1); NaN without a pose.
-    confidence: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
+    agreement: agreement of rendered and observed silhouette, 0 to 1 (1 minus the silhouette term of Eq. 2).
     status: tracked, started, lost or absent.
     stage_ms: milliseconds spent in each stage of the tracker.
+    confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
+    visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
     """
 
     pose: Array | None
     energy: float
-    confidence: float
+    agreement: float
     status: Status
     stage_ms: dict[str, float] = field(default_factory=dict)
     timestamp: float = math.nan
+    confidence: float = math.nan
+    visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)

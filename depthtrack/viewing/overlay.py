@@ -1,5 +1,7 @@
 """Overlays on images: masks as a tint with a contour, hands as a coloured skeleton."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,7 +10,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS
 from depthtrack.types import Array, Image, Mask
-from depthtrack.viewing.theme import FINGER_COLOURS, OUTLINE, PALM, TRUE_MASK, Rgb
+from depthtrack.viewing.theme import FINGER_COLOURS, HIDDEN, OUTLINE, PALM, TRUE_MASK, Rgb
 
 Bone = tuple[int, int]
 
@@ -80,6 +82,19 @@ def draw_skeleton(
     for (a, b), part in _far_to_near(points, visible):
         _draw_bone(out, pixels[a], pixels[b], palette[part], thickness)
     return out
+
+
+def faded_fingers(visibility: Sequence[float]) -> dict[str, Rgb]:
+    """Return the colours of the fingers, the greyer the less of a finger is visible.
+
+    visibility: (5,) shares, 0 to 1; NaN counts as visible.
+    """
+    shares = np.nan_to_num(np.asarray(visibility, dtype=np.float64), nan=1.0)
+    colours = {}
+    for finger, share in zip(FINGERS, shares, strict=True):
+        r, g, b = (round(share * c + (1 - share) * h) for c, h in zip(FINGER_COLOURS[finger], HIDDEN, strict=True))
+        colours[finger] = (r, g, b)
+    return colours
 
 
 def _far_to_near(points: Array, visible: Mask) -> list[tuple[Bone, str]]:

@@ -19,7 +19,7 @@ from depthtrack.viewing.theme import FINGER_TRUTH, STATUS_COLOURS
 
 _OPACITY = 170
 _HAND_IMAGES = ("hypothesis", "residual", "true_skeleton")
-_SERIES = {"energy": (167, 110, 230), "confidence": (56, 189, 248), "error_mm": (251, 191, 36)}
+_SERIES = {"energy": (167, 110, 230), "agreement": (56, 189, 248), "error_mm": (251, 191, 36)}
 
 
 class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
@@ -30,7 +30,7 @@ class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
     - `world/hypothesis`: the tracked hand's visible surface, metres, camera frame.
     - `world/camera/hypothesis` and `world/camera/residual`: images.
     - `world/true_skeleton`: true keypoints, if known.
-    - `run/energy`, `run/confidence`, `run/error_mm` and `run/status`: values over time.
+    - `run/energy`, `run/agreement`, `run/error_mm` and `run/status`: values over time.
     """
 
     def __init__(self, replay: Replay) -> None:
@@ -60,7 +60,7 @@ class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
 
     def _log_numbers(self, item: ReplayedFrame) -> None:
         rr, stream, estimate = self._rr, self._stream, item.estimate
-        values = {"energy": estimate.energy, "confidence": estimate.confidence}
+        values = {"energy": estimate.energy, "agreement": estimate.agreement}
         if self._error is not None:
             values["error_mm"] = float(self._error[item.row])
         for name, value in values.items():
@@ -85,7 +85,7 @@ class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
         rrb = importlib.import_module("rerun.blueprint")
         series = [
             rrb.TimeSeriesView(origin=f"run/{name}", name=title)
-            for name, title in (("energy", "energy"), ("error_mm", "error, mm"), ("confidence", "confidence"))
+            for name, title in (("energy", "energy"), ("error_mm", "error, mm"), ("agreement", "agreement"))
             if name != "error_mm" or self._error is not None
         ]
         images = rrb.Vertical(

@@ -15,7 +15,7 @@ from depthtrack.types import Image, Mask
 from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import close_up_regions
 from depthtrack.viewing.depth_colours import keypoint_depth_range
-from depthtrack.viewing.overlay import dimmed, draw_skeleton
+from depthtrack.viewing.overlay import dimmed, draw_skeleton, faded_fingers
 from depthtrack.viewing.panels import blank, captioned, draw_layer, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb
 from depthtrack.viewing.shading import draw_surface
@@ -101,7 +101,9 @@ class RunPainter:
         truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
         if truth is not None:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
-        return image if close.keypoints is None else draw_skeleton(image, camera, close.keypoints)
+        if close.keypoints is None:
+            return image
+        return draw_skeleton(image, camera, close.keypoints, colours=faded_fingers(replayed.estimate.visibility))
 
     def _rendered(self, replayed: ReplayedFrame, camera: Camera) -> RenderedSurface | None:
         """Return the rendered hypothesis for a view of this camera."""
@@ -117,13 +119,15 @@ class RunPainter:
         if layer == "residual":
             return "residual", "red nearer, blue farther, magenta not covered"
         truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
-        return "skeleton", "" if truth is None else "thin: ground truth"
+        return "skeleton", "grey: hidden" if truth is None else "grey: hidden, thin: ground truth"
 
     def _headline(self, replayed: ReplayedFrame, width: int) -> Image:
         bar, estimate = blank(width, 34), replayed.estimate
         tracker = str(self._replay.run.configuration.get("tracker", "track"))[:20]
         put_text(bar, f"{self._replay.sequence.name[:40]}  ·  {tracker}", (4, 17), 20)
-        values = f"energy {estimate.energy:.2f}  ·  confidence {estimate.confidence:.2f}"
+        values = f"energy {estimate.energy:.2f}  ·  agreement {estimate.agreement:.2f}"
+        if np.isfinite(estimate.confidence):
+            values += f"  ·  confidence {100 * estimate.confidence:.0f} %"
         values = "" if estimate.pose is None else values
         x = width - 4 - text_width(values, 15)
         put_text(bar, values, (x, 17), 15, FAINT_TEXT)

@@ -24,6 +24,8 @@ FINGER_COLOURS: dict[str, Rgb] = {
     "ring": (56, 189, 248),
     "little": (192, 132, 252),
 }
+HIDDEN: Rgb = (92, 99, 110)
+"""Colour of a finger that is hidden."""
 FINGER_TRUTH: dict[str, Rgb] = dict.fromkeys(("palm", *FINGER_COLOURS), TRUE_MASK)
 """Colours of a true skeleton beside a tracked one."""
 OUTLINE: Rgb = (10, 12, 18)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from depthtrack.evaluation.metrics import (
     Metric,
     PointErrors,
+    Reliability,
     SuccessCurve,
     added_jitter,
     angle_error,
@@ -240,3 +241,20 @@ def test_the_stages_of_a_frame_add_up() -> None:
     assert stage_times(stages, 3)["swarm"].statistics()["p95"] == pytest.approx(28)
     assert np.isnan(frame_time(stages, 4).values).tolist() == [False, False, False, True]
     assert frame_time({}, 2).statistics()["mean"] is None
+
+
+def test_reliability_counts_good_frames_by_confidence() -> None:
+    confidence = np.array([0.95, 0.91, 0.15, 0.12, np.nan, 0.5])
+    largest = np.array([5.0, 30.0, 40.0, 10.0, 5.0, np.nan])
+    found = Reliability.of(confidence, largest)
+    assert found is not None
+    assert (found.frames, found.good) == (4, 0.5)
+    assert found.bins == ((0.1, 2, 0.5), (0.9, 2, 0.5))
+    assert found.auroc == pytest.approx(3 / 4 - 1 / 4)  # pairs in order: 0.95 before both bad ones, 0.12 before none
+    assert Reliability.of(np.full(3, np.nan), np.zeros(3)) is None
+    perfect = Reliability.of(np.array([0.9, 0.1]), np.array([1.0, 50.0]))
+    assert perfect is not None
+    assert perfect.auroc == 1
+    alike = Reliability.of(np.array([0.9, 0.1]), np.array([1.0, 2.0]))
+    assert alike is not None
+    assert alike.auroc is None

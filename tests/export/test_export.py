@@ -51,8 +51,8 @@ def test_a_table_holds_poses_and_keypoints_bitwise(run: Path, tmp_path: Path) ->
     with (tmp_path / "out.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
     assert tuple(header) == HEADER
-    assert header[5:32] == list(POSE_NAMES)
-    assert header[32:35] == ["wrist_x", "wrist_y", "wrist_z"]
+    assert header[11:38] == list(POSE_NAMES)
+    assert header[38:41] == ["wrist_x", "wrist_y", "wrist_z"]
     loaded, keypoints = Run.load(run), expected_keypoints(run)
     assert [row[2] for row in rows] == list(loaded.status)
     for k, row in enumerate(rows):
@@ -60,8 +60,8 @@ def test_a_table_holds_poses_and_keypoints_bitwise(run: Path, tmp_path: Path) ->
         if k == 1:
             assert set(row[5:]) == {""}
         else:
-            np.testing.assert_array_equal(np.array(row[5:32], dtype=float), loaded.poses[k])
-            np.testing.assert_array_equal(np.array(row[32:], dtype=float).reshape(21, 3), keypoints[k])
+            np.testing.assert_array_equal(np.array(row[11:38], dtype=float), loaded.poses[k])
+            np.testing.assert_array_equal(np.array(row[38:], dtype=float).reshape(21, 3), keypoints[k])
 
 
 def test_exported_keypoints_are_the_recording_s_own(recording: Path, run: Path, tmp_path: Path) -> None:

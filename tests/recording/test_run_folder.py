@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import ORIENTATION
+from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run, RunRow, RunWriter, read_rows
 from depthtrack.recording.status import Status
@@ -132,9 +132,9 @@ def test_damaged_runs_are_rejected_in_one_sentence(tmp_path: Path, name: str, te
 @pytest.mark.parametrize(
     ("found", "damaged", "message"),
     [
-        ("tracked,0", "tracked,x", "line 2: expected 32 values"),
-        ("tracked,0", 'tracked,"0', "line 2: expected 32 values"),
-        ("tracked,0", "tracked", "line 2: expected 32 columns, found 31"),
+        ("tracked,0", "tracked,x", "line 2: expected 38 values"),
+        ("tracked,0", 'tracked,"0', "line 2: expected 38 values"),
+        ("tracked,0", "tracked", "line 2: expected 38 columns, found 37"),
         ("\n0,", f"\n{10**30},", "line 2: .* frames are numbered from 0 to"),
     ],
 )
@@ -154,10 +154,12 @@ def test_a_malformed_row_is_named(tmp_path: Path, found: str, damaged: str, mess
         ("timestamp", "1e300", "frame 1: the timestamp must be seconds below 1e[+]12, found 1e[+]300"),
         ("timestamp", "nan", "frame 1: the timestamp must be .*, found nan"),
         ("status", "flying", "line 3: .*the status must be one of"),
+        ("confidence", "1.5", "frame 1: confidence and visibility must be shares from 0 to 1, found 1.5"),
+        ("ring_visible", "-1", "frame 1: confidence and visibility must be shares"),
         ("x", "1e300", "frame 1: a pose must be numbers up to 100"),
         ("x", "nan", "frame 1: a pose must be numbers"),
-        ("x", "", "line 3: expected 32 values"),
-        ("x", "y" * 100_000, "line 3: expected 32 values .{1,140}$"),
+        ("x", "", "line 3: expected 38 values"),
+        ("x", "y" * 100_000, "line 3: expected 38 values .{1,140}$"),
         ("qw", "3", "frame 1: the quaternion must have length 1, found [0-9.]{1,7}$"),
     ],
 )
@@ -179,3 +181,28 @@ def test_every_status_can_be_read_back(tmp_path: Path, status: Status) -> None:
     with RunWriter(tmp_path / "run", CONFIGURATION, ("segment",)) as writer:
         writer.append(replace(row(0), status=status), {})
     assert Run.load(tmp_path / "run").status == (status,)
+
+
+def test_a_run_before_format_3_is_read_with_its_agreement(tmp_path: Path) -> None:
+    folder = tmp_path / "old"
+    folder.mkdir()
+    (folder / "run.json").write_text("{}")
+    pose = ",".join(["0.0", "0.0", "0.5", "1.0", "0.0", "0.0", "0.0", *["0.1"] * 20])
+    header = ",".join(["index", "timestamp", "status", "energy", "confidence", *POSE_NAMES])
+    (folder / "poses.csv").write_text(f"{header}\n0,0.0,started,5.0,0.9,{pose}\n")
+    (folder / "timings.csv").write_text("index,segment\n0,1.0\n")
+    run = Run.load(folder)
+    assert run.agreement.tolist() == [0.9]
+    assert np.isnan(run.confidence).all()
+    assert np.isnan(run.visibility).all()
+    assert run.visibility.shape == (1, 5)
+
+
+def test_confidence_and_visibility_are_read_back_bitwise(tmp_path: Path) -> None:
+    pose = np.array([0.0, 0, 0.5, 1, 0, 0, 0, *[0.1] * 20])
+    row = RunRow(0, 0.0, Status.TRACKED, 5.0, 0.9, pose, 1 / 3, (0.1, 1 / 7, 1.0, 0.0, 0.5))
+    with RunWriter(tmp_path / "run", {}, ("segment",)) as run:
+        run.append(row, {})
+    read = Run.load(tmp_path / "run")
+    assert read.confidence.tolist() == [1 / 3]
+    assert tuple(read.visibility[0]) == row.visibility

@@ -61,9 +61,9 @@ def write_run(
         for row, pose in enumerate(poses):
             said = (status or {}).get(row, "started" if row == 0 else "tracked")
             seen = said != "absent"
-            energy, confidence = (2.0 + row, 0.9) if seen else (float("nan"), 0.0)
+            energy, agreement = (2.0 + row, 0.9) if seen else (float("nan"), 0.0)
             time = float(sequence.timestamps[row])
             run.append(
-                RunRow(row, time, Status(said), energy, confidence, pose if seen else None), {"segment": 4, "swarm": 16}
+                RunRow(row, time, Status(said), energy, agreement, pose if seen else None), {"segment": 4, "swarm": 16}
             )
     return folder

@@ -247,6 +247,6 @@ def test_a_viewer_file_of_a_run_has_hypothesis_residual_and_values(run: Path, ou
     ).stdout
     for entity in ("world/camera/hypothesis", "world/camera/residual", "world/hypothesis", "world/skeleton"):
         assert f"/{entity}" in listing
-    for entity in ("world/true_skeleton", "run/energy", "run/confidence", "run/error_mm", "run/status"):
+    for entity in ("world/true_skeleton", "run/energy", "run/agreement", "run/error_mm", "run/status"):
         assert f"/{entity}" in listing
     assert cv2.VideoCapture("b.mp4").get(cv2.CAP_PROP_FRAME_COUNT) == FRAMES

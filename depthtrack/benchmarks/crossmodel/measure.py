@@ -43,7 +43,7 @@ def measure(**recording: Any) -> Row:
             "side_margin": found.side_margin,
             "calibration_s": perf_counter() - begun,
         }
-        joints = np.array([_true_joints(sequence, index) for index in range(len(sequence))])
+        joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
         visible = np.array([_visible(sequence, index, joints[index]) for index in range(len(sequence))])
         row |= _starts(sequence, found, joints)
         for name in TRACKERS:
@@ -51,7 +51,8 @@ def measure(**recording: Any) -> Row:
     return row
 
 
-def _true_joints(sequence: Sequence, index: int) -> Array:
+def true_joints(sequence: Sequence, index: int) -> Array:
+    """Return the true keypoints (21, 3) of a frame, metres, camera frame."""
     truth = sequence.ground_truth
     assert truth is not None
     joints = truth.keypoints_at(float(sequence.timestamps[index]))

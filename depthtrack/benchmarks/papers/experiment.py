@@ -79,7 +79,7 @@ class PaperComparison:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment of a paper. All cells, all rows and all lines of the table have equal keys.
+    """An experiment. All cells, all rows and all lines of the table have equal keys.
 
     source: paper and figure.
     cells: returns the cells for the options of the user.
@@ -87,6 +87,7 @@ class Experiment:
     tabulate: returns the table of the rows of all cells.
     compare: returns the figures of the paper beside those of the rows.
     draw: plots the rows on matplotlib axes.
+    reference: heading of the figures of the paper.
     """
 
     name: str
@@ -97,3 +98,4 @@ class Experiment:
     tabulate: Callable[[Sequence[Row]], list[Row]]
     compare: Callable[[Sequence[Row]], list[PaperComparison]]
     draw: Callable[[Axes, Sequence[Row]], None]
+    reference: str = "paper, from its text"

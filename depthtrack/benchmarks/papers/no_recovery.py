@@ -4,12 +4,12 @@ from depthtrack.options import parameters, with_options
 from depthtrack.tracking.configuration import TrackerConfig
 
 _OFF = {
-    "thresholds.confidence": 0.0,
+    "thresholds.agreement": 0.0,
     "thresholds.energy": float("inf"),
     "thresholds.longest_gap": float("inf"),
     "recovery.every": 0,
     "recovery.accept_finger": 0.0,
-    "recovery.doubt_confidence": 0.0,
+    "recovery.doubt_agreement": 0.0,
     "recovery.doubt_energy": float("inf"),
 }
 

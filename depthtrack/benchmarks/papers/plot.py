@@ -35,7 +35,7 @@ def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[
 
     note: last line of the picture, which describes the measurements.
     """
-    below = [_head(), *map(_line, comparisons), ("", "", ""), (note, "", "")]
+    below = [("", experiment.reference, "ours"), *map(_line, comparisons), ("", "", ""), (note, "", "")]
     height = _INCHES[1] + _LINE * (len(below) + 1)
     with rc_context(_STYLE):
         figure = Figure((_INCHES[0], height), dpi=150)
@@ -56,10 +56,6 @@ def mark(axes: Axes, x: float, text: str) -> None:
     """Draw a vertical line at `x` with a text beside it."""
     axes.axvline(x, color="0.5", linestyle=":")
     axes.text(x, 0.98, f" {text}".replace("\n", "\n "), va="top", color="0.35", transform=axes.get_xaxis_transform())
-
-
-def _head() -> tuple[str, str, str]:
-    return "", "paper, from its text", "ours"
 
 
 def _line(comparison: PaperComparison) -> tuple[str, str, str]:

@@ -14,6 +14,7 @@ from depthtrack.evaluation.metrics.points import (
     endpoint_errors,
     joint_errors,
 )
+from depthtrack.evaluation.metrics.reliability import Reliability
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
 from depthtrack.evaluation.metrics.success import SuccessCurve
 from depthtrack.evaluation.metrics.timing import frame_time, stage_times
@@ -24,6 +25,7 @@ __all__ = [
     "Losses",
     "Metric",
     "PointErrors",
+    "Reliability",
     "Residuals",
     "SuccessCurve",
     "added_jitter",

@@ -118,7 +118,7 @@ class RecoverLocally:
         best, options = candidates[0], self.options
         if best.energy <= options.good_energy * frame.clamp:
             return candidates
-        doubtful = frame.state.is_beyond(best.energy, best.confidence, options.doubt_energy, options.doubt_confidence)
+        doubtful = frame.state.is_beyond(best.energy, best.agreement, options.doubt_energy, options.doubt_agreement)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
         due = due and frame.state.is_elevated(best.energy, options.elevated_ratio)
         if not (due or doubtful):

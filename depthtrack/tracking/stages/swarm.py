@@ -27,16 +27,16 @@ def run_swarm(
 
     particles: (N, D) in the coordinates of `space`.
     """
-    least, confidence = np.full(len(particles), np.inf), np.zeros(len(particles))
+    least, agreement = np.full(len(particles), np.inf), np.zeros(len(particles))
 
     def score(coordinates: Array) -> Array:
         scores = scorer.evaluate(space.poses(coordinates))
         better = scores.energy < least
-        least[better], confidence[better] = scores.energy[better], scores.agreement[better]
+        least[better], agreement[better] = scores.energy[better], scores.agreement[better]
         return scores.energy
 
     found = minimise(score, particles, space.lower, space.upper, space.fingers, generator, options)
-    rows = zip(space.poses(found.positions), found.energies.tolist(), confidence.tolist(), strict=True)
+    rows = zip(space.poses(found.positions), found.energies.tolist(), agreement.tolist(), strict=True)
     return by_energy(Candidate(*row) for row in rows)
 
 

@@ -96,7 +96,7 @@ def test_synergies_reduce_the_errors_of_hidden_fingers() -> None:
     frames = range(160, 280, 2)
 
     def mean_error(used: Synergies | None = None, **options: bool) -> float:
-        never_lost = {"thresholds.confidence": 0.0, "thresholds.energy": np.inf}
+        never_lost = {"thresholds.agreement": 0.0, "thresholds.energy": np.inf}
         config = tracker_config("ik", **never_lost, **({} if used is None else {"synergies": "leap"}), **options)
         tracker = create_tracker(config, made.options.hand, synergies=used)
         poses = [tracker.start(observe(made, frames[0]), made.poses[frames[0]]).pose]

@@ -46,7 +46,7 @@ def test_tracks_everyday_motion(made: Synthesiser, name: str, highest: float) ->
     estimates = follow(made, tracker, frames)
     assert errors_mm(made, estimates, frames).mean() < highest
     assert {estimate.status for estimate in estimates[1:]} == {Status.TRACKED}
-    assert min(estimate.confidence for estimate in estimates) > 0.8
+    assert min(estimate.agreement for estimate in estimates) > 0.8
     assert set(estimates[1].stage_ms) == set(tracker.stages)
 
 

@@ -1,0 +1,71 @@
+"""Evidence and errors of every frame of a recording, to which the confidence is fitted.
+
+Each recording is tracked with three hands: the calibrated one, the same of the other side, and the average hand.
+"""
+
+from contextlib import closing
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from depthtrack.benchmarks.crossmodel.measure import true_joints
+from depthtrack.benchmarks.crossmodel.recordings import made_recording
+from depthtrack.calibration.calibrate import calibrate
+from depthtrack.calibration.views import choose_views
+from depthtrack.evaluation.metrics import without_offsets
+from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording.sequence import Sequence
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.tracking.pipeline import Pipeline, track_frames
+from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.types import Array
+
+TRACKERS = ("hybrid", "ik")
+
+
+def measure_evidence(cell: Cell) -> Row:
+    """Return one entry per tracked frame: hand, tracker, evidence, and largest joint error, mm.
+
+    cell: arguments of `made_recording`.
+
+    Constant offsets of the joints are removed from the errors of hands of the right side.
+    """
+    with made_recording(**cell) as sequence:
+        views = choose_views(sequence, Segmenter.for_sequence(sequence))
+        side: Side = cell["side"]
+        other: Side = "left" if side == "right" else "right"
+        calibrated = calibrate(views, partial(RasterScorer, threads=1), side).hand
+        hands = {"calibrated": calibrated, "mirrored": calibrated.with_(side=other), "average": HandShape(side=side)}
+        joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
+        frames: list[Any] = []
+        for kind, hand in hands.items():
+            for name in TRACKERS:
+                frames += [[kind, name, *row] for row in _tracked(sequence, hand, name, joints, kind != "mirrored")]
+    return {"tracked": frames}
+
+
+def _tracked(
+    sequence: Sequence, hand: HandShape, name: str, joints: Array, aligned: bool
+) -> list[tuple[list[float], float]]:
+    """Return the evidence and the largest joint error (mm) of each frame with a pose.
+
+    aligned: remove the constant offsets of the joints.
+    """
+    evidence: dict[int, list[float]] = {}
+    poses, model = np.full((len(sequence), 27), np.nan), HandModel(hand)
+    with closing(create_tracker(tracker_config(name), hand)) as tracker:
+        pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence), hand)
+        for each in track_frames(sequence, pipeline):
+            if each.estimate.pose is not None and tracker.evidence is not None:
+                poses[each.frame.index] = each.estimate.pose
+                evidence[each.frame.index] = [round(float(value), 5) for value in tracker.evidence]
+    if not evidence:
+        return []
+    known = sorted(evidence)
+    points = without_offsets(model, poses, joints)[known] if aligned else model.keypoints(poses[known])
+    errors = 1e3 * np.linalg.norm(points - joints[known], axis=2).max(axis=1)
+    return [(evidence[index], round(float(error), 2)) for index, error in zip(known, errors, strict=True)]

@@ -1,0 +1,142 @@
+"""Confidence of an estimate, and the visibility of its fingers.
+
+The confidence is the probability that the largest joint error is below 20 mm. It is a logistic function of a few
+figures of the frame. `tools/fit_confidence.py` fits it on the tuning seeds of the cross-model benchmark: no recording
+of a reported figure takes part.
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Depth, Mask
+
+CLIPPED = 0.04
+"""Metres: depth difference at which a pixel disagrees completely, d_M of Oikonomidis et al. 2011, Eq. (2)."""
+THICK = 0.006
+"""Metres: silhouette parts that are thinner are errors of the outline."""
+FLESH = 0.02
+"""Metres: largest depth of a bone below the skin in front of it."""
+LONGEST_TRACK = 2.0
+"""Seconds after a start from which on a track counts as old."""
+
+
+class Evidence(NamedTuple):
+    """Figures of an estimate that its confidence depends on.
+
+    energy: logarithm of E of Oikonomidis et al. 2011, Eq. (1), as a share of a completely wrong pixel's.
+    energy_ratio: logarithm of its ratio to the median energy of the track.
+    depth_difference: logarithm of the mean difference of rendered and observed depth, clipped, mm.
+    unexplained, in_vain: shares of the observed silhouette that the hand does not cover, and of the hand's that nothing
+        was observed in.
+    thick_unexplained, thick_in_vain: the same without parts thinner than `THICK`.
+    visible: share of the bones' points that are visible.
+    least_visible: that of the finger that is hidden most.
+    area: observed area, in areas of the palm.
+    pixels: logarithm of the number of observed pixels.
+    age: time since the start of the track, s, at most `LONGEST_TRACK`.
+    """
+
+    energy: float
+    energy_ratio: float
+    depth_difference: float
+    unexplained: float
+    in_vain: float
+    thick_unexplained: float
+    thick_in_vain: float
+    visible: float
+    least_visible: float
+    area: float
+    pixels: float
+    age: float
+
+
+@dataclass(frozen=True)
+class ConfidenceModel:
+    """Logistic function of the evidence: sigmoid(bias + weights . evidence)."""
+
+    weights: tuple[float, ...]
+    bias: float
+
+    def __call__(self, evidence: Evidence) -> float:
+        """Return the probability that the largest joint error is below 20 mm."""
+        return float(1 / (1 + np.exp(-np.clip(self.bias + np.dot(self.weights, evidence), -30, 30))))
+
+
+@cache
+def fitted_model() -> ConfidenceModel:
+    """Return the fitted model, which `confidence.json` holds."""
+    fields = json.loads(files("depthtrack.tracking").joinpath("confidence.json").read_text())
+    weights = tuple(float(fields["weights"][name]) for name in Evidence._fields)
+    return ConfidenceModel(weights, float(fields["bias"]))
+
+
+def evidence_of(
+    pose: Array,
+    rendered: Depth,
+    target: Target,
+    hand: HandShape,
+    visibility: Array,
+    energy: float,
+    energy_ratio: float,
+    age: float,
+) -> Evidence:
+    """Return the evidence of a pose (27,).
+
+    rendered: (h, w) depth of the posed hand, metres.
+    visibility: (5,) of the fingers.
+    energy: in multiples of `Objective.clamp`.
+    """
+    observed, covered = target.silhouette, rendered > 0
+    both = covered & (target.depth > 0)
+    differences = np.minimum(np.abs(rendered[both] - target.depth[both]), CLIPPED)
+    pixel = float(pose[2]) / target.camera.fx
+    unexplained, in_vain = observed & ~covered, covered & ~observed
+    seen, shown = max(int(observed.sum()), 1), max(int(covered.sum()), 1)
+    palm = hand.palm_breadth * hand.palm_length * hand.scale**2
+    return Evidence(
+        energy=math.log(max(energy, 1e-3)),
+        energy_ratio=energy_ratio,
+        depth_difference=math.log(1e3 * max(float(differences.mean()) if len(differences) else CLIPPED, 1e-4)),
+        unexplained=int(unexplained.sum()) / seen,
+        in_vain=int(in_vain.sum()) / shown,
+        thick_unexplained=_thick(unexplained, pixel) / seen,
+        thick_in_vain=_thick(in_vain, pixel) / shown,
+        visible=float(visibility.mean()),
+        least_visible=float(visibility.min()),
+        area=seen * pixel**2 / palm,
+        pixels=math.log(seen),
+        age=min(age, LONGEST_TRACK),
+    )
+
+
+def _thick(mask: Mask, pixel: float) -> int:
+    """Return the number of pixels that are no outline; `pixel`: its side, metres."""
+    side = max(1, round(THICK / pixel))
+    return int(cv2.erode(mask.view(np.uint8), np.ones((side, side), np.uint8)).sum())
+
+
+def finger_visibility(model: HandModel, pose: Array, rendered: Depth, camera: Camera) -> Array:
+    """Return the visible share (5,) of the points along each finger's bones.
+
+    pose: (27,).
+    rendered: (h, w) depth of the posed hand, metres; 0 for none.
+    """
+    ends = model.endpoints(pose).reshape(5, 4, 3)
+    points = np.concatenate([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=1)
+    u, v = np.moveaxis(np.rint(np.nan_to_num(camera.project(points), nan=-1.0)).astype(int), -1, 0)
+    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+    front = np.zeros(inside.shape)
+    front[inside] = rendered[v[inside], u[inside]]
+    visible = inside & ((front == 0) | (points[..., 2] - front < FLESH))
+    return np.asarray(visible.mean(axis=1))

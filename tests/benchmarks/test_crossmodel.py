@@ -1,0 +1,79 @@
+"""The cross-model benchmark: choice of recordings, measurement and table."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from depthtrack.benchmarks.crossmodel import measure as measuring
+from depthtrack.benchmarks.crossmodel.experiment import EXPERIMENT, compare, tabulate
+from depthtrack.benchmarks.crossmodel.measure import _longest, measure
+from depthtrack.benchmarks.crossmodel.recordings import MOTIONS, made_recording, random_hand, recording_cells
+from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+from depthtrack.benchmarks.papers.plot import draw_png
+from depthtrack.calibration.calibrate import Calibration
+
+TINY: dict[str, Any] = {
+    "motion": "everyday",
+    "seed": 3,
+    "sensor": "kinect2",
+    "side": "left",
+    "scale": 1.0,
+    "viewpoint": 0,
+    "rig": None,
+    "frames": 16,
+}
+
+
+def test_cells_are_drawn_once_for_each_motion_and_seed() -> None:
+    cells = recording_cells(ExperimentOptions(repetitions=3))
+    assert len(cells) == 3 * len(MOTIONS)
+    assert cells == recording_cells(ExperimentOptions(repetitions=3))
+    assert {cell["side"] for cell in cells} == {"left", "right"}
+    assert all(0.8 <= cell["scale"] <= 1.2 for cell in cells)
+    tuned = recording_cells(ExperimentOptions(repetitions=3, split="tuning"))
+    assert not {cell["seed"] for cell in cells} & {cell["seed"] for cell in tuned}
+
+
+def test_hands_are_drawn_from_the_prior_and_differ() -> None:
+    one, other = random_hand("left", 1.1, 1), random_hand("left", 1.1, 2)
+    assert (one.side, one.scale) == ("left", 1.1)
+    assert not np.allclose(one.lengths, other.lengths)
+    assert one == random_hand("left", 1.1, 1)
+
+
+def test_the_recording_of_a_cell_has_exact_truth() -> None:
+    with made_recording(**TINY | {"frames": 2}) as sequence:
+        assert len(sequence) == 2
+        assert sequence.exact_depth(1) is not None
+        assert sequence.ground_truth is not None
+        assert sequence.hand is not None
+        assert sequence.hand.side == "left"
+
+
+@pytest.mark.slow
+def test_a_known_hand_is_measured_without_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The calibration is replaced by the true sizes."""
+
+    def calibrated(sequence: Any, *_: Any) -> Calibration:
+        nothing = np.zeros((0, 27))
+        return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
+
+    monkeypatch.setattr(measuring, "calibrate_either_side", calibrated)
+    row = measure(**TINY)
+    assert (row["side_right"], row["side_sure"], row["starts"], row["starts_right"]) == (True, True, 2, 2)
+    for name in measuring.TRACKERS:
+        assert row[f"{name}_mean_mm"] < 3
+        assert row[f"{name}_wrong_percent"] == 0
+    figures = {each.what: each.ours for each in compare([row])}
+    assert figures["right sides among those"] == 100
+    assert figures["starts on the right branch"] == 100
+    assert [line["tracker"] for line in tabulate([row])] == list(measuring.TRACKERS)
+    picture = draw_png(EXPERIMENT, [row], compare([row]), "one recording")
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_the_longest_wrong_branch_is_timed() -> None:
+    wrong = np.array([False, True, True, False, True, True, True])
+    assert _longest(wrong, np.arange(7) / 10) == pytest.approx(0.2)
+    assert _longest(~wrong & wrong, np.arange(7) / 10) == 0

@@ -1,0 +1,103 @@
+"""Fit the confidence of estimates to the tuning seeds of the cross-model benchmark.
+
+Usage: fit_confidence.py FOLDER [--rig RIG.glb ...] [--seeds N] [--frames N]
+
+The folder holds the evidence of each recording, from which an interrupted run continues. The fit is logistic
+regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual never raises
+the confidence, a more visible finger never lowers it. Printed are the area under the ROC curve (AUROC) of recordings
+left out of the fit, and the reliability in ten bins. The result is written to `depthtrack/tracking/confidence.json`.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+from depthtrack.benchmarks.crossmodel.evidence import measure_evidence
+from depthtrack.benchmarks.crossmodel.recordings import recording_cells
+from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+from depthtrack.evaluation.metrics.reliability import SMALL, auroc
+from depthtrack.evaluation.sweep.rows import Journal
+from depthtrack.evaluation.sweep.run import run_sweep
+from depthtrack.evaluation.sweep.workers import chosen_workers
+from depthtrack.tracking.confidence import Evidence
+from depthtrack.types import Array, Mask
+
+RIDGE = 1e-2
+"""Weight of the squared coefficients of standardised evidence."""
+FOLDS = 6
+RAISES = ("visible", "least_visible", "area", "pixels", "age")
+"""Evidence that raises the confidence; the rest lowers it."""
+OUT = Path(__file__).parents[1] / "depthtrack" / "tracking" / "confidence.json"
+
+
+def fit(evidence: Array, good: Mask, weights: Array) -> tuple[Array, float]:
+    """Return the weights (F,) and the bias of the logistic function.
+
+    evidence: (N, F).
+    good: (N,) largest joint error below `SMALL`.
+    weights: (N,) of the frames.
+    """
+    mean, spread = evidence.mean(axis=0), evidence.std(axis=0) + 1e-9
+    features, sign = (evidence - mean) / spread, np.where(good, 1.0, -1.0)
+
+    def loss(parameters: Array) -> tuple[float, Array]:
+        margin = sign * (features @ parameters[:-1] + parameters[-1])
+        slope = -weights * sign / (1 + np.exp(np.clip(margin, -50, 50)))
+        value = (weights * np.logaddexp(0, -margin)).sum() + RIDGE * weights.sum() * (parameters[:-1] ** 2).sum()
+        gradient = np.append(features.T @ slope + 2 * RIDGE * weights.sum() * parameters[:-1], slope.sum())
+        return float(value), gradient
+
+    bounds = [(0, None) if name in RAISES else (None, 0) for name in Evidence._fields]
+    start = np.zeros(evidence.shape[1] + 1)
+    found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[*bounds, (None, None)]).x
+    scaled = found[:-1] / spread
+    return scaled, float(found[-1] - scaled @ mean)
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("folder", type=Path)
+    arguments.add_argument("--rig", nargs="*", default=[])
+    arguments.add_argument("--seeds", type=int, default=4)
+    arguments.add_argument("--frames", type=int, default=90)
+    chosen = arguments.parse_args()
+    options = ExperimentOptions(repetitions=chosen.seeds, frames=chosen.frames, rigs=tuple(chosen.rig), split="tuning")
+    cells = recording_cells(options)
+    with Journal(chosen.folder / "evidence.jsonl", list(cells[0])) as journal:
+        rows = run_sweep(measure_evidence, cells, journal, chosen_workers(None))
+    frames = [(number, *frame) for number, row in enumerate(rows) for frame in row["tracked"]]
+    recording = np.array([frame[0] for frame in frames])
+    kinds, evidence = np.array([frame[1] for frame in frames]), np.array([frame[3] for frame in frames])
+    good = np.array([frame[4] for frame in frames]) < SMALL
+    weights = 1 / np.bincount(recording)[recording]
+    print(f"{len(rows)} recordings, {len(frames)} frames, {100 * good.mean():.0f} % of them good")
+    left_out = np.empty(len(frames))
+    for fold in range(FOLDS):
+        test = recording % FOLDS == fold
+        coefficients, bias = fit(evidence[~test], good[~test], weights[~test])
+        left_out[test] = evidence[test] @ coefficients + bias
+    for kind in ("calibrated", "mirrored", "average"):
+        part = kinds == kind
+        print(f"AUROC, {kind} hand: {auroc(left_out[part], good[part]):.3f} ({100 * good[part].mean():.0f} % good)")
+    print(f"AUROC, all: {auroc(left_out, good):.3f}")
+    probability = 1 / (1 + np.exp(-left_out))
+    for low in np.arange(0, 1, 0.1):
+        part = (probability >= low) & (probability < low + 0.1)
+        if part.any():
+            print(f"{low:.1f} to {low + 0.1:.1f}: {100 * good[part].mean():5.1f} % good of {part.sum()} frames")
+    coefficients, bias = fit(evidence, good, weights)
+    fields = {
+        "about": "logistic function of the evidence; see depthtrack/tracking/confidence.py and tools/fit_confidence.py",
+        "recordings": len(rows),
+        "weights": {name: float(f"{w:.6g}") for name, w in zip(Evidence._fields, coefficients, strict=True)},
+        "bias": float(f"{bias:.6g}"),
+    }
+    OUT.write_text(json.dumps(fields, indent=2) + "\n")
+    print(f"written to {OUT}")
+
+
+if __name__ == "__main__":
+    main()
