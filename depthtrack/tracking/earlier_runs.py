@@ -54,7 +54,7 @@ def _with_seconds(fields: Mapping[str, Any]) -> dict[str, Any]:
     frames = thresholds.get("memory_frames")
     memory = {"memory": frames / _RATE} if isinstance(frames, int) else {}
     # Those versions followed the last pose after any pause.
-    options = {**options, "thresholds": _renamed(rest) | memory | {"longest_gap": "inf"}}
+    options = {**options, "thresholds": _renamed(rest) | memory | {"longest_gap": "inf", "confidence": 0.0}}
     if isinstance(recovery := options.get("recovery"), dict):
         options["recovery"] = _renamed(recovery)
     return {**fields, "format": 3, "options": options}

@@ -28,7 +28,12 @@ class TrackingThresholds:
     The median term adapts to hands whose shape differs from the model: their energy is high in every frame.
     """
 
-    agreement: float = option(0.5, "A track with a lower agreement is lost")
+    confidence: float = option(
+        0.02,
+        "A start with a lower confidence is lost, and a track after two such frames",
+        source="half of the lowest confidence of a good pose among the tuning recordings of the cross-model benchmark",
+    )
+    agreement: float = option(0.5, "A track with a lower agreement of the silhouettes is lost")
     energy: float = option(
         0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
     )

@@ -28,7 +28,7 @@ class SideOptions:
 
     stretches: int = option(8, "Stretches of the recording, evenly spread")
     stretch_frames: int = option(20, "Frames of each stretch", unit="frames")
-    sure_margin: float = option(0.1, "Share by which the other side's energy is higher if the side is certain")
+    sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
     tracker: TrackerConfig = option(HybridConfig(), "Tracker of both sides")
 
     def frames(self, length: int) -> list[int]:

@@ -33,7 +33,7 @@ class TrackState:
 
     def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
         self._thresholds, self._clamp = thresholds, clamp
-        self._agreement = 0.0
+        self._agreement, self._confidence = 0.0, math.nan
         self._energies: deque[float] = deque(maxlen=thresholds.median_frames)
         self.pose: Array | None = None
         self.energy = np.inf
@@ -41,8 +41,14 @@ class TrackState:
         self._time, self._started = math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
 
-    def is_lost(self, energy: float, agreement: float) -> bool:
-        """Return whether a pose with this energy and agreement is not trusted."""
+    def is_lost(self, energy: float, agreement: float, confidence: float = math.nan, previous: float = 0.0) -> bool:
+        """Return whether a pose with these figures is not trusted.
+
+        confidence: NaN if unknown; a low one counts only if it was as low in the frame before.
+        previous: confidence of the frame before; 0 for a start.
+        """
+        if max(confidence, previous) < self._thresholds.confidence:
+            return True
         return self.is_beyond(energy, agreement, self._thresholds.energy, self._thresholds.agreement)
 
     def is_beyond(self, energy: float, agreement: float, most_energy: float, least_agreement: float) -> bool:
@@ -77,7 +83,8 @@ class TrackState:
         visibility: tuple[float, ...] = UNKNOWN_VISIBILITY,
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted."""
-        status = Status.LOST if self.is_lost(energy, agreement) else status
+        previous = self._confidence if status is Status.TRACKED else 0.0
+        status = Status.LOST if self.is_lost(energy, agreement, confidence, previous) else status
         estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, confidence, visibility)
         self.update(estimate)
         return estimate
@@ -111,6 +118,7 @@ class TrackState:
             self._motion, self._duration = np.zeros(26), math.nan
             self._started = estimate.timestamp
         self.pose, self.energy, self._agreement = estimate.pose, estimate.energy, estimate.agreement
+        self._confidence = estimate.confidence
         self.last_trusted, self._time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 

@@ -4,6 +4,7 @@ from depthtrack.options import parameters, with_options
 from depthtrack.tracking.configuration import TrackerConfig
 
 _OFF = {
+    "thresholds.confidence": 0.0,
     "thresholds.agreement": 0.0,
     "thresholds.energy": float("inf"),
     "thresholds.longest_gap": float("inf"),
