@@ -51,5 +51,6 @@ class CalibrationOptions:
         "Agreement of silhouettes below which no hand was found",
         source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
     )
+    rig_margin: float = option(0.02, "Share by which the other side may fit better than that of a rig")
     sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")

@@ -97,7 +97,7 @@ def calibrate_rig(
     factor = min(options.tried_scales, key=lambda f: energies[rig.side, f])
     other = min(energy for (side, _), energy in energies.items() if side != rig.side)
     margin = other / energies[rig.side, factor] - 1
-    if margin < -options.sure_margin:
+    if margin < -options.rig_margin:
         raise InputError(
             f"the recording must show a {rig.side} hand like the rig, but the other side fits {-margin:.0%} better: "
             "give a rig of the other hand"
