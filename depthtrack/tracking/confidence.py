@@ -15,6 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -97,19 +98,18 @@ def evidence_of(
     visibility: (5,) of the fingers.
     energy: in multiples of `Objective.clamp`.
     """
-    observed, covered = target.silhouette, rendered > 0
-    both = covered & (target.depth > 0)
-    differences = np.minimum(np.abs(rendered[both] - target.depth[both]), CLIPPED)
-    pixel = float(pose[2]) / target.camera.fx
-    unexplained, in_vain = observed & ~covered, covered & ~observed
-    seen, shown = max(int(observed.sum()), 1), max(int(covered.sum()), 1)
-    palm = hand.palm_breadth * hand.palm_length * hand.scale**2
+    unexplained, in_vain = (np.zeros(rendered.shape, dtype=np.bool_) for _ in range(2))
+    counts = compare_images(rendered, target.depth, target.silhouette, unexplained, in_vain)
+    observed, covered, missed, vain, compared, difference = counts
+    pixel, palm = float(pose[2]) / target.camera.fx, hand.palm_breadth * hand.palm_length * hand.scale**2
+    seen, shown = max(observed, 1), max(covered, 1)
+    mean_difference = difference / compared if compared else CLIPPED
     return Evidence(
         energy=math.log(max(energy, 1e-3)),
         energy_ratio=energy_ratio,
-        depth_difference=math.log(1e3 * max(float(differences.mean()) if len(differences) else CLIPPED, 1e-4)),
-        unexplained=int(unexplained.sum()) / seen,
-        in_vain=int(in_vain.sum()) / shown,
+        depth_difference=math.log(1e3 * max(mean_difference, 1e-4)),
+        unexplained=missed / seen,
+        in_vain=vain / shown,
         thick_unexplained=_thick(unexplained, pixel) / seen,
         thick_in_vain=_thick(in_vain, pixel) / shown,
         visible=float(visibility.mean()),
@@ -118,6 +118,36 @@ def evidence_of(
         pixels=math.log(seen),
         age=min(age, LONGEST_TRACK),
     )
+
+
+@compiled(nogil=True)
+def compare_images(
+    rendered: Depth, depth: Depth, silhouette: Mask, unexplained: Mask, in_vain: Mask
+) -> tuple[int, int, int, int, int, float]:
+    """Write which pixels are unexplained or covered in vain; return sums over the image.
+
+    rendered, depth: (h, w) metres, 0 for none.
+    silhouette, unexplained, in_vain: (h, w).
+
+    Returns:
+        Numbers of observed, covered, unexplained and vainly covered pixels, of pixels with both depths, and the sum of
+        their clipped differences, metres.
+    """
+    observed, covered, missed, vain, compared, difference = 0, 0, 0, 0, 0, 0.0
+    for v in range(rendered.shape[0]):
+        for u in range(rendered.shape[1]):
+            there, here = silhouette[v, u], rendered[v, u] > 0
+            observed, covered = observed + there, covered + here
+            if there and not here:
+                unexplained[v, u] = True
+                missed += 1
+            if here and not there:
+                in_vain[v, u] = True
+                vain += 1
+            if here and depth[v, u] > 0:
+                compared += 1
+                difference += min(abs(float(rendered[v, u]) - float(depth[v, u])), CLIPPED)
+    return observed, covered, missed, vain, compared, difference
 
 
 def _thick(mask: Mask, pixel: float) -> int:

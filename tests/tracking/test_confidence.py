@@ -13,9 +13,11 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.confidence import (
+    CLIPPED,
     LONGEST_TRACK,
     ConfidenceModel,
     Evidence,
+    compare_images,
     evidence_of,
     finger_visibility,
     fitted_model,
@@ -91,3 +93,20 @@ def test_estimates_have_a_confidence_that_resumes(everyday_skin: Synthesiser, na
     for one, other in zip(estimates[2:], again, strict=True):
         assert 0 < one.confidence < 1
         assert (one.confidence, one.visibility) == (other.confidence, other.visibility)
+
+
+def test_the_comparison_of_images_equals_its_definition() -> None:
+    draw = np.random.default_rng(3)
+    rendered, depth = (
+        np.where(draw.random((9, 13)) < 0.5, 0, draw.uniform(0.4, 0.6, (9, 13))).astype(np.float32) for _ in range(2)
+    )
+    silhouette = draw.random((9, 13)) < 0.6
+    unexplained, in_vain = np.zeros((9, 13), np.bool_), np.zeros((9, 13), np.bool_)
+    *counts, difference = compare_images(rendered, depth, silhouette, unexplained, in_vain)
+    covered = rendered > 0
+    both = covered & (depth > 0)
+    np.testing.assert_array_equal(unexplained, silhouette & ~covered)
+    np.testing.assert_array_equal(in_vain, covered & ~silhouette)
+    assert counts == [silhouette.sum(), covered.sum(), unexplained.sum(), in_vain.sum(), both.sum()]
+    gaps = np.abs(rendered[both].astype(float) - depth[both].astype(float))
+    assert difference == pytest.approx(np.minimum(gaps, CLIPPED).sum())
