@@ -101,7 +101,7 @@ def tracked_hand(
     frames: number of first frames that show the side; all if absent.
 
     Raises:
-        InputError: the file holds no hand, the recording has no sizes, or no frame shows a hand.
+        InputError: the file holds no hand, or the recording has no sizes.
     """
     if hand is not None:
         return open_hand(hand, recording)

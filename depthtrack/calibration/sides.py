@@ -16,7 +16,7 @@ from depthtrack.hand.shape import Side
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.side_choice import choose_side, energies_of_sides
+from depthtrack.tracking.side_choice import SideOptions, choose_side, energies_of_sides
 
 
 def calibrate_either_side(
@@ -38,10 +38,12 @@ def calibrate_either_side(
     """
     options = options or CalibrationOptions()
     report = progress or (lambda stage, share: None)
-    choice = choose_side(sequence, segmentation, progress=_frames(report, 0.0, 0.25))
+    sides_options = SideOptions()
+    choice = choose_side(sequence, segmentation, options=sides_options, progress=_frames(report, 0.0, 0.25))
     if choice.sure:
         part = _part(report, 0.25, 0.75)
-        return replace(calibrate(views, scorer, choice.side, seed, source, part, options), side_margin=choice.margin)
+        measured = calibrate(views, scorer, choice.side, seed, source, part, options)
+        return replace(measured, side_margin=choice.margin, sure_margin=sides_options.sure_margin)
     found: dict[Side, Calibration] = {}
     failure: InputError | None = None
     sides: tuple[Side, ...] = ("right", "left")
@@ -67,11 +69,12 @@ def _cheaper(
     """Return the calibration of the side that costs less.
 
     The cost of a side is the product of two figures: the mean energy while its hand is tracked, and the median distance
-    of the views' points to its skin.
+    of the views' points to its skin. The distance alone counts if no tracked frame shows a hand.
     """
     hands = {side: each.hand for side, each in found.items()}
     energies = energies_of_sides(sequence, hands, segmentation, progress=progress)
-    costs = {side: float(energies[side].mean()) * each.after_mm for side, each in found.items()}
+    shown = all(len(each) for each in energies.values())
+    costs = {side: each.after_mm * (float(energies[side].mean()) if shown else 1.0) for side, each in found.items()}
     side, other = sorted(found, key=lambda each: costs[each])
     return replace(found[side], side_margin=costs[other] / costs[side] - 1)
 

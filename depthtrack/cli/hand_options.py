@@ -47,11 +47,7 @@ class HandOptions:
         threads: int | None = None,
         frames: int | None = None,
     ) -> "SideChoice | None":
-        """Return the side of the hand in a recording; None if `hand` or `side` states it.
-
-        Raises:
-            InputError: if no frame shows a hand.
-        """
+        """Return the side of the hand in a recording; None if `hand` or `side` states it."""
         from depthtrack.cli.progress import percent_bar
         from depthtrack.machine import usable_cores
         from depthtrack.tracking.side_choice import choose_side

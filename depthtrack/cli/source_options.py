@@ -56,7 +56,7 @@ class SourceOptions:
         """Return a source with the side of its hand, which is found if nothing states it.
 
         Raises:
-            InputError: if the recording is unusable, or no frame shows a hand.
+            InputError: if the recording is unusable.
         """
         if source.hand is not None or source.side is not None:
             return source

@@ -113,7 +113,9 @@ class TrackCommand:
 
     def _choose_side(self, sequence: "Recording") -> "SideChoice | None":
         choice = self.hands.choose_side(sequence, self.segmentation_options, self.threads, self.frames)
-        if choice is not None:
+        if choice is not None and choice.frames == 0:
+            print("a right hand is assumed: no hand was found in the frames that were tried", flush=True)
+        elif choice is not None:
             other = "left" if choice.side == "right" else "right"
             print(
                 f"a {choice.side} hand: a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames",

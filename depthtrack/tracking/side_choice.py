@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.options import option
 from depthtrack.recording.sequence import Sequence
@@ -43,7 +42,7 @@ DEFAULTS = SideOptions()
 
 @dataclass(frozen=True)
 class SideChoice:
-    """The side whose tracks have the lower mean energy.
+    """The side of the lower mean energy; right, and not sure, if no frame shows a hand.
 
     margin: share by which the mean energy of the other side is higher.
     sure: whether that is enough.
@@ -68,12 +67,11 @@ def choose_side(
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
-
-    Raises:
-        InputError: if no frame shows a hand.
     """
     hands: dict[Side, HandShape] = {"right": HandShape(), "left": HandShape(side="left")}
     energies = energies_of_sides(sequence, hands, segmentation, threads, frames, options, progress)
+    if not len(energies["right"]):
+        return SideChoice("right", 0.0, False, 0)
     means = {side: float(values.mean()) for side, values in energies.items()}
     side, other = sorted(means, key=lambda each: means[each])
     margin = means[other] / means[side] - 1
@@ -93,9 +91,6 @@ def energies_of_sides(
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
-
-    Raises:
-        InputError: if no frame shows a hand.
     """
     indices = options.frames(min(len(sequence), frames or len(sequence)))
     energies = np.full((len(hands), len(indices)), np.nan)
@@ -108,6 +103,4 @@ def energies_of_sides(
                 if progress is not None:
                     progress(row * len(indices) + column + 1, len(hands) * len(indices))
     known = np.isfinite(energies).all(axis=0)
-    if not known.any():
-        raise InputError(f"no hand was found in {len(indices)} frames of {sequence.name}: check the unit of its depth")
     return {side: energies[row, known] for row, side in enumerate(hands)}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from depthtrack.calibration import sides
+from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.cli import main
-from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.run_folder import Run
@@ -48,13 +48,15 @@ def test_the_side_is_found_and_its_hand_tracked(tmp_path: Path, side: Side, caps
     assert main(["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik", "--resume"]) == 0
 
 
-def test_a_recording_without_a_hand_is_refused(tmp_path: Path) -> None:
+def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = Synthesiser(Synthesis(frames=1))
     with SequenceWriter(tmp_path / "empty", made.sensor.camera) as writer:
         for index in range(3):
             writer.append(index / 30, np.zeros(made.sensor.camera.shape, np.float32))
-    with pytest.raises(InputError, match="no hand was found in 3 frames"):
-        choose_side(open_sequence(tmp_path / "empty"), options=OPTIONS)
+    assert choose_side(open_sequence(tmp_path / "empty"), options=OPTIONS) == SideChoice("right", 0.0, False, 0)
+    assert main(["track", str(tmp_path / "empty"), "-o", str(tmp_path / "run"), "--tracker", "ik"]) == 0
+    assert "a right hand is assumed" in capsys.readouterr().out
+    assert Run.load(tmp_path / "run").status == ("absent",) * 3
 
 
 @pytest.mark.parametrize("sure", [True, False])
@@ -66,6 +68,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         hand: HandShape
         after_mm: float
         side_margin: float | None = None
+        sure_margin: float = CalibrationOptions().sure_margin
 
     tried = list[Side]()
 
@@ -73,11 +76,12 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         tried.append(side)
         return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side])
 
-    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.3, sure, 10))
+    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
     monkeypatch.setattr(sides, "calibrate", calibrate)
     energies = {"right": np.array([11.0]), "left": np.array([10.0])}
     monkeypatch.setattr(sides, "energies_of_sides", lambda *rest, **more: energies)
     found = calibrate_either_side(None, [], None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
     assert found.hand.side == ("left" if sure else "right")
-    assert found.side_margin == pytest.approx(0.3 if sure else 2 * 10 / 11 - 1)
+    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / 11 - 1)
+    assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
