@@ -22,13 +22,13 @@ from depthtrack.evaluation.metrics import (
     joint_errors,
     stage_times,
     visible_and_hidden,
-    visible_points,
 )
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.evaluation.residuals import run_residuals
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import GroundTruth
+from depthtrack.rendering.visibility import points_in_view
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.types import Array, Mask
 
@@ -145,7 +145,7 @@ def _visible(replay: Replay, points: Array) -> Mask | None:
         depth = replay.sequence.exact_depth(index)
         if depth is None:
             return None
-        found[row] = visible_points(points[row], depth, replay.sequence.camera)
+        found[row] = points_in_view(points[row], depth, replay.sequence.camera)
     return found
 
 

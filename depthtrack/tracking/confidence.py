@@ -20,14 +20,13 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
+from depthtrack.rendering.visibility import points_in_view
 from depthtrack.types import Array, Depth, Mask
 
 CLIPPED = 0.04
 """Metres: depth difference at which a pixel disagrees completely, d_M of Oikonomidis et al. 2011, Eq. (2)."""
 THICK = 0.006
 """Metres: silhouette parts that are thinner are errors of the outline."""
-FLESH = 0.02
-"""Metres: largest depth of a bone below the skin in front of it."""
 LONGEST_TRACK = 2.0
 """Seconds after a start from which on a track counts as old."""
 
@@ -164,9 +163,4 @@ def finger_visibility(model: HandModel, pose: Array, rendered: Depth, camera: Ca
     """
     ends = model.endpoints(pose).reshape(5, 4, 3)
     points = np.concatenate([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=1)
-    u, v = np.moveaxis(np.rint(np.nan_to_num(camera.project(points), nan=-1.0)).astype(int), -1, 0)
-    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    front = np.zeros(inside.shape)
-    front[inside] = rendered[v[inside], u[inside]]
-    visible = inside & ((front == 0) | (points[..., 2] - front < FLESH))
-    return np.asarray(visible.mean(axis=1))
+    return np.asarray(points_in_view(points, rendered, camera).mean(axis=1))

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, visible_points, without_offsets
+from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, without_offsets
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.visibility import points_in_view
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 CAMERA = Camera(40, 30, 50.0, 50.0, 20.0, 15.0)
@@ -15,7 +16,7 @@ def test_a_point_behind_a_surface_or_outside_the_image_is_hidden() -> None:
     depth = np.zeros(CAMERA.shape, dtype=np.float32)
     depth[:, :20] = 0.5
     points = np.array([[-0.05, 0, 0.51], [-0.05, 0, 0.55], [0.05, 0, 0.9], [5, 0, 0.5], [np.nan] * 3])
-    assert visible_points(points, depth, CAMERA).tolist() == [True, False, True, False, False]
+    assert points_in_view(points, depth, CAMERA).tolist() == [True, False, True, False, False]
 
 
 def test_the_joints_of_an_open_hand_are_visible_and_those_of_a_fist_are_not() -> None:
@@ -23,7 +24,7 @@ def test_the_joints_of_an_open_hand_are_visible_and_those_of_a_fist_are_not() ->
     shares = []
     for index in (0, 330):
         shown = made[index]
-        shares.append(visible_points(shown.joints, shown.exact_depth.astype(np.float32), made.sensor.camera).mean())
+        shares.append(points_in_view(shown.joints, shown.exact_depth.astype(np.float32), made.sensor.camera).mean())
     assert shares[0] == 1
     assert shares[1] < 1
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.benchmarks.crossmodel.measure import true_joints
+from depthtrack.benchmarks.crossmodel.measure import TRACKERS, true_joints
 from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import calibrate
 from depthtrack.calibration.views import choose_views
@@ -23,8 +23,6 @@ from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.types import Array
-
-TRACKERS = ("hybrid", "ik")
 
 
 def measure_evidence(cell: Cell) -> Row:

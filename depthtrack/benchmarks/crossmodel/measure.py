@@ -11,12 +11,13 @@ from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.calibration.views import choose_views
-from depthtrack.evaluation.metrics import visible_points, without_offsets
+from depthtrack.evaluation.metrics import without_offsets
 from depthtrack.evaluation.sweep.rows import Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.recording.sequence import Sequence
 from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.visibility import points_in_view
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -63,7 +64,7 @@ def true_joints(sequence: Sequence, index: int) -> Array:
 def _visible(sequence: Sequence, index: int, joints: Array) -> Mask:
     depth = sequence.exact_depth(index)
     assert depth is not None
-    return visible_points(joints, depth, sequence.camera)
+    return points_in_view(joints, depth, sequence.camera)
 
 
 def _starts(sequence: Sequence, found: Calibration, joints: Array) -> Row:
