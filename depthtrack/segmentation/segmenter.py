@@ -99,4 +99,5 @@ class Segmenter:
             arm_direction=located.arm_direction,
             wrist=located.wrist,
             cloud_options=self._options.point_cloud,
+            keypoints=None if frame.keypoints is None else frame.keypoints.shifted(*masks.region[:2]),
         )
