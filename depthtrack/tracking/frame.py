@@ -13,7 +13,8 @@ from depthtrack.rendering.options import ScoringOptions
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
-from depthtrack.solver.options import SurfaceFitOptions, SurfaceName
+from depthtrack.solver.lifting import Lifter
+from depthtrack.solver.options import LiftOptions, SurfaceFitOptions, SurfaceName
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.state import TrackState
@@ -33,6 +34,7 @@ class Toolkit:
         self.synergies = synergies or load_synergies()
         self._coarse: dict[int, Scorer] = {}
         self._fitters: dict[SurfaceFitOptions, IcpFitter] = {}
+        self._lifters: dict[LiftOptions, Lifter] = {}
         self._targets: dict[object, Observation] = {}
 
     def set_target(self, observation: Observation) -> None:
@@ -69,6 +71,12 @@ class Toolkit:
             fitter.set_target(observation, options.step(observation.reading_count))
             self._targets[options] = observation
         return fitter
+
+    def lifter(self, options: LiftOptions) -> Lifter:
+        """Return a lifter of keypoints with these options."""
+        if options not in self._lifters:
+            self._lifters[options] = Lifter(self.model, self.synergies, options)
+        return self._lifters[options]
 
     def close(self) -> None:
         """Free the renderers."""

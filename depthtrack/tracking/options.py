@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from depthtrack.errors import InputError
 from depthtrack.options import option
-from depthtrack.solver.options import IcpOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
+from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 
 Spread = tuple[float, float, float]
 """Standard deviations of position, rotation and angles."""
@@ -191,6 +191,20 @@ class SurfaceChoiceOptions:
     iterations: int = option(3, "Rounds of correspondences of each brief fit")
     scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
     accept: float = option(0.85, "Residual ratio below which another surface than the preferred one is used")
+
+
+@dataclass(frozen=True)
+class KeypointOptions:
+    """Proposals from keypoints of another detector: at starts, and if the pose contradicts them.
+
+    The robust cost of keypoints lies between 0, on their lines of sight, and 1.
+    """
+
+    lift: LiftOptions = option(LiftOptions(), "Fit of the hand to keypoints and the depth near them")
+    contradicted: float = option(0.25, "Robust cost of the keypoints above which they are lifted to other poses")
+    finger: float = option(0.5, "Robust cost of a finger's keypoints above which its lifted angles are tried")
+    accept: float = option(0.97, "Energy ratio below which a lifted pose is accepted")
+    tie: float = option(0.1, "Share of its energy that the robust cost of 1 adds to a pose that is compared")
 
 
 @dataclass(frozen=True)

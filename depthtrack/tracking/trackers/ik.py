@@ -7,6 +7,7 @@ from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
@@ -32,12 +33,14 @@ def _all_angles(config: IkConfig) -> Stages:
     fit = SurfaceFit(config.fit)
     search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
     fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
-    start: list[Stage] = [SearchGlobally(search, config.search), fingers]
+    keypoints = KeypointProposals(config.keypoints, config.fit)
+    start: list[Stage] = [SearchGlobally(search, config.search), keypoints, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
             fit,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
+            keypoints,
             RecoverLocally(near, config.recovery, elsewhere=start),
             fingers,
         ],

@@ -3,6 +3,7 @@
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import SwarmSearch
@@ -19,16 +20,19 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
     """
     search = SwarmSearch(config.swarm_search)
     fingers = RefineFingers(search, config.recovery, config.fingers)
+    keypoints = KeypointProposals(config.keypoints, config.final_fit)
     refine: list[Stage] = [Refine(config.final_fit)] if config.refine else []
     return Stages(
         follow=[
             Swarm(config.swarm, config.spread, widen=config.widen),
+            keypoints,
             RecoverLocally(search, config.recovery),
             fingers,
             *refine,
         ],
         start=[
             SearchGlobally(search, config.search),
+            keypoints,
             fingers,
             ReinitialiseNearLast(search, config.recovery, fingers),
             *refine,
