@@ -33,6 +33,10 @@ LANDMARK_NAMES = (
 )
 """MediaPipe's names of the keypoints `kinematics.KEYPOINT_NAMES`, in the same order."""
 COLUMNS = tuple(f"{name}_{value}" for name in LANDMARK_NAMES for value in ("x", "y", "confidence"))
+HEADER = ("timestamp", "side", *COLUMNS)
+"""Columns of a file with time stamps and sides."""
+KEYPOINTS_FILE = "keypoints.csv"
+"""Name of the file beside a synthetic recording."""
 MAX_BYTES = 1 << 27
 """Largest file read: an hour at 30 Hz has half as much."""
 _LONGEST_LINE, _FARTHEST = 4096, 1e5
@@ -128,14 +132,6 @@ def read_keypoints(path: Path) -> KeypointFile:
     return KeypointFile(
         np.array(keys), first == "timestamp", table[..., :2], np.nan_to_num(table[..., 2], nan=0.0), tuple(sides)
     )
-
-
-def header_line(side: bool = True) -> str:
-    """Return the first line of a file with time stamps.
-
-    side: whether it states the side of the hand.
-    """
-    return ",".join(("timestamp", *(["side"] if side else []), *COLUMNS))
 
 
 def keypoint_cells(keypoints: ImageKeypoints) -> list[str]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
-from depthtrack.recording.keypoints import COLUMNS, LANDMARK_NAMES, header_line, keypoint_cells, read_keypoints
+from depthtrack.recording.keypoints import COLUMNS, HEADER, LANDMARK_NAMES, keypoint_cells, read_keypoints
 from depthtrack.recording.sequence import ImageKeypoints
 from tests.support.recordings import TIMES, write_sample
 
@@ -27,7 +27,7 @@ def keypoints(seed: int, missing: float = 0.2) -> ImageKeypoints:
 
 def write(path: Path, times: tuple[float, ...] = TIMES) -> Path:
     rows = [",".join([str(time), *keypoint_cells(keypoints(seed))]) for seed, time in enumerate(times)]
-    path.write_text("\n".join([header_line(), *rows]) + "\n")
+    path.write_text("\n".join([",".join(HEADER), *rows]) + "\n")
     return path
 
 
