@@ -107,6 +107,9 @@ class LiftOptions:
     least_keypoints: int = option(8, "Fewer known keypoints are not lifted")
     least_confidence: float = option(0.2, "Keypoints of a lower confidence count as unknown")
     window: float = option(0.006, "Half the side of the window whose median depth is read at a keypoint", unit="m")
+    farthest: float = option(
+        0.12, "Readings farther from their median, on an average hand, are those of the background", unit="m"
+    )
     rounds: int = option(8, "Rounds of robust weights")
     scale: tuple[float, float] = option(
         (0.06, 0.015), "Scale of the Geman-McClure robust kernel in the first and the last round", unit="m"

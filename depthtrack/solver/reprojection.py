@@ -24,6 +24,8 @@ from depthtrack.solver.robust import geman_mcclure
 from depthtrack.types import Array, Index
 
 COUNT = len(KEYPOINT_BODIES)
+_BEFORE = 3.0
+"""Scale of the kernel for points before a reading, as a multiple of that for points beyond it."""
 
 
 @dataclass(frozen=True)
@@ -118,15 +120,18 @@ def mean_misfit(misfits: Array) -> float:
 def depth_weight(along: Array, scale: float) -> Array:
     """Return the weights of distances beyond the measured ones, metres; 0 for NaN.
 
-    A point far beyond the reading is hidden by another part: the Geman-McClure weight decreases fast. A point cannot
-    lie before the reading, so that side has the weight of Huber's linear cost.
+    A point beyond the reading is hidden by another part, which is common. A point before the reading is an error,
+    unless the reading is that of the background. The Geman-McClure kernel has a wider scale on that side.
     """
-    beyond = geman_mcclure(np.nan_to_num(along, nan=np.inf) ** 2, scale)
-    return np.where(along < 0, scale / np.maximum(-along, scale), beyond)
+    ratio = np.nan_to_num(along, nan=np.inf) / _depth_scale(along, scale)
+    return geman_mcclure(ratio**2, 1.0)
 
 
 def depth_cost(along: Array, scale: float) -> Array:
     """Return the costs that `depth_weight` minimises, m^2; as much as a hidden point's for NaN."""
-    beyond = scale**2 * (1 - 1 / (1 + np.nan_to_num(along, nan=np.inf) ** 2 / scale**2))
-    before = np.where(along < -scale, scale * (-2 * along - scale), along**2)
-    return np.where(along < 0, before, beyond)
+    square = _depth_scale(along, scale) ** 2
+    return square * (1 - 1 / (1 + np.nan_to_num(along, nan=np.inf) ** 2 / square))
+
+
+def _depth_scale(along: Array, scale: float) -> Array:
+    return np.where(along < 0, _BEFORE * scale, scale)
