@@ -16,7 +16,7 @@ from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.configuration import LiftConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.run_configuration import RunConfiguration, camera_fields, versions
@@ -71,6 +71,8 @@ class TrackingRun(Closing):
         self.hand = configuration.hand_shape()
         self._clock, self._start_pose = clock, true_start(sequence) if configuration.start == "truth" else None
         named = configuration.keypoints
+        if named is None and isinstance(configuration.tracker, LiftConfig):
+            raise InputError("the tracker lift must have keypoints, found none: give --keypoints FILE.csv")
         self._keypoints = None if named is None else read_keypoints(Path(named))
         self.tracker = wrap(create_tracker(configuration.tracker, self.hand, threads))
 

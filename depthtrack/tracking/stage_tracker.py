@@ -1,7 +1,7 @@
 """Tracker made of stages: lists of stages over candidates, and the state between frames."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.timing import StageClock
-from depthtrack.tracking.tracker import Estimate
+from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.types import Array
 
 
@@ -86,6 +86,8 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
+        It is absent if the stages find no candidate.
+
         pose: (27,) given by the user.
         """
         clock = StageClock(self.stages)
@@ -97,7 +99,12 @@ class StageTracker:
             for stage in stages:
                 candidates = stage(frame, candidates)
                 clock.lap(stage.name)
-            found.append((candidates[0], Status.STARTED if frame.restarted else status))
+            if candidates:
+                found.append((candidates[0], Status.STARTED if frame.restarted else status))
+        if not found:
+            estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
+            self._state.update(estimate)
+            return estimate
         best, status = min(found, key=lambda pair: pair[0].energy)
         self.evidence, visibility = self._evidence(best, status, observation.timestamp)
         confidence = self._confidence(self.evidence)

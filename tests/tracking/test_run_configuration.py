@@ -109,6 +109,8 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
         ({"frames": -1}, "whole number"),
         ({"camera": 3}, "entry 'camera'"),
         ({"start": "guess"}, "auto or truth"),
+        ({"keypoints": 3}, "path of a file"),
+        ({"keypoints": "x" * 2000}, "expected a path as keypoints"),
     ],
 )
 def test_a_malformed_configuration_is_rejected(recording: Path, change: dict[str, Any], expected: str) -> None:
