@@ -82,7 +82,7 @@ def _lifted(frames: list[Frame], hand: HandShape, options: LiftOptions | None) -
 
 
 def _palm_ratio(points: Array, side: Side) -> float:
-    """Return the size of the palm, relative to the average hand's, of measured keypoints (N, 21, 3).
+    """Return the size of the palm of measured keypoints (N, 21, 3), relative to the average.
 
     Raises:
         InputError: if no frame shows enough of the palm.
