@@ -9,6 +9,7 @@ from depthtrack.options import check_seed, option
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, LiftOptions, SurfaceFitOptions, SwarmOptions
 from depthtrack.tracking.options import (
+    BranchOptions,
     FingerOptions,
     FitRound,
     FitSearchOptions,
@@ -79,6 +80,7 @@ class PsoConfig:
     recovery: RecoveryOptions = option(RecoveryOptions(), "Local re-initialisation", advanced=True)
     fingers: FingerOptions = option(FingerOptions(), "Search of single fingers", advanced=True)
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
@@ -118,6 +120,7 @@ class IkConfig:
     )
     fingers: FingerOptions = option(_FIT_FINGERS, "Search of single fingers", advanced=True)
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
@@ -166,6 +169,7 @@ class HybridConfig:
     routine_search: FitSearchOptions = option(_ROUTINE_FITS, "Surface fits of a routine local search", advanced=True)
     fingers: FingerOptions = option(_HYBRID_FINGERS, "Search of single fingers", advanced=True)
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")

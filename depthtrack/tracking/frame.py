@@ -8,6 +8,7 @@ import numpy as np
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
+from depthtrack.recording.branches import Branch
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.rendering.scorer import Scorer
@@ -91,6 +92,7 @@ class FrameContext:
     start_pose: (27,) pose given by the user, or None.
     predictions: candidates that `Predict` made, best first.
     restarted: whether a search replaced the track, so that the status becomes `started`.
+    branches: alternatives to the pose that the next frame goes on with.
     surface: surface that all fits of the frame use, None for that of their options.
     """
 
@@ -101,6 +103,7 @@ class FrameContext:
     start_pose: Array | None = None
     predictions: list[Candidate] = field(default_factory=list)
     restarted: bool = False
+    branches: tuple[Branch, ...] = ()
     surface: SurfaceName | None = None
 
     @cached_property

@@ -177,6 +177,7 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
             estimate.pose,
             estimate.confidence,
             estimate.visibility,
+            estimate.branches,
         )
         run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
         yield each
@@ -185,6 +186,16 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
 def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
     """Return the estimates that a run folder holds."""
     return [
-        Estimate(row.pose, row.energy, row.agreement, row.status, {}, row.timestamp, row.confidence, row.visibility)
+        Estimate(
+            row.pose,
+            row.energy,
+            row.agreement,
+            row.status,
+            {},
+            row.timestamp,
+            row.confidence,
+            row.visibility,
+            row.branches,
+        )
         for row in rows
     ]

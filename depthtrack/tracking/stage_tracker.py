@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.candidate import Candidate
@@ -93,24 +94,25 @@ class StageTracker:
         clock = StageClock(self.stages)
         self._tools.set_target(observation)
         clock.lap("target")
-        found: list[tuple[Candidate, Status]] = []
+        found: list[tuple[Candidate, Status, tuple[Branch, ...]]] = []
         for status, stages in lists.items():
             frame, candidates = FrameContext(observation, self._tools, self._state, self._seed, pose), list[Candidate]()
             for stage in stages:
                 candidates = stage(frame, candidates)
                 clock.lap(stage.name)
             if candidates:
-                found.append((candidates[0], Status.STARTED if frame.restarted else status))
+                found.append((candidates[0], Status.STARTED if frame.restarted else status, frame.branches))
         if not found:
             estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
             self._state.update(estimate)
             return estimate
-        best, status = min(found, key=lambda pair: pair[0].energy)
+        best, status, branches = min(found, key=lambda pair: pair[0].energy)
         self.evidence, visibility = self._evidence(best, status, observation.timestamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")
         shares = tuple(map(float, visibility))
-        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, confidence, shares)
+        time = observation.timestamp
+        return self._state.commit(*best, status, clock.milliseconds, time, confidence, shares, branches)
 
     def _evidence(self, best: Candidate, status: Status, timestamp: float) -> tuple[Evidence, Array]:
         """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
@@ -22,7 +23,7 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     """Return the stages of the hybrid tracker.
 
     The surface that the observed points lie on is chosen in each frame. The best prediction is fitted to it, then the
-    best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches.
+    best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches. Branches are followed.
     """
     fit = SurfaceFit(config.fit)
     chosen = FitChosenSurface(config.surface_choice, fit)
@@ -45,6 +46,7 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
             keypoints,
             RecoverLocally(near, config.recovery, elsewhere=elsewhere, routine=routine),
             in_turn,
+            CarryBranches(config.branches, sparse),
         ],
         start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
         refine=[GivenPose(), replace(chosen, fit=replace(fit, hold_last=False, effort=2))],

@@ -3,6 +3,7 @@
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
@@ -16,7 +17,7 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
     """Return the stages of the PSO tracker.
 
     The swarm starts from the last pose, its linear prediction and the observed hand. Frames that fit poorly trigger a
-    search near the pose, then of single fingers; searches fit surfaces between their rounds.
+    search near the pose, then of single fingers; searches fit surfaces between their rounds. Branches are followed.
     """
     search = SwarmSearch(config.swarm_search)
     fingers = RefineFingers(search, config.recovery, config.fingers)
@@ -29,6 +30,7 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
             RecoverLocally(search, config.recovery),
             fingers,
             *refine,
+            CarryBranches(config.branches, config.swarm_search.fit),
         ],
         start=[
             SearchGlobally(search, config.search),
