@@ -89,7 +89,18 @@ def test_a_run_is_repeated_from_its_configuration(
 
 
 def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_path: Path) -> None:
-    first = ["track", str(recording), "-o", str(tmp_path / "first"), "--tracker", "ik", "--frames", "1"]
+    first = [
+        "track",
+        str(recording),
+        "-o",
+        str(tmp_path / "first"),
+        "--tracker",
+        "ik",
+        "--frames",
+        "1",
+        "--hand",
+        "truth",
+    ]
     assert main([*first, "--subsample", "9", "--start", "truth"]) == 0
     again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first")]
     assert main([*again, "--icp-iterations", "2"]) == 0
@@ -190,7 +201,18 @@ def test_a_run_with_changed_segmentation_options_is_repeated(tmp_path: Path, use
 
 def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_path: Path) -> None:
     """Options of the tracker and of the segmentation that `--help` does not list are accepted."""
-    first = ["track", str(recording), "-o", str(tmp_path / "first"), "--tracker", "ik", "--frames", "1"]
+    first = [
+        "track",
+        str(recording),
+        "-o",
+        str(tmp_path / "first"),
+        "--tracker",
+        "ik",
+        "--frames",
+        "1",
+        "--hand",
+        "truth",
+    ]
     more = ["--segmentation.margin", "0.05", "--segmentation.grid.max-jump", "0.02", "--wrist-margin", "10"]
     assert main([*first, *more, "--retry-ratio", "1.4", "--start", "truth", "--depth-only"]) == 0
     again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first")]
