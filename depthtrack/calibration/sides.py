@@ -14,7 +14,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.side_choice import SideOptions, choose_side, mean_energies, track_sides
+from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies, track_sides
 
 
 def calibrate_either_side(
@@ -63,18 +63,22 @@ def calibrate_either_side(
     tracked = track_sides(
         sequence, hands, segmentation, threads, frames, options.stretches, _frames(report, 0.85, 0.15)
     )
-    return _cheaper(calibrations, *mean_energies(tracked))
+    return _cheaper(calibrations, *mean_energies(tracked), choice)
 
 
-def _cheaper(calibrations: dict[Side, Calibration], energies: dict[Side, float], frames: int) -> Calibration:
+def _cheaper(
+    calibrations: dict[Side, Calibration], energies: dict[Side, float], frames: int, choice: SideChoice
+) -> Calibration:
     """Return the calibration of the side that costs less.
 
     energies: mean energy of each side while its hand is tracked in `frames` frames.
+    choice: the comparison of the average hands.
 
-    The cost of a side is the product of that energy and of the median distance of the views' points to its skin. The
-    distance alone counts if no tracked frame shows a hand.
+    The cost of a side is a product of three figures: that energy, the energy of its average hand, and the median
+    distance of the views' points to its skin. The energies do not count if no tracked frame shows a hand.
     """
     costs = {side: each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()}
+    costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
     side, other = sorted(calibrations, key=lambda each: costs[each])
     return replace(calibrations[side], side_margin=costs[other] / costs[side] - 1)
 

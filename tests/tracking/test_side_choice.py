@@ -85,5 +85,5 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     found = calibrate_either_side(None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
     assert found.hand.side == ("left" if sure else "right")
-    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / 11 - 1)
+    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
