@@ -71,7 +71,7 @@ def test_a_configuration_round_trips_through_json(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("all_changed", [False, True])
-@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize("name", [name for name in CONFIGURATIONS if name != "lift"])  # needs a keypoint file
 def test_a_run_is_repeated_from_its_configuration(
     recording: Path, tmp_path: Path, name: str, all_changed: bool
 ) -> None:
