@@ -49,10 +49,10 @@ def calibrate(
         depthtrack.track("my-hand", calibration.hand, out="my-run")
     """
     sequence = as_recording(recording)
-    source, threads = f"calibrated on {sequence.name}", threads or usable_cores()
+    threads = threads or usable_cores()
     if side is None:
-        return calibrate_either_side(sequence, segmentation, seed, threads, source, frames, progress)
-    return calibrate_side(sequence, side, (), segmentation, seed, threads, source, frames, progress)
+        return calibrate_either_side(sequence, segmentation, seed, threads, frames, progress)
+    return calibrate_side(sequence, side, (), segmentation, seed, threads, frames, progress)
 
 
 def calibrate_rig(

@@ -86,7 +86,6 @@ def calibrate(
     segmentation: SegmentationOptions | None = None,
     seed: int = 0,
     threads: int = 1,
-    source: str = "calibrated",
     frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
@@ -127,7 +126,7 @@ def calibrate(
     before, after = (_refined(observed, fitted.poses, sizes, side, options) for sizes in (np.zeros(COUNT), values))
     report("done", 1.0)
     return Calibration(
-        hand_of(values, side, source),
+        hand_of(values, side, f"calibrated on {sequence.name}"),
         _measured(values, fitted.covariance),
         None,
         1000 * float(np.median(before.distances)),

@@ -22,7 +22,6 @@ def calibrate_either_side(
     segmentation: SegmentationOptions | None = None,
     seed: int = 0,
     threads: int = 1,
-    source: str = "calibrated",
     frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
@@ -42,7 +41,7 @@ def calibrate_either_side(
     def measured(side: Side, begun: float, share: float) -> Calibration:
         part = _part(report, begun, share)
         views = choice.views.get(side, ())
-        return calibrate(sequence, side, views, segmentation, seed, threads, source, frames, part, options)
+        return calibrate(sequence, side, views, segmentation, seed, threads, frames, part, options)
 
     if choice.sure:
         found = measured(choice.side, 0.25, 0.75)

@@ -22,11 +22,10 @@ def test_the_arguments_reach_the_calibration(path: Path, monkeypatch: pytest.Mon
         segmentation: Any,
         seed: Any,
         threads: Any,
-        source: Any,
         frames: Any,
         progress: Any,
     ) -> str:
-        seen.extend((len(sequence), side, seed, threads, source, frames))
+        seen.extend((len(sequence), side, seed, threads, frames))
         progress("measuring", 1.0)
         return "a calibration"
 
@@ -36,7 +35,7 @@ def test_the_arguments_reach_the_calibration(path: Path, monkeypatch: pytest.Mon
         recording, "left", seed=3, threads=1, frames=2, progress=lambda stage, share: stages.append(stage)
     )
     assert found == "a calibration"
-    assert seen == [4, "left", 3, 1, "calibrated on everyday", 2]
+    assert seen == [4, "left", 3, 1, 2]
     assert stages == ["measuring"]
 
 

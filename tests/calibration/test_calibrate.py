@@ -92,7 +92,7 @@ def calibration(made: Synthesiser, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
     hand = calibration.hand
-    assert hand.side == "right"
+    assert (hand.side, hand.source) == ("right", "calibrated on everyday")
     assert hand.scale == pytest.approx(0.9, rel=0.02)
     found, true = hand.lengths.sum(axis=1) * hand.scale, TRUE_HAND.lengths.sum(axis=1) * TRUE_HAND.scale
     np.testing.assert_allclose(found, true, atol=0.0025)
