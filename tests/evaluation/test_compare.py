@@ -140,7 +140,7 @@ class Idle:
 
 
 def test_stages_are_scaled_to_the_cpu_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sum is that of the clock of the process; the shares are those of the tracker's own clock.
+    """The sum is that of the process's clock, and the shares are the tracker's.
 
     The clock is replaced, since threads of other tests would count as well.
     """
