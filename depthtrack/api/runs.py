@@ -25,7 +25,7 @@ from depthtrack.recording.run_folder import Run
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
 from depthtrack.tracking.pipeline import TrackedFrame
-from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run import TrackingRun, check_run, configure
 from depthtrack.tracking.run_configuration import Start
 
 
@@ -112,6 +112,7 @@ def track(
         keypoints=None if keypoints is None else str(Path(keypoints).resolve()),
     )
     if hand is None:
+        check_run(configuration, sequence, None if out is None else Path(out), resume)
         measured = measured_hand(sequence, segmentation, threads, frames)
         configuration = replace(configuration, hand=measured.to_fields())
     run = TrackingRun(configuration, sequence, threads)

@@ -124,7 +124,7 @@ class TrackCommand:
         return options.chosen(sequence, choice)
 
     def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
-        from depthtrack.tracking.run import configure
+        from depthtrack.tracking.run import check_run, configure
 
         configuration = configure(
             self.recording.path,
@@ -137,7 +137,8 @@ class TrackCommand:
             on_damage=self.recording.on_damage,
             keypoints=None if self.keypoints is None else str(self.keypoints.resolve()),
         )
-        # A hand is measured after all options were checked.
+        # To measure the hand takes long, so everything else is checked before.
+        check_run(configuration, sequence, self.out, self.resume)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
     def _report(self) -> None:

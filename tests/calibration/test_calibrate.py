@@ -43,7 +43,7 @@ from depthtrack.tracking.stretches import StretchOptions
 from depthtrack.viewing.calibration_picture import shown_views
 from tests.support.observations import observe
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("calibration")]
 
 
 def _rendered(pose: np.ndarray) -> Observation:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import depthtrack as dt
 from depthtrack.calibration.calibrate import Calibration, Measured
 from depthtrack.cli import main
 from depthtrack.errors import InputError
@@ -144,6 +145,38 @@ def test_a_hand_is_measured_unless_one_is_given(
     assert "mm long" not in capsys.readouterr().out
     assert main(["track", str(recording), "-o", str(tmp_path / "given"), *short, "--hand", "truth"]) == 0
     assert "mm long" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (["-o", "{run}"], "already holds a run"),
+        (["-o", "{new}", "--tracker", "ik", "--synergies", "leap", "--components", "99"], "components"),
+        (["-o", "{new}", "--tracker", "lift"], "must have keypoints"),
+    ],
+)
+def test_mistakes_are_found_before_the_hand_is_measured(
+    recording: Path,
+    run: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    more: list[str],
+    expected: str,
+) -> None:
+    def measured(*_: object) -> None:
+        raise AssertionError("the hand was measured")
+
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", measured)
+    options = [each.format(run=run, new=tmp_path / "new") for each in more]
+    assert main(["track", str(recording), *options]) == 2
+    assert expected in capsys.readouterr().err
+    tracker = dt.tracker_config("ik", synergies="leap", components=99)
+    monkeypatch.setattr("depthtrack.api.choices.calibrate_either_side", measured)
+    with pytest.raises(InputError):
+        dt.track(recording, tracker=tracker)
+    with pytest.raises(InputError, match="already holds a run"):
+        dt.track(recording, out=run)
 
 
 def test_the_average_hand_is_tracked_if_none_can_be_measured(
