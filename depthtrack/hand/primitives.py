@@ -26,7 +26,8 @@ PRIMITIVE_COUNT = 37
 class Proportions(NamedTuple):
     """Positions and sizes of palm and thumb as shares of the sizes of `HandShape`.
 
-    Centres are x, y, z from the middle of the knuckles, in halves of the palm's breadth and thickness and in palm lengths.
+    Centres are x, y, z from the middle of the knuckles, in halves of the palm's breadth and thickness and in its
+    length.
     The thumb's centre is from its saddle joint, in radii and metacarpal lengths.
 
     cylinder: x, z of its axis; half breadth, half thickness; first and last y.
