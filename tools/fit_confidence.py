@@ -3,8 +3,8 @@
 Usage: fit_confidence.py FOLDER [--rig RIG.glb ...] [--seeds N] [--frames N]
 
 The folder holds the evidence of each recording, from which an interrupted run continues. The fit is logistic
-regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual never raises
-the confidence, a more visible finger never lowers it. Printed are the area under the ROC curve (AUROC) of recordings
+regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual or spread
+never raises the confidence. Printed are the area under the ROC curve (AUROC) of recordings
 left out of the fit, and the reliability in ten bins. The result is written to `depthtrack/tracking/confidence.json`.
 """
 
@@ -28,7 +28,7 @@ from depthtrack.types import Array, Mask
 RIDGE = 1e-2
 """Weight of the squared coefficients of standardised evidence."""
 FOLDS = 6
-RAISES = ("visible", "least_visible", "area", "pixels", "age")
+RAISES = ("pixels",)
 """Evidence that raises the confidence; the rest lowers it."""
 OUT = Path(__file__).parents[1] / "depthtrack" / "tracking" / "confidence.json"
 

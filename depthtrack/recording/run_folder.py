@@ -1,8 +1,8 @@
 """The run folder: a tracker's result of every frame, readable after a kill at any time.
 
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
-agreement, confidence, visibility of each finger and the pose, which is empty if there is none. `timings.csv` has the
-milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed beside it.
+agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. It is empty without a
+pose. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
@@ -19,6 +19,7 @@ import numpy as np
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.files import read_text, write_atomic
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_NAMES, POSE_SIZE
 from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, read_branches
 from depthtrack.recording.run_tables import header_of, read_table, rewrite_table
@@ -27,10 +28,13 @@ from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
 
 _EARLIER_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
-"""Columns of runs before format 3, whose confidence was the agreement of silhouettes."""
+"""Columns of runs whose confidence was the agreement of silhouettes."""
 VISIBILITY_COLUMNS = tuple(f"{finger}_visible" for finger in FINGERS)
-_COLUMNS = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
+SPREAD_COLUMNS = tuple(f"{point}_spread" for point in KEYPOINT_NAMES)
+_COLUMNS_WITHOUT_SPREAD = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
+_COLUMNS = (*_COLUMNS_WITHOUT_SPREAD, *SPREAD_COLUMNS)
 UNKNOWN_VISIBILITY = (math.nan,) * len(FINGERS)
+UNKNOWN_SPREAD = (math.nan,) * len(KEYPOINT_NAMES)
 _LARGEST = 100.0
 """Bound on the numbers of a pose, metres and radians."""
 _LATEST = 1e12
@@ -48,6 +52,7 @@ class RunRow:
     pose: (27,) metres, quaternion, radians, camera frame; None if no hand was observed.
     confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
+    spread: distance (21,) of the keypoints from the truth that about 68 % stay below, metres; NaN if unknown.
     branches: alternatives to the pose.
     """
 
@@ -59,6 +64,7 @@ class RunRow:
     pose: Array | None
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
+    spread: tuple[float, ...] = UNKNOWN_SPREAD
     branches: tuple[Branch, ...] = ()
 
 
@@ -128,6 +134,7 @@ class Run:
     timestamps: (T,) seconds.
     energy, agreement, confidence: (T,) of the poses, see `RunRow`.
     visibility: (T, 5) of the fingers, see `RunRow`.
+    spread: (T, 21) of the keypoints, metres, see `RunRow`.
     poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
     stage_ms: (T,) milliseconds of each stage.
     """
@@ -141,6 +148,7 @@ class Run:
     agreement: Array
     confidence: Array
     visibility: Array
+    spread: Array
     poses: Array
     stage_ms: dict[str, Array]
 
@@ -163,6 +171,7 @@ class Run:
             np.array([row.agreement for row in rows], dtype=np.float64),
             np.array([row.confidence for row in rows], dtype=np.float64),
             np.array([row.visibility for row in rows], dtype=np.float64).reshape(-1, len(FINGERS)),
+            np.array([row.spread for row in rows], dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES)),
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
         )
@@ -192,11 +201,12 @@ def read_rows(folder: Path) -> list[RunRow]:
         InputError: if a row is malformed, or holds values that no tracker writes.
     """
     path = folder / "poses.csv"
-    columns = _EARLIER_COLUMNS if header_of(path) == _EARLIER_COLUMNS else _COLUMNS
+    header = header_of(path)
+    columns = header if header in (_EARLIER_COLUMNS, _COLUMNS_WITHOUT_SPREAD) else _COLUMNS
     branches, rows = read_branches(folder / "branches.csv"), list[RunRow]()
     for number, cells in enumerate(read_table(path, columns), start=2):
         try:
-            row = _row(cells)
+            row = _row(dict(zip(columns, cells, strict=True)))
             rows.append(replace(row, branches=branches.get(row.index, ())))
         except (ValueError, IndexError) as error:
             raise InputError(
@@ -207,18 +217,30 @@ def read_rows(folder: Path) -> list[RunRow]:
     return rows
 
 
-def _row(cells: list[str]) -> RunRow:
-    """Return the row of a line's cells, of this format or the earlier one. Raises ValueError."""
-    index, timestamp, status, energy, agreement, *rest = cells
-    pose = rest[-POSE_SIZE:]
-    numbers = np.array([float(x) for x in pose]) if any(pose) else None
-    if not 0 <= int(index) < MAX_FRAMES:
+def _row(named: Mapping[str, str]) -> RunRow:
+    """Return the row of cells by column, also of earlier runs. Raises ValueError."""
+
+    def numbers(columns: Sequence[str]) -> tuple[float, ...]:
+        return tuple(float(named.get(column, "nan")) for column in columns)
+
+    if not 0 <= int(named["index"]) < MAX_FRAMES:
         raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
-    row = RunRow(int(index), float(timestamp), Status(status), float(energy), float(agreement), numbers)
-    if len(rest) == POSE_SIZE:
-        return row
-    confidence, *visibility = map(float, rest[:-POSE_SIZE])
-    return replace(row, confidence=confidence, visibility=tuple(visibility))
+    today = "agreement" in named
+    timestamp, energy, agreement, confidence = numbers(
+        ("timestamp", "energy", "agreement" if today else "confidence", "confidence" if today else "")
+    )
+    has_pose = any(named[column] for column in POSE_NAMES)
+    return RunRow(
+        int(named["index"]),
+        timestamp,
+        Status(named["status"]),
+        energy,
+        agreement,
+        np.array(numbers(POSE_NAMES)) if has_pose else None,
+        confidence,
+        numbers(VISIBILITY_COLUMNS),
+        numbers(SPREAD_COLUMNS),
+    )
 
 
 def _row_fault(row: RunRow) -> str | None:
@@ -228,6 +250,9 @@ def _row_fault(row: RunRow) -> str | None:
     shares = np.array([row.confidence, *row.visibility])
     if len(outside := shares[(shares < 0) | (shares > 1)]):
         return f"confidence and visibility must be shares from 0 to 1, found {outside[0]:.6g}"
+    spread = np.array(row.spread)
+    if len(outside := spread[(spread < 0) | (spread > _LARGEST)]):
+        return f"a spread must be metres from 0 to {_LARGEST:g}, found {outside[0]:.6g}"
     if row.pose is None:
         return None
     if not np.all(np.abs(row.pose) <= _LARGEST):
@@ -256,7 +281,7 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
 def _cells(row: RunRow) -> list[str]:
     pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
     shares = map(repr, (row.energy, row.agreement, row.confidence, *row.visibility))
-    return [str(row.index), repr(row.timestamp), row.status, *shares, *pose]
+    return [str(row.index), repr(row.timestamp), row.status, *shares, *pose, *map(repr, row.spread)]
 
 
 def check_unused(folder: Path, resume: bool) -> None:

@@ -1,4 +1,4 @@
-"""Confidence of an estimate, and the visibility of its fingers.
+"""Confidence of an estimate.
 
 The confidence is the probability that the largest joint error is below 20 mm. It is a logistic function of a few
 figures of the frame. `tools/fit_confidence.py` fits it on the tuning seeds of the cross-model benchmark: no recording
@@ -16,49 +16,37 @@ import cv2
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.geometry.camera import Camera
-from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
-from depthtrack.rendering.visibility import points_in_view
+from depthtrack.tracking.spread import CLIPPED, BonesInView
 from depthtrack.types import Array, Depth, Mask
 
-CLIPPED = 0.04
-"""Metres: depth difference at which a pixel disagrees completely, d_M of Oikonomidis et al. 2011, Eq. (2)."""
 THICK = 0.006
 """Metres: silhouette parts that are thinner are errors of the outline."""
-LONGEST_TRACK = 2.0
-"""Seconds after a start from which on a track counts as old."""
 
 
 class Evidence(NamedTuple):
     """Figures of an estimate that its confidence depends on.
 
     energy: logarithm of E of Oikonomidis et al. 2011, Eq. (1), as a share of a completely wrong pixel's.
-    energy_ratio: logarithm of its ratio to the median energy of the track.
     depth_difference: logarithm of the mean difference of rendered and observed depth, clipped, mm.
-    unexplained, in_vain: shares of the observed silhouette that the hand does not cover, and of the hand's that nothing
-        was observed in.
-    thick_unexplained, thick_in_vain: the same without parts thinner than `THICK`.
-    visible: share of the bones' points that are visible.
-    least_visible: that of the finger that is hidden most.
-    area: observed area, in areas of the palm.
+    finger_difference: the same for the finger that agrees least.
+    in_vain: share of the hand's silhouette that nothing was observed in.
+    thick_unexplained: share of the observed silhouette that the hand does not cover; parts thinner than `THICK` are not
+        counted.
+    largest_spread, usual_spread: logarithms of the largest and of the median spread of the fingers, mm.
+    posture: distance of the finger angles from common postures, in standard deviations.
     pixels: logarithm of the number of observed pixels.
-    age: time since the start of the track, s, at most `LONGEST_TRACK`.
     """
 
     energy: float
-    energy_ratio: float
     depth_difference: float
-    unexplained: float
+    finger_difference: float
     in_vain: float
     thick_unexplained: float
-    thick_in_vain: float
-    visible: float
-    least_visible: float
-    area: float
+    largest_spread: float
+    usual_spread: float
+    posture: float
     pixels: float
-    age: float
 
 
 @dataclass(frozen=True)
@@ -81,42 +69,33 @@ def fitted_model() -> ConfidenceModel:
     return ConfidenceModel(weights, float(fields["bias"]))
 
 
-def evidence_of(
-    pose: Array,
-    rendered: Depth,
-    target: Target,
-    hand: HandShape,
-    visibility: Array,
-    energy: float,
-    energy_ratio: float,
-    age: float,
-) -> Evidence:
+def evidence_of(pose: Array, rendered: Depth, target: Target, bones: BonesInView, energy: float) -> Evidence:
     """Return the evidence of a pose (27,).
 
     rendered: (h, w) depth of the posed hand, metres.
-    visibility: (5,) of the fingers.
     energy: in multiples of `Objective.clamp`.
     """
     unexplained, in_vain = (np.zeros(rendered.shape, dtype=np.bool_) for _ in range(2))
     counts = compare_images(rendered, target.depth, target.silhouette, unexplained, in_vain)
-    observed, covered, missed, vain, compared, difference = counts
-    pixel, palm = float(pose[2]) / target.camera.fx, hand.palm_breadth * hand.palm_length * hand.scale**2
-    seen, shown = max(observed, 1), max(covered, 1)
-    mean_difference = difference / compared if compared else CLIPPED
+    observed, covered, _, vain, compared, difference = counts
+    pixel, seen = float(pose[2]) / target.camera.fx, max(observed, 1)
+    fingers = bones.spread[1:].reshape(5, 4).max(axis=1)
     return Evidence(
         energy=math.log(max(energy, 1e-3)),
-        energy_ratio=energy_ratio,
-        depth_difference=math.log(1e3 * max(mean_difference, 1e-4)),
-        unexplained=missed / seen,
-        in_vain=vain / shown,
+        depth_difference=_logarithm(difference / compared if compared else CLIPPED),
+        finger_difference=_logarithm(bones.differences.mean(axis=(1, 2)).max()),
+        in_vain=vain / max(covered, 1),
         thick_unexplained=_thick(unexplained, pixel) / seen,
-        thick_in_vain=_thick(in_vain, pixel) / shown,
-        visible=float(visibility.mean()),
-        least_visible=float(visibility.min()),
-        area=seen * pixel**2 / palm,
+        largest_spread=_logarithm(fingers.max()),
+        usual_spread=_logarithm(np.median(fingers)),
+        posture=bones.posture,
         pixels=math.log(seen),
-        age=min(age, LONGEST_TRACK),
     )
+
+
+def _logarithm(distance: float) -> float:
+    """Return the logarithm of a distance in mm; of 0.1 mm if it is less."""
+    return math.log(1e3 * max(float(distance), 1e-4))
 
 
 @compiled(nogil=True)
@@ -153,14 +132,3 @@ def _thick(mask: Mask, pixel: float) -> int:
     """Return the number of pixels that are no outline; `pixel`: its side, metres."""
     side = max(1, round(THICK / pixel))
     return int(cv2.erode(mask.view(np.uint8), np.ones((side, side), np.uint8)).sum())
-
-
-def finger_visibility(model: HandModel, pose: Array, rendered: Depth, camera: Camera) -> Array:
-    """Return the visible share (5,) of the points along each finger's bones.
-
-    pose: (27,).
-    rendered: (h, w) depth of the posed hand, metres; 0 for none.
-    """
-    ends = model.endpoints(pose).reshape(5, 4, 3)
-    points = np.concatenate([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=1)
-    return np.asarray(points_in_view(points, rendered, camera).mean(axis=1))

@@ -177,6 +177,7 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
             estimate.pose,
             estimate.confidence,
             estimate.visibility,
+            estimate.spread,
             estimate.branches,
         )
         run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
@@ -195,6 +196,7 @@ def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
             row.timestamp,
             row.confidence,
             row.visibility,
+            row.spread,
             row.branches,
         )
         for row in rows

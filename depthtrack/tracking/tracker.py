@@ -8,7 +8,7 @@ from typing import Protocol
 from numpy.typing import ArrayLike
 
 from depthtrack.recording.branches import Branch
-from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
+from depthtrack.recording.run_folder import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
@@ -25,6 +25,7 @@ class Estimate:
     stage_ms: milliseconds spent in each stage of the tracker.
     confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
+    spread: distance (21,) of the keypoints from the truth that about 68 % stay below, metres; NaN if unknown.
     branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
     """
@@ -37,6 +38,7 @@ class Estimate:
     timestamp: float = math.nan
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
+    spread: tuple[float, ...] = UNKNOWN_SPREAD
     branches: tuple[Branch, ...] = ()
 
 

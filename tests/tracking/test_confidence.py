@@ -1,4 +1,4 @@
-"""Confidence of an estimate, and the visibility of fingers."""
+"""Confidence of an estimate."""
 
 import math
 from contextlib import closing
@@ -6,27 +6,18 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import make_pose
-from depthtrack.hand.postures import POSTURES
-from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.confidence import (
-    CLIPPED,
-    LONGEST_TRACK,
     ConfidenceModel,
     Evidence,
     compare_images,
     evidence_of,
-    finger_visibility,
     fitted_model,
 )
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.spread import CLIPPED, BonesInView
 from tests.support.observations import observe
-
-HAND = HandShape()
-MODEL = HandModel(HAND)
 
 
 def test_the_confidence_is_a_logistic_function() -> None:
@@ -37,9 +28,9 @@ def test_the_confidence_is_a_logistic_function() -> None:
 
 
 def test_better_evidence_gives_more_confidence() -> None:
-    """All fingers in view, a low energy and thin residual outlines, against the opposite."""
-    good = Evidence(-2.0, 0.0, 1.0, 0.05, 0.05, 0.0, 0.0, 1.0, 1.0, 1.6, 8.0, 2.0)
-    bad = Evidence(0.0, 1.0, 2.5, 0.4, 0.4, 0.2, 0.2, 0.3, 0.0, 0.8, 8.0, 0.0)
+    """All fingers measured, a low energy and thin residual outlines, against the opposite."""
+    good = Evidence(-2.0, 1.0, 1.0, 0.05, 0.0, 1.2, 1.0, 3.0, 8.0)
+    bad = Evidence(0.0, 2.5, 3.5, 0.4, 0.2, 3.9, 3.0, 9.0, 8.0)
     assert fitted_model()(good) > 0.7
     assert fitted_model()(bad) < 0.3
 
@@ -47,36 +38,24 @@ def test_better_evidence_gives_more_confidence() -> None:
 def test_evidence_counts_both_silhouettes(everyday_skin: Synthesiser) -> None:
     observation = observe(everyday_skin, 20)
     target = Target(observation.camera, observation.silhouette, observation.depth)
-    visibility = np.array([1.0, 1.0, 0.5, 1.0, 0.0])
+    differences, spread = np.full((5, 3, 2), 0.001), np.full(21, 0.002)
+    differences[3], spread[[0, 20]] = 0.03, (0.5, 0.05)
+    bones = BonesInView(np.ones((5, 3, 2), dtype=np.bool_), differences, spread, 4.0)
 
-    def evidence(rendered: np.ndarray, age: float) -> Evidence:
-        pose = everyday_skin.poses[20]
-        return evidence_of(pose, rendered, target, HAND, visibility, 0.2, 0.1, age)
+    def evidence(rendered: np.ndarray) -> Evidence:
+        return evidence_of(everyday_skin.poses[20], rendered, target, bones, 0.2)
 
-    whole = evidence(observation.depth, 9.0)
-    assert whole.unexplained <= np.mean(observation.depth[observation.silhouette] == 0)
-    assert (whole.in_vain, whole.thick_unexplained, whole.age) == (0, 0, LONGEST_TRACK)
-    assert (whole.visible, whole.least_visible) == (0.7, 0.0)
+    whole = evidence(observation.depth)
+    assert (whole.in_vain, whole.thick_unexplained, whole.posture) == (0, 0, 4.0)
     assert whole.energy == pytest.approx(math.log(0.2))
+    assert whole.finger_difference == pytest.approx(math.log(30))
+    assert (whole.largest_spread, whole.usual_spread) == pytest.approx((math.log(50), math.log(2)))
     half = observation.depth.copy()
     half[: half.shape[0] // 2] = 0
-    assert evidence(half, 0.0).thick_unexplained > 0.2
+    assert evidence(half).thick_unexplained > 0.2
     shifted = np.roll(observation.depth, 30, axis=1)
-    assert evidence(shifted, 0.0).thick_in_vain > 0.1
-    assert evidence(observation.depth + 0.03 * (observation.depth > 0), 0.0).depth_difference > math.log(20)
-
-
-def test_folded_fingers_are_hidden_behind_the_back_of_the_hand(everyday_skin: Synthesiser) -> None:
-    observation = observe(everyday_skin, 20)
-    shares = []
-    for name in ("open", "fist"):
-        # The camera sees the back of the hand.
-        pose = make_pose(np.array([0, 0, 0.5]), np.array([0.0, 1.0, 0.0, 0.0]), POSTURES[name])
-        with closing(create_tracker(tracker_config("ik"), HAND)) as tracker:
-            tracker._tools.set_target(observation)
-            rendered = tracker._tools.scorer.render(pose)
-        shares.append(finger_visibility(MODEL, pose, rendered, observation.camera)[1:].mean())
-    assert shares[0] > shares[1]
+    assert evidence(shifted).in_vain > 0.1
+    assert evidence(observation.depth + 0.03 * (observation.depth > 0)).depth_difference > math.log(20)
 
 
 @pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
@@ -92,7 +71,8 @@ def test_estimates_have_a_confidence_that_resumes(everyday_skin: Synthesiser, na
         again = [cut.track(frame) for frame in frames[2:]]
     for one, other in zip(estimates[2:], again, strict=True):
         assert 0 < one.confidence < 1
-        assert (one.confidence, one.visibility) == (other.confidence, other.visibility)
+        assert np.all(np.array(one.spread) > 0)
+        assert (one.confidence, one.visibility, one.spread) == (other.confidence, other.visibility, other.spread)
 
 
 def test_the_comparison_of_images_equals_its_definition() -> None:
