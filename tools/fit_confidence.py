@@ -28,8 +28,6 @@ from depthtrack.types import Array, Mask
 RIDGE = 1e-2
 """Weight of the squared coefficients of standardised evidence."""
 FOLDS = 6
-RAISES = ("pixels",)
-"""Evidence that raises the confidence; the rest lowers it."""
 OUT = Path(__file__).parents[1] / "depthtrack" / "tracking" / "confidence.json"
 
 
@@ -50,7 +48,7 @@ def fit(evidence: Array, good: Mask, weights: Array) -> tuple[Array, float]:
         gradient = np.append(features.T @ slope + 2 * RIDGE * weights.sum() * parameters[:-1], slope.sum())
         return float(value), gradient
 
-    bounds = [(0, None) if name in RAISES else (None, 0) for name in Evidence._fields]
+    bounds = [(None, 0.0)] * evidence.shape[1]
     start = np.zeros(evidence.shape[1] + 1)
     found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[*bounds, (None, None)]).x
     scaled = found[:-1] / spread
@@ -82,8 +80,11 @@ def main() -> None:
     for kind in ("calibrated", "mirrored", "average"):
         part = kinds == kind
         print(f"AUROC, {kind} hand: {auroc(left_out[part], good[part]):.3f} ({100 * good[part].mean():.0f} % good)")
+    measured = kinds != "average"
+    print(f"AUROC, calibrated and mirrored hands: {auroc(left_out[measured], good[measured]):.3f}")
     print(f"AUROC, all: {auroc(left_out, good):.3f}")
     probability = 1 / (1 + np.exp(-left_out))
+    print(f"half of the lowest confidence of a good pose: {probability[good].min() / 2:.3f}")
     for low in np.arange(0, 1, 0.1):
         part = (probability >= low) & (probability < low + 0.1)
         if part.any():

@@ -4,7 +4,7 @@ Usage: fit_primitives.py [--hands N] [--seed N]
 
 The skins are those of the average hand and of hands with random sizes, in typical and in random postures. The squared
 distances of the vertices of palm and thumb from the union of the primitives are minimised, with a robust kernel. The
-caps must cover the open ends of the palm's cylinder.
+caps must cover the open ends of the palm's cylinder, and end at the wrist, where segmentation cuts the forearm.
 Printed are the fitted proportions, and the distances of these hands and of others before and after the fit.
 """
 
@@ -50,8 +50,10 @@ SOFT = 1.5
 """Millimetres, scale of the robust kernel."""
 FAR = 20.0
 """Millimetres, largest distance that counts."""
-RIM, RIM_WEIGHT = 16, 100.0
-"""Points of each rim, and the weight of their distances against 1 for that of a vertex."""
+RIM = 16
+"""Points of each rim of the cylinder."""
+HARD = 100.0
+"""Weight of distances that must vanish, against 1 for that of a vertex."""
 RANDOM_POSTURES = 2
 """Number of random postures for each hand, beside the typical ones."""
 
@@ -119,6 +121,13 @@ def uncovered(proportions: Proportions) -> Array:
     return np.asarray(1e3 * np.concatenate(out))
 
 
+def beyond_wrist(proportions: Proportions) -> float:
+    """Return how far the cap ends beyond the wrist, mm."""
+    _, cap, _ = Primitives.of(HandShape(), proportions).T_body_unit[:3]
+    wrist = HandModel(HandShape()).wrist(make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20)))
+    return float(1e3 * max(wrist[1] - (cap[1, 3] - cap[1, 1]), 0))
+
+
 def distance(kind: int, T: Array, points: Array) -> Array:
     """Return first-order signed distances (N,), metres, of points (N, 3).
 
@@ -157,7 +166,9 @@ def main() -> None:
 
     def residuals(x: Array) -> Array:
         proportions = of_vector(start + UNIT * (x - 1))
-        return np.concatenate([robust(distances(proportions, fitted)), RIM_WEIGHT * uncovered(proportions)])
+        return np.concatenate(
+            [robust(distances(proportions, fitted)), HARD * uncovered(proportions), [HARD * beyond_wrist(proportions)]]
+        )
 
     found = least_squares(
         residuals,
