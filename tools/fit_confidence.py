@@ -4,8 +4,11 @@ Usage: fit_confidence.py FOLDER [--rig RIG.glb ...] [--seeds N] [--frames N]
 
 The folder holds the evidence of each recording, from which an interrupted run continues. The fit is logistic
 regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual or spread
-never raises the confidence. Printed are the area under the ROC curve (AUROC) of recordings
-left out of the fit, and the reliability in ten bins. The result is written to `depthtrack/tracking/confidence.json`.
+never raises the confidence. The result is written to `depthtrack/tracking/confidence.json`.
+
+Printed are the area under the ROC curve (AUROC) of recordings left out of the fit, and the reliability in ten bins. The
+shares of keypoints within their spread follow, and the threshold of a trusted pose. The constants of
+`depthtrack/tracking/spread.py` were chosen by these shares.
 """
 
 import argparse
@@ -84,6 +87,12 @@ def main() -> None:
     print(f"AUROC, calibrated and mirrored hands: {auroc(left_out[measured], good[measured]):.3f}")
     print(f"AUROC, all: {auroc(left_out, good):.3f}")
     probability = 1 / (1 + np.exp(-left_out))
+    counts = np.array([frame[5:] for frame in frames])
+    for kind in ("calibrated", "average"):
+        shown, shown_within, hidden, hidden_within = counts[kinds == kind].sum(axis=0)
+        print(
+            f"within the spread, {kind} hand: {shown_within / shown:.2f} visible, {hidden_within / hidden:.2f} hidden"
+        )
     print(f"half of the lowest confidence of a good pose: {probability[good].min() / 2:.3f}")
     for low in np.arange(0, 1, 0.1):
         part = (probability >= low) & (probability < low + 0.1)
