@@ -4,7 +4,7 @@ Usage: fit_primitives.py [--hands N] [--seed N]
 
 The skins are those of the average hand and of hands with random sizes, in typical and in random postures. The squared
 distances of the vertices of palm and thumb from the union of the primitives are minimised, with a robust kernel. The
-caps must cover the open ends of the palm's cylinder, and end at the wrist, where segmentation cuts the forearm.
+caps must cover the open ends of the palm's cylinder. Cap and thumb end at the wrist, where segmentation cuts the arm.
 Printed are the fitted proportions, and the distances of these hands and of others before and after the fit.
 """
 
@@ -52,6 +52,8 @@ FAR = 20.0
 """Millimetres, largest distance that counts."""
 RIM = 16
 """Points of each rim of the cylinder."""
+ENDING = ("palm_wrist_cap", "thumb_ellipsoid")
+"""Ellipsoids that reach the wrist."""
 HARD = 100.0
 """Weight of distances that must vanish, against 1 for that of a vertex."""
 RANDOM_POSTURES = 2
@@ -122,10 +124,12 @@ def uncovered(proportions: Proportions) -> Array:
 
 
 def beyond_wrist(proportions: Proportions) -> float:
-    """Return how far the cap ends beyond the wrist, mm."""
-    _, cap, _ = Primitives.of(HandShape(), proportions).T_body_unit[:3]
-    wrist = HandModel(HandShape()).wrist(make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20)))
-    return float(1e3 * max(wrist[1] - (cap[1, 3] - cap[1, 1]), 0))
+    """Return how far palm and thumb of a resting hand end beyond the wrist, mm."""
+    primitives, model = Primitives.of(HandShape(), proportions), HandModel(HandShape())
+    rest = make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20))
+    T = primitives.transforms(model.transforms(rest))[[primitives.names.index(name) for name in ENDING]]
+    lowest = T[:, 1, 3] - np.linalg.norm(T[:, 1, :3], axis=1)
+    return float(1e3 * np.maximum(model.wrist(rest)[1] - lowest, 0).sum())
 
 
 def distance(kind: int, T: Array, points: Array) -> Array:
