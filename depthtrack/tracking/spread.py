@@ -21,7 +21,7 @@ from depthtrack.rendering.visibility import points_in_view
 from depthtrack.solver.prior import Prior, prior_energy
 from depthtrack.types import Array, Depth, Mask
 
-MEASURED = 0.005
+MEASURED = 0.004
 """Metres: standard deviation of a measured point."""
 AGREES = 0.01
 """Metres: largest difference of rendered and observed depth at a measured point."""
