@@ -2,7 +2,8 @@
 // Sums of Oikonomidis et al. 2011, Eq. (2), over blocks of 4 x 4 pixels, clipped at the tile's edge.
 
 uniform sampler2D inverse_depth;  // 1/m, 0 = nothing drawn; tiles of the atlas
-uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1
+uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1;
+                                  // inverse depth that a visible surface exceeds, 1/m
 uniform ivec2 tile;               // pixels
 uniform ivec2 blocks;             // blocks of a tile
 uniform float match_depth, clamp_depth;  // d_m, d_M, metres
@@ -15,10 +16,11 @@ void main() {
     sums = vec4(0.0);
     for (int y = first.y; y < last.y; ++y) {
         for (int x = first.x; x < last.x; ++x) {
-            vec2 observed = texelFetch(observation, ivec2(x, y), 0).rg;
+            vec3 observed = texelFetch(observation, ivec2(x, y), 0).rgb;
             float w = texelFetch(inverse_depth, corner * tile + ivec2(x, y), 0).r;
-            float difference = abs(observed.r - (w > 0.0 ? 1.0 / w : 0.0));
-            bool matched = w > 0.0 && (difference < match_depth || observed.r == 0.0);
+            bool drawn = w > observed.b;
+            float difference = abs(observed.r - (drawn ? 1.0 / w : 0.0));
+            bool matched = drawn && (difference < match_depth || observed.r == 0.0);
             sums.x += min(difference, clamp_depth);
             sums.y += matched ? observed.g : 0.0;
             sums.z += matched ? 1.0 : observed.g;

@@ -69,7 +69,7 @@ def evaluate(
 
     silhouette: (h, w) o_s.
     observed: (h, w) metres, 0 = no reading.
-    rendered: (h, w) metres, 0 = nothing drawn.
+    rendered: (h, w) metres, 0 = nothing drawn, or hidden (`Target.unhidden`).
 
     A drawn pixel is matched (r_m) if its depth lies within d_m of the observation, or if the observation is missing.
     Absent depth counts as 0 in the difference, so a pixel that only one map holds costs the full clamp.

@@ -27,9 +27,14 @@ class Objective:
         0.001, "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20", unit="m"
     )
     epsilon: float = option(1e-6, "Keeps the quotients of Eq. (2) finite")
+    hidden_depth: float = option(
+        0.005,
+        "Depth behind an occluder from which it hides the hand: above a sensor's noise, below a finger's radius",
+        unit="m",
+    )
 
     def __post_init__(self) -> None:
-        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
+        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon", "hidden_depth"):
             if not 0 < getattr(self, name) <= 10:
                 raise InputError(f"objective {name} must be above 0 and at most 10, found {getattr(self, name)!r}")
 

@@ -31,7 +31,8 @@ class OracleScorer(ScorerBase):
 
     def terms(self, poses: ArrayLike) -> Terms:
         target, batch = self.target, as_batch(poses)
-        sums = [evaluate(self._objective, target.silhouette, target.depth, self._depth(pose)) for pose in batch]
+        visible = (target.unhidden(self._depth(pose), self._objective.hidden_depth) for pose in batch)
+        sums = [evaluate(self._objective, target.silhouette, target.depth, drawn) for drawn in visible]
         clamped, matched_silhouette, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
         return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 

@@ -27,6 +27,8 @@ from depthtrack.types import Array
 HYPOTHESES, SIDE = 64, 64
 _SEED = 11
 """The first seed from 0 that leaves no pixel within half a micrometre of d_m, where float32 rounding would decide."""
+_OCCLUDER = 0.477
+"""Metres: depth of an object that hides half of what is drawn behind it, with no pixel within a micrometre."""
 ENERGY_TOLERANCE = 1e-3
 DEPTH_TOLERANCE = 1e-4
 """Metres."""
@@ -61,7 +63,10 @@ class SelfCheck:
 
 
 def scene() -> tuple[HandShape, Target, Array]:
-    """Return a hand, its target of 64 x 64 pixels, and poses (64, 27) around the true one."""
+    """Return a hand, its target of 64 x 64 pixels, and poses (64, 27) around the true one.
+
+    An object hides the left third of the image behind it, but not all of the poses there.
+    """
     shape = HandShape()
     truth = within_limits(make_pose([0, 0, 0.5], [0.1, 1, 0.2, 0.1], np.full(20, 0.3)))
     rng = np.random.Generator(np.random.Philox(key=_SEED))
@@ -72,7 +77,10 @@ def scene() -> tuple[HandShape, Target, Array]:
     with OracleScorer(shape) as oracle:
         oracle.set_target(blank)
         depth = oracle.render(truth)
-    return shape, Target(camera, depth > 0, depth), poses
+    occluder = np.zeros(camera.shape, np.float32)
+    occluder[:, : SIDE // 3] = _OCCLUDER
+    seen = np.where(occluder > 0, np.float32(0), depth)
+    return shape, Target(camera, seen > 0, seen, occluder=occluder), poses
 
 
 def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:

@@ -70,6 +70,12 @@ def test_agrees_with_the_oracle_in_a_region_of_the_hand(run: Run, seed: int, red
 
 
 @given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=8)
+def test_agrees_with_the_oracle_behind_an_occluder(run: Run, seed: int) -> None:
+    run(views.assert_occluded_window_agrees, seed)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_agrees_with_the_oracle_through_any_camera(run: Run, seed: int) -> None:
     run(views.assert_any_camera_agrees, seed)
@@ -176,8 +182,12 @@ def test_the_kernel_sums_tiles_like_the_plain_evaluation(seed: int) -> None:
     regions, sums = np.tile([0, 0, w, h], (count, 1)), np.empty((count, 3))
     empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(silhouette.sum())
     limits = objective.match_depth, objective.clamp_depth
-    sum_tiles(tiles, columns, regions, depth, silhouette.astype(np.float32), empty, *limits, sums)
-    expected = [evaluate(objective, silhouette, depth, image) for image in rendered]
+    occluder = np.where(rng.random((h, w)) < 0.3, rng.uniform(0.4, 0.5, (h, w)), 0)
+    target = Target(Camera(w, h, 60, 60, 0, 0), silhouette, depth, occluder=occluder)
+    maps = depth, silhouette.astype(np.float32), target.hidden_from(objective.hidden_depth)
+    sum_tiles(tiles, columns, regions, *maps, empty, *limits, sums)
+    visible = [target.unhidden(image, objective.hidden_depth) for image in rendered]
+    expected = [evaluate(objective, silhouette, depth, image) for image in visible]
     np.testing.assert_allclose(sums, expected, rtol=1e-5, atol=1e-5)
 
 

@@ -184,10 +184,13 @@ class Renderer:
         return _texture(gl)
 
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
-        """Write an observation (h, w, 2) to a texture: depth (metres) and silhouette (0 or 1)."""
+        """Write an observation (h, w, 3) to a texture.
+
+        It holds depth (metres), silhouette (0 or 1), and the inverse depth (1/m) that a visible surface exceeds.
+        """
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
-        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RG32F, width, height, 0, gl.GL_RG, gl.GL_FLOAT, observation)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RGB32F, width, height, 0, gl.GL_RGB, gl.GL_FLOAT, observation)
 
     def _describe_instances(self, gl: Any) -> None:
         gl.glBindVertexArray(self._vertices)

@@ -57,7 +57,7 @@ class KernelArrays:
     def allocate_images(self, shape: tuple[int, int], threads: int) -> None:
         """Allocate the images (h, w) of the target, tiled, and the workspace of each thread."""
         self.workspaces = [Workspace.of(shape) for _ in range(threads)]
-        self.observed, self.silhouette = tiles.new_tiled_image(shape), tiles.new_tiled_image(shape)
+        self.observed, self.silhouette, self.hidden_from = (tiles.new_tiled_image(shape) for _ in range(3))
 
     def score_tickets(self, thread: int, spin_limit: int) -> None:
         """Score poses of the batch in this thread until `queue.pop` returns -1."""
@@ -70,6 +70,7 @@ class KernelArrays:
             self.camera,
             self.observed,
             self.silhouette,
+            self.hidden_from,
             self.empty,
             self.objective,
             *self.workspaces[thread].arrays,

@@ -108,7 +108,7 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth):
+def _compare(observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
     Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
@@ -124,7 +124,7 @@ def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, cl
         for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             w = _load(buffer, index)
             o = _load(observed, index)
-            drawn = w > 0.0
+            drawn = w > _load(hidden_from, index)
             z = estimated_reciprocal(w)
             z = z + z * (one - w * z)
             difference = vabs(o - z)
@@ -150,6 +150,7 @@ def score_poses(
     camera: Array,
     observed: Array32,
     silhouette: Array32,
+    hidden_from: Array32,
     empty: Array,
     objective: Array,
     scratch: Array,
@@ -169,6 +170,7 @@ def score_poses(
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     silhouette: 0 or 1, tiled.
+    hidden_from: inverse depth, 1/m, that a visible surface exceeds, tiled; 0 without an occluder.
     empty: (3,) sums of Eq. (2) for an empty image.
     objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
@@ -184,7 +186,7 @@ def score_poses(
             break
         tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
         clamped, on_silhouette, matched = _compare(
-            observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth
+            observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
         )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
