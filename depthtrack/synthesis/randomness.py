@@ -26,6 +26,7 @@ class Stream(IntEnum):
     ARM = 8
     LIGHT = 9
     DEPTH_NOISE = 10
+    HELD = 11
 
 
 def generator(seed: int, frame: int, stream: Stream) -> np.random.Generator:
