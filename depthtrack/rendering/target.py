@@ -92,6 +92,13 @@ class Target:
             return np.zeros(self.camera.shape, np.float32)
         return np.where(self.occluder > 0, np.float32(1) / (self.occluder + np.float32(behind)), np.float32(0))
 
+    def with_occluder(self, rendered: Depth) -> Depth:
+        """Return the nearer of a rendered depth map (h, w), metres, and the occluder."""
+        if self.occluder is None:
+            return rendered
+        before = (self.occluder > 0) & ((rendered == 0) | (self.occluder < rendered))
+        return np.where(before, self.occluder, rendered)
+
     def unhidden(self, rendered: ArrayLike, behind: float) -> Array:
         """Return a rendered depth map (h, w), metres, with 0 where the occluder hides it.
 

@@ -16,7 +16,6 @@ import cv2
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
@@ -93,7 +92,7 @@ def evidence_of(
 ) -> Evidence:
     """Return the evidence of a pose (27,).
 
-    rendered: (h, w) depth of the posed hand, metres.
+    rendered: (h, w) depth of the posed hand without what an occluder hides, metres.
     visibility: (5,) of the fingers.
     energy: in multiples of `Objective.clamp`.
     """
@@ -155,12 +154,18 @@ def _thick(mask: Mask, pixel: float) -> int:
     return int(cv2.erode(mask.view(np.uint8), np.ones((side, side), np.uint8)).sum())
 
 
-def finger_visibility(model: HandModel, pose: Array, rendered: Depth, camera: Camera) -> Array:
+def finger_visibility(model: HandModel, pose: Array, rendered: Depth, target: Target) -> Array:
     """Return the visible share (5,) of the points along each finger's bones.
+
+    Points behind the hand's own surface or behind the target's occluder are hidden.
 
     pose: (27,).
     rendered: (h, w) depth of the posed hand, metres; 0 for none.
     """
     ends = model.endpoints(pose).reshape(5, 4, 3)
     points = np.concatenate([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=1)
-    return np.asarray(points_in_view(points, rendered, camera).mean(axis=1))
+    visible = points_in_view(points, rendered, target.camera)
+    if target.occluder is not None:
+        # Bones lie inside the fingers: none is behind an object that does not hide its finger.
+        visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
+    return np.asarray(visible.mean(axis=1))

@@ -109,7 +109,8 @@ class StageTracker:
         """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""
         tools, state = self._tools, self._state
         target, rendered = tools.scorer.target, tools.scorer.render(best.pose)
-        visibility = finger_visibility(tools.model, best.pose, rendered, target.camera)
+        visibility = finger_visibility(tools.model, best.pose, rendered, target)
+        rendered = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
         usual = state.median_energy if state.median_energy < np.inf else best.energy
         ratio = float(np.log(max(best.energy, _LEAST_ENERGY) / max(usual, _LEAST_ENERGY)))
         energy = best.energy / tools.scoring.objective.clamp

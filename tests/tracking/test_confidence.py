@@ -2,6 +2,7 @@
 
 import math
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,8 +76,21 @@ def test_folded_fingers_are_hidden_behind_the_back_of_the_hand(everyday_skin: Sy
         with closing(create_tracker(tracker_config("ik"), HAND)) as tracker:
             tracker._tools.set_target(observation)
             rendered = tracker._tools.scorer.render(pose)
-        shares.append(finger_visibility(MODEL, pose, rendered, observation.camera)[1:].mean())
+        shares.append(finger_visibility(MODEL, pose, rendered, observation)[1:].mean())
     assert shares[0] > shares[1]
+
+
+def test_fingers_behind_an_object_are_hidden(everyday_skin: Synthesiser) -> None:
+    observation = observe(everyday_skin, 20)
+    pose, nothing = everyday_skin.poses[20], np.zeros(observation.camera.shape, np.float32)
+    tips = observation.camera.project(MODEL.endpoints(pose).reshape(5, 4, 3)[:, -1])
+    u, v = np.meshgrid(*map(np.arange, nothing.shape[::-1]))
+    ball = np.hypot(u - tips[1, 0], v - tips[1, 1]) < 25
+    for distance, hides in ((0.3, True), (0.7, False)):
+        occluder = np.where(ball, distance, 0).astype(np.float32)
+        shares = finger_visibility(MODEL, pose, nothing, replace(observation, occluder=occluder))
+        assert (shares[1] < 0.8) == hides
+    assert finger_visibility(MODEL, pose, nothing, observation).min() == 1
 
 
 @pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
