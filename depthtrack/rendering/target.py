@@ -18,7 +18,7 @@ class Target:
     camera: of the region of interest.
     silhouette: (h, w) true for pixels of the hand.
     depth: (h, w) metres, 0 = no reading of the hand.
-    occluder: (h, w) metres, readings of an object that may hide the hand, 0 = none; None for no object.
+    occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
 
     A hypothesis behind the occluder is not drawn there: Eq. (2) compares what a camera would observe.
 

@@ -5,6 +5,8 @@ the reach, such as walls and tables, are left out. So are parts as small or as t
 Without colour an object in the hand is connected to it, and belongs to the hand.
 """
 
+import math
+
 import cv2
 import numpy as np
 
@@ -12,7 +14,7 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.continuing_surfaces import READING, without_continuing_surfaces
 from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.masks import HandMasks
-from depthtrack.segmentation.morphology import disc
+from depthtrack.segmentation.morphology import disc, eroded
 from depthtrack.segmentation.options import OccluderOptions
 from depthtrack.segmentation.roi_tracking import mark_reachable
 from depthtrack.segmentation.wrist import WristPlane
@@ -22,7 +24,7 @@ from depthtrack.types import Array, Depth, Mask
 def find_occluder(
     frame: Frame, masks: HandMasks, centre: Array, wrist: WristPlane | None, hand: HandSize, options: OccluderOptions
 ) -> Depth | None:
-    """Return the depth (h, w) of objects, metres, 0 elsewhere; None without any.
+    """Return the depth (h, w) up to which objects are solid, metres; None without objects.
 
     masks: of the hand; the result covers their region.
     centre: (3,) of the palm on the visible surface, metres, camera frame.
@@ -41,16 +43,40 @@ def find_occluder(
     if np.count_nonzero(readings) * (float(centre[2]) / camera.fx) ** 2 < options.least_area:
         return None
     readings = without_continuing_surfaces(depth, kinds, readings, camera.fx, options.max_jump, options.border_share)
-    thick = _thick_parts(readings, float(centre[2]) / camera.fx, options)
-    if not thick.any():
+    pixel = float(centre[2]) / camera.fx
+    parts = _thick_parts(readings, pixel, options)
+    if not parts:
         return None
-    found = _over_missing_readings(np.where(thick, depth, np.float32(0)), depth, round(options.gap * camera.width))
+    found = np.zeros_like(depth)
+    for part in parts:
+        found[part] = solid_depth(depth, part, pixel)[part]
+    found = _over_missing_readings(found, depth, round(options.gap * camera.width))
     found[own] = 0
     return masks.region.crop(region.paste(found, camera.rect))
 
 
-def _thick_parts(mask: Mask, pixel: float, options: OccluderOptions) -> Mask:
-    """Return the parts of a mask (h, w) that are neither thin nor small.
+def solid_depth(depth: Depth, part: Mask, pixel: float) -> Depth:
+    """Return the depth (h, w) up to which an object is solid at least, metres.
+
+    depth: (h, w) metres.
+    part: (h, w) its pixels.
+    pixel: side of one, metres.
+
+    A convex object contains what lies between its visible surface and the plane through its outline. A plane's inverse
+    depth is linear in the pixel. Half a sphere bulges most, by its radius.
+    """
+    rim = part & ~eroded(part, 1)
+    v, u = np.nonzero(rim if np.count_nonzero(rim) > 2 else part)
+    plane, *_ = np.linalg.lstsq(np.stack([u, v, np.ones(len(u))], axis=1), 1 / depth[v, u].astype(np.float64))
+    rows, columns = np.ogrid[: depth.shape[0], : depth.shape[1]]
+    inverse = plane[0] * columns + plane[1] * rows + plane[2]
+    radius = pixel * math.sqrt(np.count_nonzero(part) / math.pi)
+    behind = np.divide(1, inverse, out=np.zeros(depth.shape), where=inverse > 0)
+    return np.clip(behind, depth, depth + radius).astype(np.float32)
+
+
+def _thick_parts(mask: Mask, pixel: float, options: OccluderOptions) -> list[Mask]:
+    """Return the connected parts of a mask (h, w) that are neither thin nor small.
 
     pixel: its side, metres.
     """
@@ -59,7 +85,7 @@ def _thick_parts(mask: Mask, pixel: float, options: OccluderOptions) -> Mask:
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
     large = statistics[:, cv2.CC_STAT_AREA] * pixel**2 >= options.least_area
     large[0] = False
-    return np.asarray(large[labels])
+    return [labels == label for label in np.flatnonzero(large)]
 
 
 def _over_missing_readings(found: Depth, depth: Depth, radius: int) -> Depth:

@@ -8,6 +8,7 @@ import pytest
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.occluder import solid_depth
 from depthtrack.segmentation.options import OccluderOptions, SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
@@ -40,6 +41,29 @@ def test_a_sphere_in_the_hand_is_an_occluder(guided: bool) -> None:
     assert (there & sphere).sum() > 0.5 * sphere.sum()
     assert (there & sphere).sum() > 0.9 * there.sum()
     assert not (there & (found.silhouette | (found.depth > 0))).any()
+
+
+@pytest.mark.parametrize(("bulge", "expected"), [(0.02, 0.02), (0.0, 0.0), (-0.02, 0.0)])
+def test_an_object_is_solid_up_to_the_plane_of_its_outline(bulge: float, expected: float) -> None:
+    radius = 40
+    v, u = np.mgrid[:150, :200]
+    away = np.hypot(u - 110, v - 70) / radius
+    part = away < 1
+    # A slanted plane, and a cap before or behind it.
+    plane = 0.5 / (1 + 0.001 * (u - 110))
+    depth = (plane - bulge * np.sqrt(np.clip(1 - away**2, 0, 1))).astype(np.float32)
+    solid = solid_depth(depth, part, 0.001)
+    assert (solid - depth)[70, 110] == pytest.approx(expected, abs=5e-3)
+    assert np.all(solid >= depth)
+
+
+def test_an_object_is_no_deeper_than_a_ball_of_its_area() -> None:
+    depth = np.full((60, 60), 0.7, np.float32)
+    depth[10:50, 10:50] = 0.4
+    part = np.zeros(depth.shape, bool)
+    part[9:51, 9:51] = True  # its outline is on what lies behind
+    solid = solid_depth(depth, part, 0.001)
+    assert (solid - depth)[30, 30] == pytest.approx(0.001 * 42 / np.sqrt(np.pi), abs=1e-5)
 
 
 @pytest.mark.parametrize("guided", [True, False])
