@@ -46,7 +46,7 @@ class KernelArrays:
 
     def __init__(self, hand: Array, objective: Array, tickets: Tickets) -> None:
         self.hand, self.objective, self.tickets = hand, objective, tickets
-        self.camera, self.empty = np.empty(8), np.empty(3)
+        self.camera, self.empty, self.has_occluder = np.empty(8), np.empty(3), np.zeros(1, np.bool_)
         self.workspaces: list[Workspace] = []
         self.allocate_poses(256)
 
@@ -70,6 +70,7 @@ class KernelArrays:
             self.camera,
             self.observed,
             self.silhouette,
+            self.has_occluder,
             self.hidden_from,
             self.empty,
             self.objective,

@@ -32,7 +32,7 @@ from depthtrack.simd.vectors import (
     store,
     vmin,
 )
-from depthtrack.types import Array, Array32, Index
+from depthtrack.types import Array, Array32, Index, Mask
 
 _load = loader(F32X16)
 _fill = filler(F32X16)
@@ -108,7 +108,7 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth):
+def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
     Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
@@ -124,7 +124,7 @@ def _compare(observed, silhouette, hidden_from, buffer, tile_rows, low, high, ma
         for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             w = _load(buffer, index)
             o = _load(observed, index)
-            drawn = w > _load(hidden_from, index)
+            drawn = w > _load(hidden_from, index) if has_occluder else w > 0.0
             z = estimated_reciprocal(w)
             z = z + z * (one - w * z)
             difference = vabs(o - z)
@@ -150,6 +150,7 @@ def score_poses(
     camera: Array,
     observed: Array32,
     silhouette: Array32,
+    has_occluder: Mask,
     hidden_from: Array32,
     empty: Array,
     objective: Array,
@@ -170,7 +171,8 @@ def score_poses(
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     silhouette: 0 or 1, tiled.
-    hidden_from: inverse depth, 1/m, that a visible surface exceeds, tiled; 0 without an occluder.
+    has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
+    hidden_from: inverse depth, 1/m, that a visible surface exceeds, tiled.
     empty: (3,) sums of Eq. (2) for an empty image.
     objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
@@ -185,9 +187,15 @@ def score_poses(
         if n < 0:
             break
         tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
-        clamped, on_silhouette, matched = _compare(
-            observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
-        )
+        # Constant arguments compile to two loops: the one without an occluder does not read `hidden_from`.
+        if has_occluder[0]:
+            clamped, on_silhouette, matched = _compare(
+                True, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
+            )
+        else:
+            clamped, on_silhouette, matched = _compare(
+                False, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
+            )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
         sums[n, 2] = empty[2] + matched - on_silhouette

@@ -57,7 +57,9 @@ class RasterScorer(ScorerBase):
             arrays.allocate_images(shape, self._threads)
         tiles.write_tiled(target.depth, np.nan, arrays.observed)
         tiles.write_tiled(target.silhouette, 0, arrays.silhouette)
-        tiles.write_tiled(target.hidden_from(self._objective.hidden_depth), 0, arrays.hidden_from)
+        arrays.has_occluder[0] = target.occluder is not None
+        if target.occluder is not None:
+            tiles.write_tiled(target.hidden_from(self._objective.hidden_depth), 0, arrays.hidden_from)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         arrays.empty[:] = clamped, 0.0, np.count_nonzero(target.silhouette)
         c = target.camera
