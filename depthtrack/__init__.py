@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from depthtrack.api.choices import open_recording as open_recording
     from depthtrack.api.comparing import compare as compare
     from depthtrack.api.comparing import comparison_table as comparison_table
+    from depthtrack.api.lifting import lift as lift
     from depthtrack.api.live import HandTracker as HandTracker
     from depthtrack.api.measuring import calibrate as calibrate
     from depthtrack.api.measuring import calibrate_rig as calibrate_rig
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from depthtrack.recording.run_folder import Run as Run
     from depthtrack.recording.sequence import Frame as Frame
     from depthtrack.recording.sequence import GroundTruth as GroundTruth
+    from depthtrack.recording.sequence import ImageKeypoints as ImageKeypoints
     from depthtrack.recording.sequence import Sequence as Sequence
     from depthtrack.recording.status import Status as Status
     from depthtrack.rendering.backends import create_scorer as create_scorer
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "api.choices": ("open_hand", "open_recording"),
     "api.comparing": ("compare", "comparison_table"),
+    "api.lifting": ("lift",),
     "api.live": ("HandTracker",),
     "api.measuring": ("calibrate", "calibrate_rig"),
     "api.runs": ("evaluate", "export_run", "joint_track", "read_run", "track"),
@@ -67,7 +70,7 @@ _MODULES = {
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),
     "recording.run_folder": ("Run",),
-    "recording.sequence": ("Frame", "GroundTruth", "Sequence"),
+    "recording.sequence": ("Frame", "GroundTruth", "ImageKeypoints", "Sequence"),
     "recording.status": ("Status",),
     "rendering.backends": ("create_scorer",),
     "segmentation.observation": ("Observation",),

@@ -1,10 +1,13 @@
 """The examples run and give the stated results."""
 
+import ast
 import re
+import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ import pytest
 import depthtrack as dt
 from depthtrack.calibration.calibrate import Measured
 from depthtrack.hand.synergies import load_synergies
+from depthtrack.recording.keypoints import HEADER, read_keypoints
 
 FOLDER = Path(__file__).parent.parent / "examples"
 FILES = sorted(FOLDER.glob("*.py"))
@@ -123,3 +127,54 @@ def test_11_a_run_is_exported(run: str, tmp_path: Path) -> None:
     track = example(11).main(run, str(tmp_path / "joints.csv"))
     assert len((tmp_path / "joints.csv").read_text().splitlines()) == FRAMES + 1
     assert track.keypoints.shape == (FRAMES, 21, 3)
+
+
+class StandInDetector:
+    """Finds two hands in each image but the first, at a corner and at the centre."""
+
+    def __init__(self) -> None:
+        self.times: list[int] = []
+
+    def __enter__(self) -> "StandInDetector":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    def detect_for_video(self, image: Any, milliseconds: int) -> SimpleNamespace:
+        self.times.append(milliseconds)
+        if len(self.times) == 1:
+            return SimpleNamespace(hand_landmarks=[], handedness=[])
+        hands = [[SimpleNamespace(x=place, y=place)] * 21 for place in (0.0, 0.5)]
+        sides = [[SimpleNamespace(score=score)] for score in (0.6, 0.9)]
+        return SimpleNamespace(hand_landmarks=hands, handedness=sides)
+
+
+def test_12_keypoints_of_mediapipe_are_read(recording: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MediaPipe, whose libraries conflict with ours, is replaced by a stand-in."""
+    detector, out = StandInDetector(), tmp_path / "keypoints.csv"
+    vision = SimpleNamespace(
+        HandLandmarkerOptions=lambda **options: options,
+        RunningMode=SimpleNamespace(VIDEO="video"),
+        HandLandmarker=SimpleNamespace(create_from_options=lambda options: detector),
+    )
+    tasks = SimpleNamespace(vision=vision, BaseOptions=lambda model_asset_path: model_asset_path)
+    image = SimpleNamespace(create_from_file=lambda path: SimpleNamespace(width=640, height=480))
+    monkeypatch.setitem(sys.modules, "mediapipe", SimpleNamespace(tasks=tasks, Image=image))
+    assert example(12).main(recording, "hand_landmarker.task", str(out)) == FRAMES - 1
+    found = read_keypoints(out)
+    assert found.rows(dt.open_recording(recording).timestamps).tolist() == list(range(FRAMES))
+    np.testing.assert_allclose(found.pixels[1, 20], (319.5, 239.5))
+    assert (found.confidence[0].max(), found.confidence[1, 0], found.side) == (0, 0.9, None)
+    assert tuple(example(12).HEADER) == HEADER
+
+
+def test_12_needs_nothing_of_depthtrack_and_states_what_is_missing(
+    recording: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tree = ast.parse((FOLDER / "12_mediapipe_keypoints.py").read_text())
+    imports = {ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)}
+    assert not any("depthtrack" in each for each in imports)
+    monkeypatch.setitem(sys.modules, "mediapipe", None)
+    with pytest.raises(SystemExit, match="pip install mediapipe"):
+        example(12).main(recording, "hand_landmarker.task", str(tmp_path / "keypoints.csv"))

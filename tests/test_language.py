@@ -46,6 +46,7 @@ REWRITTEN = (
     "examples/README.md",
     "docs/benchmarks.md",
     "docs/joints.md",
+    "docs/keypoints.md",
     "docs/limitations.md",
     "docs/metrics.md",
     "docs/parameters.md",

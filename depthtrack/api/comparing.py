@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from depthtrack.api.choices import Recording, on_damage_of, path_of
+from depthtrack.errors import InputError
 from depthtrack.evaluation.compare.comparison import Comparison
 from depthtrack.evaluation.compare.comparison import compare as compare_runs
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, tracker_results, write_results
@@ -30,6 +31,7 @@ def compare(
     seed: int = 0,
     equal_ms: float | None = None,
     jobs: int | None = None,
+    keypoints: Sequence[Path | str] | None = None,
 ) -> list[Evaluation]:
     """Compare trackers on recordings, and write results and a report to `out`.
 
@@ -42,6 +44,7 @@ def compare(
     repeats: runs per tracker and recording, with seeds from `seed` on.
     equal_ms: CPU milliseconds a frame that each tracker may take; its work is chosen to fit.
     jobs: processes, one per core if absent.
+    keypoints: a file of 2D keypoints from another detector for each recording (docs/keypoints.md).
 
     Returns:
         One evaluation per run, recording by recording; `comparison_table` prints them.
@@ -59,7 +62,12 @@ def compare(
     else:
         specs = read_specs(trackers)
     name = None if hand is None else TRUTH if hand == TRUTH else str(Path(hand).resolve())
+    if keypoints is not None and len(keypoints) != len(recordings):
+        raise InputError(f"expected keypoints of {len(recordings)} recordings, found {len(keypoints)} files")
     sources = tuple(_source(each, name, frames) for each in recordings)
+    if keypoints is not None:
+        files = (str(Path(file).resolve()) for file in keypoints)
+        sources = tuple(replace(source, keypoints=file) for source, file in zip(sources, files, strict=True))
     runs = compare_runs(Comparison(sources, tuple(specs), repeats, seed, equal_ms), folder, workers)
     evaluations = list(evaluate_runs([Path(run.folder) for run in runs], workers))
     write_results(evaluations, folder)

@@ -11,7 +11,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.machine import usable_cores
-from depthtrack.recording.sequence import Frame
+from depthtrack.recording.sequence import Frame, ImageKeypoints
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
@@ -69,12 +69,21 @@ class HandTracker(Closing):
         self._last: TrackedFrame | None = None
         self._closed = False
 
-    def update(self, depth: NDArray[Any], colour: Image | None = None, *, timestamp: float) -> Estimate:
+    def update(
+        self,
+        depth: NDArray[Any],
+        colour: Image | None = None,
+        *,
+        timestamp: float,
+        keypoints: ImageKeypoints | ArrayLike | None = None,
+    ) -> Estimate:
         """Track the hand into the next frame. An array that needs no conversion is not copied.
 
         depth: (h, w) along the optical axis; floats in metres, or uint16 in units of `camera.depth_scale`; 0 = none.
         colour: (h, w, 3) uint8 RGB registered to the depth.
         timestamp: seconds on any clock, later than that of the frame before.
+        keypoints: from another detector, in MediaPipe's order: (21, 3) column and row in the depth image, pixels, and
+            confidence, 0 to 1. Those with NaN are unknown.
 
         Returns:
             The estimate; its `pose` (27,) is None if no hand was observed.
@@ -91,6 +100,7 @@ class HandTracker(Closing):
             _checked_depth(depth, self.camera),
             None if colour is None else _checked_colour(colour, self.camera),
             self.camera,
+            None if keypoints is None else _checked_keypoints(keypoints),
         )
         if self._pipeline is None:
             segmenter = Segmenter.from_options(self._segmentation, has_colour=colour is not None)
@@ -154,3 +164,20 @@ def _checked_colour(colour: Image, camera: Camera) -> Image:
         expected = (*camera.shape, 3)
         raise InputError(f"colour must be uint8 RGB of shape {expected}, found {colour.dtype} of {colour.shape}")
     return np.ascontiguousarray(colour)
+
+
+def _checked_keypoints(keypoints: ImageKeypoints | ArrayLike) -> ImageKeypoints:
+    """Return the keypoints. Raises InputError if their shape or a confidence is wrong."""
+    if isinstance(keypoints, ImageKeypoints):
+        parts = np.asarray(keypoints.pixels), np.asarray(keypoints.confidence)
+        if (parts[0].shape, parts[1].shape) != ((21, 2), (21,)):
+            raise InputError(f"keypoints must be (21, 2) pixels and (21,) confidences, found {parts[0].shape}")
+        rows, side = np.column_stack(parts), keypoints.side
+    else:
+        rows, side = np.asarray(keypoints, dtype=np.float64), None
+    if rows.shape != (21, 3):
+        raise InputError(f"keypoints must be x, y and confidence of 21 points, found shape {rows.shape}")
+    known = np.asarray(np.isfinite(rows).all(axis=1))
+    if np.any((rows[known, 2] < 0) | (rows[known, 2] > 1)):
+        raise InputError("the confidence of keypoints must lie between 0 and 1, found other values")
+    return ImageKeypoints(np.where(known[:, None], rows[:, :2], np.nan), np.where(known, rows[:, 2], 0.0), side)

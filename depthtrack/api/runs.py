@@ -31,6 +31,7 @@ def track(
     frames: int | None = None,
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
+    keypoints: Path | str | None = None,
 ) -> Iterator[TrackedFrame]: ...
 
 
@@ -46,6 +47,7 @@ def track(
     frames: int | None = None,
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
+    keypoints: Path | str | None = None,
 ) -> Run: ...
 
 
@@ -60,6 +62,7 @@ def track(
     frames: int | None = None,
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
+    keypoints: Path | str | None = None,
 ) -> Iterator[TrackedFrame] | Run:
     """Track the hand of a recording; the poses are those of `depthtrack track`.
 
@@ -72,6 +75,7 @@ def track(
     frames: number of frames to track; all if absent.
     segmentation: how the hand is found in a frame.
     threads: threads of the renderer, one per core if absent; poses do not depend on it.
+    keypoints: path of a file of 2D keypoints from another detector (docs/keypoints.md).
 
     Returns:
         The run if `out` is given, else an iterator over tracked frames. Poses (27,) are metres, quaternion and radians
@@ -95,6 +99,7 @@ def track(
         start=start,
         frames=frames,
         on_damage=on_damage_of(sequence),
+        keypoints=None if keypoints is None else str(Path(keypoints).resolve()),
     )
     run = TrackingRun(configuration, sequence, threads)
     if out is None:

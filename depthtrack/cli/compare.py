@@ -1,6 +1,6 @@
 """`depthtrack compare`: run trackers on the same recordings and write a report."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.source_options import SourceOptions
 from depthtrack.cli.stated_default import stated_default
+from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.comparison import Comparison
@@ -37,6 +38,9 @@ class Command:
     seed: int = 0
     """Seed of the first run."""
 
+    keypoints: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.csv ...")] = ()
+    """2D keypoints from another detector, a file for each recording in their order (docs/keypoints.md)."""
+
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
 
     jobs: Annotated[int | None, stated_default(metavar="N")] = None
@@ -58,8 +62,18 @@ class Command:
         from depthtrack.evaluation.compare.comparison import Comparison
         from depthtrack.evaluation.compare.specs import read_specs
 
+        if self.keypoints and len(self.keypoints) != len(self.sequences):
+            raise InputError(
+                f"--keypoints needs a file for each recording, found {len(self.keypoints)} for {len(self.sequences)}"
+            )
+        files: list[str | None] = [str(file.resolve()) for file in self.keypoints]
+        files = files or [None] * len(self.sequences)
+        sources = (
+            replace(self.recordings.source(each), keypoints=file)
+            for each, file in zip(self.sequences, files, strict=True)
+        )
         return Comparison(
-            sources=tuple(self.recordings.with_side(self.recordings.source(each)) for each in self.sequences),
+            sources=tuple(map(self.recordings.with_side, sources)),
             specs=tuple(read_specs(self.trackers)),
             repeats=self.repeats,
             seed=self.seed,

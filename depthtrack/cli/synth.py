@@ -64,6 +64,15 @@ class Command:
     seed: int = 0
     """Seed of the person, room, noise and random motion."""
 
+    keypoints: bool = False
+    """Write 2D keypoints too, as a detector finds them: `keypoints.csv`, for `track --keypoints`."""
+    keypoint_noise: Annotated[float, tyro.conf.arg(metavar="PIXELS")] = 3.0
+    """Standard deviation of the keypoints."""
+    missing_keypoints: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 10.0
+    """Share of the keypoints that are unknown."""
+    swapped_fingers: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 2.0
+    """Share of the frames in which the keypoints of two neighbouring fingers are exchanged."""
+
     overwrite: bool = False
     """Replace the recording in OUT."""
     threads: int = 2
@@ -79,7 +88,9 @@ class Command:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
 
         from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+        from depthtrack.synthesis.keypoints import KeypointErrors
 
+        errors = KeypointErrors(self.keypoint_noise, self.missing_keypoints / 100, self.swapped_fingers / 100)
         options = Synthesis(
             motion=self.motion,
             distance=self.distance,
@@ -96,6 +107,7 @@ class Command:
             frames=self.frames,
             rate=self.fps,
             seed=self.seed,
+            keypoints=errors if self.keypoints else None,
         )
         made = Synthesiser(options)
         write_recording(

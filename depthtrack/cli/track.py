@@ -48,6 +48,8 @@ class TrackCommand:
     """Start with a search, or from the recording's true pose of its first frame."""
     frames: Annotated[int | None, stated_default(metavar="N")] = None
     """Track only the first N frames."""
+    keypoints: Annotated[Path | None, stated_default(metavar="FILE.csv")] = None
+    """2D keypoints of the hand from another detector (docs/keypoints.md)."""
     resume: bool = False
     """Continue the run that the folder holds."""
     threads: Annotated[int | None, stated_default(metavar="N")] = None
@@ -138,6 +140,7 @@ class TrackCommand:
             start=self.start,
             frames=self.frames,
             on_damage=self.recording.on_damage,
+            keypoints=None if self.keypoints is None else str(self.keypoints.resolve()),
         )
 
     def _report(self, sequence: "Recording", choice: "SideChoice | None") -> None:
@@ -178,6 +181,7 @@ def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]
     recording = RecordingOptions(tyro.MISSING)
     if run is not None:
         defaults |= {"start": run.start, "frames": run.frames}
+        defaults |= {"keypoints": None if run.keypoints is None else Path(run.keypoints)}
         recording = dataclasses.replace(recording, on_damage=run.on_damage)
     return Command, Command(recording=recording, out=tyro.MISSING, **defaults)
 

@@ -9,6 +9,7 @@ import numpy as np
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
+from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.hand_surface import HandSurface
@@ -114,6 +115,9 @@ class Replay:
         segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)
         row_of = {int(index): row for row, index in enumerate(self.run.index)}
         frames = self.sequence.frames(map(int, self.run.index))
+        if self.configuration.keypoints is not None:
+            keypoints = read_keypoints(Path(self.configuration.keypoints))
+            frames = keypoints.attach(frames, self.sequence.timestamps)
         known = ((frame, estimate_of(self.run, row_of[frame.index])) for frame in frames)
         for each in replay_frames(known, guide, segmenter, self.hand):
             yield ReplayedFrame(row_of[each.frame.index], each.frame, each.observation, each.estimate)

@@ -2,7 +2,7 @@
 
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
 agreement, confidence, visibility of each finger and the pose, which is empty if there is none. `timings.csv` has the
-milliseconds of each stage.
+milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed beside it.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
@@ -18,8 +18,10 @@ import numpy as np
 
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
-from depthtrack.files import read_lines, read_text, write_atomic
+from depthtrack.files import read_text, write_atomic
 from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_NAMES, POSE_SIZE
+from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, read_branches
+from depthtrack.recording.run_tables import header_of, read_table, rewrite_table
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
@@ -29,8 +31,6 @@ _EARLIER_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POS
 VISIBILITY_COLUMNS = tuple(f"{finger}_visible" for finger in FINGERS)
 _COLUMNS = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
 UNKNOWN_VISIBILITY = (math.nan,) * len(FINGERS)
-_LARGEST_TABLE = 1 << 29
-"""Bytes: eight hours at 30 Hz, and a bound on memory."""
 _LARGEST = 100.0
 """Bound on the numbers of a pose, metres and radians."""
 _LATEST = 1e12
@@ -48,6 +48,7 @@ class RunRow:
     pose: (27,) metres, quaternion, radians, camera frame; None if no hand was observed.
     confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
+    branches: alternatives to the pose.
     """
 
     index: int
@@ -58,6 +59,7 @@ class RunRow:
     pose: Array | None
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
+    branches: tuple[Branch, ...] = ()
 
 
 class RunWriter(Closing):
@@ -86,19 +88,26 @@ class RunWriter(Closing):
             if before.get("on_damage") != configuration.get("on_damage"):
                 write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
-            _rewrite(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
-            kept = _read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
-            _rewrite(folder / "timings.csv", ("index", *self._stages), kept)
+            rewrite_table(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
+            kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
+            rewrite_table(folder / "timings.csv", ("index", *self._stages), kept)
+            branches = [cells for row in self.rows for cells in branch_rows(row.index, row.branches)]
+            rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, branches)
         else:
-            _rewrite(folder / "poses.csv", _COLUMNS, ())
-            _rewrite(folder / "timings.csv", ("index", *self._stages), ())
+            rewrite_table(folder / "poses.csv", _COLUMNS, ())
+            rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
+            rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
             write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
         self._poses = (folder / "poses.csv").open("a", newline="", encoding="utf-8")
         self._timings = (folder / "timings.csv").open("a", newline="", encoding="utf-8")
+        self._branches = (folder / "branches.csv").open("a", newline="", encoding="utf-8")
 
     def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
         """Append the next frame and the milliseconds of its stages."""
-        # Timings first: a kill between the two writes leaves a surplus row there, which resuming drops.
+        # The poses last: a kill between the writes leaves surplus rows in the other tables, which resuming drops.
+        if row.branches:
+            csv.writer(self._branches).writerows(branch_rows(row.index, row.branches))
+            self._branches.flush()
         csv.writer(self._timings).writerow([row.index, *(f"{stage_ms.get(stage, 0):.3f}" for stage in self._stages)])
         self._timings.flush()
         csv.writer(self._poses).writerow(_cells(row))
@@ -109,6 +118,7 @@ class RunWriter(Closing):
         """Close the files."""
         self._poses.close()
         self._timings.close()
+        self._branches.close()
 
 
 @dataclass(frozen=True)
@@ -183,11 +193,12 @@ def read_rows(folder: Path) -> list[RunRow]:
         InputError: if a row is malformed, or holds values that no tracker writes.
     """
     path = folder / "poses.csv"
-    columns = _EARLIER_COLUMNS if _header(path) == _EARLIER_COLUMNS else _COLUMNS
-    rows = []
-    for number, cells in enumerate(_read_table(path, columns), start=2):
+    columns = _EARLIER_COLUMNS if header_of(path) == _EARLIER_COLUMNS else _COLUMNS
+    branches, rows = read_branches(folder / "branches.csv"), list[RunRow]()
+    for number, cells in enumerate(read_table(path, columns), start=2):
         try:
-            rows.append(_row(cells))
+            row = _row(cells)
+            rows.append(replace(row, branches=branches.get(row.index, ())))
         except (ValueError, IndexError) as error:
             raise InputError(
                 f"{path}, line {number}: expected {len(columns)} values of a frame: {error!s:.120}"
@@ -195,11 +206,6 @@ def read_rows(folder: Path) -> list[RunRow]:
         if (reason := _row_fault(rows[-1])) is not None:
             raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
     return rows
-
-
-def _header(path: Path) -> tuple[str, ...]:
-    """Return the names in the first line of a table."""
-    return tuple(next(read_lines(path, _LARGEST_TABLE), "").strip().split(","))
 
 
 def _row(cells: list[str]) -> RunRow:
@@ -233,7 +239,7 @@ def _row_fault(row: RunRow) -> str | None:
 
 def _read_timings(path: Path, count: int) -> dict[str, Array]:
     """Return the milliseconds (T,) of each stage, of at most `count` frames."""
-    header, *lines = _read_table(path, None)
+    header, *lines = read_table(path, None)
     if header[:1] != ["index"]:
         raise InputError(f"{path} must begin with a line of columns, 'index' and the tracker's stages")
     rows = []
@@ -248,41 +254,10 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
     return {stage: columns[:, k] for k, stage in enumerate(header[1:])}
 
 
-def _read_table(path: Path, columns: Sequence[str] | None) -> list[list[str]]:
-    """Return the complete lines of a table, without its header if `columns` is given."""
-    lines = [line for line in read_lines(path, _LARGEST_TABLE) if line.endswith("\n")]
-    try:
-        # No cell needs quotes, so a stray quote must not join the lines after it.
-        header, *rows = list(csv.reader(lines, quoting=csv.QUOTE_NONE)) or [[]]
-    except csv.Error as error:
-        raise InputError(f"{path} must be a CSV table: {error}") from error
-    if columns is None:
-        return [header, *rows]
-    if tuple(header) != tuple(columns):
-        raise InputError(f"{path} must begin with the columns {', '.join(columns[:5])}...")
-    # A row truncated inside its line break still has all its cells.
-    if rows and len(rows[-1]) != len(columns):
-        rows.pop()
-    for number, cells in enumerate(rows, start=2):
-        if len(cells) != len(columns):
-            raise InputError(f"{path}, line {number}: expected {len(columns)} columns, found {len(cells)}")
-    return rows
-
-
 def _cells(row: RunRow) -> list[str]:
     pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
     shares = map(repr, (row.energy, row.agreement, row.confidence, *row.visibility))
     return [str(row.index), repr(row.timestamp), row.status, *shares, *pose]
-
-
-def _rewrite(path: Path, columns: Sequence[str], rows: Any) -> None:
-    import io
-
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(columns)
-    writer.writerows(rows)
-    write_atomic(path, text.getvalue())
 
 
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:

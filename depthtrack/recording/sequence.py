@@ -1,15 +1,33 @@
 """The protocol of recordings: frames one at a time, a camera, ground truth if it exists."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.types import Array, Depth, Image, Mask
+
+
+@dataclass(frozen=True)
+class ImageKeypoints:
+    """The 21 keypoints of a hand in an image, from any detector, in MediaPipe's order.
+
+    pixels: (21, 2) column and row, of the depth image; NaN if unknown.
+    confidence: (21,) 0 to 1; 0 if unknown.
+    side: side of the hand by the detector, None if unknown.
+    """
+
+    pixels: Array
+    confidence: Array
+    side: Side | None = None
+
+    def shifted(self, left: float, top: float) -> "ImageKeypoints":
+        """Return the keypoints in the part of the image whose first pixel is (left, top)."""
+        return replace(self, pixels=self.pixels - [left, top])
 
 
 @dataclass(frozen=True)
@@ -19,6 +37,7 @@ class Frame:
     timestamp: seconds.
     depth: (h, w) float32, metres along the optical axis, 0 = no reading.
     colour: (h, w, 3) uint8 RGB registered to the depth, or None.
+    keypoints: of the hand in the depth image, from elsewhere; None if there are none.
     """
 
     index: int
@@ -26,6 +45,7 @@ class Frame:
     depth: Depth
     colour: Image | None
     camera: Camera
+    keypoints: ImageKeypoints | None = None
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ from depthtrack.recording.ground_truth import (
     QUATERNION_TOLERANCE,
 )
 from depthtrack.recording.images import write_jpeg, write_png
+from depthtrack.recording.keypoints import HEADER, KEYPOINTS_FILE, keypoint_cells
+from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.recording.sequences.tum import EXACT_DEPTH_SCALE
 from depthtrack.types import Array, Image, Mask
 
@@ -95,6 +97,7 @@ class SequenceWriter:
         exact_depth: NDArray[np.floating[Any]] | None = None,
         pose: ArrayLike | None = None,
         joints: ArrayLike | None = None,
+        keypoints: ImageKeypoints | None = None,
     ) -> None:
         """Add a frame; arrays are copied.
 
@@ -105,6 +108,7 @@ class SequenceWriter:
         mask: (h, w) of the hand.
         pose: (27,) metres, quaternion, radians, camera frame.
         joints: (21, 3) metres, camera frame.
+        keypoints: in the depth image, from a detector.
 
         Frames may lack ground truth, but all annotated frames have the same parts.
 
@@ -128,6 +132,8 @@ class SequenceWriter:
         for (name, header), values in truth.items():
             # repr is the shortest text that reads back as the same float64.
             self._write_line(name, ",".join(header), ",".join([stem, *map(repr, values.ravel().tolist())]))
+        if keypoints is not None:
+            self._write_line(KEYPOINTS_FILE, ",".join(HEADER), ",".join([stem, *keypoint_cells(keypoints)]))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

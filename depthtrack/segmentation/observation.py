@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from depthtrack.geometry.rectangle import Rect
+from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.rendering.target import Target
 from depthtrack.segmentation.options import PointCloudOptions
 from depthtrack.segmentation.point_cloud import point_cloud
@@ -25,6 +26,7 @@ class Observation(Target):
     arm_direction: (3,) unit vector from the palm along the forearm, camera frame; None without a visible arm.
     wrist: plane where the forearm is cut off, if any.
     cloud_options: options of the point cloud.
+    keypoints: of the hand in the region, from elsewhere; None if there are none.
     """
 
     frame_index: int
@@ -35,6 +37,7 @@ class Observation(Target):
     arm_direction: Array | None = None
     wrist: WristPlane | None = None
     cloud_options: PointCloudOptions | None = None
+    keypoints: ImageKeypoints | None = None
 
     def whole_mask(self, shape: tuple[int, ...]) -> Mask:
         """Return the silhouette in the whole frame of `shape` (height, width)."""

@@ -105,4 +105,5 @@ class Segmenter:
             wrist=located.wrist,
             cloud_options=self._options.point_cloud,
             occluder=occluder,
+            keypoints=None if frame.keypoints is None else frame.keypoints.shifted(*masks.region[:2]),
         )

@@ -7,17 +7,20 @@ import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.geometry.rotations import quaternion_from_matrix, rotation_matrix
-from depthtrack.hand.compiled_kinematics import BodyPoses, Chain, forward_kinematics
+from depthtrack.hand.compiled_kinematics import BODY_COUNT, BodyPoses, Chain, forward_kinematics
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.correspondences import Correspondences, PointCloud, Surface
 from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import solve
+from depthtrack.solver.keypoints import local_keypoints
 from depthtrack.solver.normal_equations import NormalEquations, clear
 from depthtrack.solver.options import IcpOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradients
+from depthtrack.solver.reprojection import LinesOfSight
 from depthtrack.solver.residuals import add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.types import Array
@@ -35,6 +38,8 @@ class IcpFitter:
         self.options = options
         self._surface = surface
         self._chain, self._points = Chain.of(shape), FixedPoints.none()
+        self._local = local_keypoints(HandModel(shape))
+        self._sight: LinesOfSight | None = None
         self._bodies, self._equations = BodyPoses.empty(), NormalEquations.empty()
 
     def set_target(self, observation: Observation, every: int) -> None:
@@ -44,6 +49,10 @@ class IcpFitter:
         self._coarse = PointCloud.of(observation, every * self.options.coarse_every)
         self._coarse_matches = Correspondences.allocate(len(self._coarse.points))
         self._surface.set_target(observation, self._cloud, self.options.max_distance)
+        self._sight, self._points = None, FixedPoints.none()
+        if observation.keypoints is not None and self.options.keypoint_weight > 0:
+            self._sight = LinesOfSight.of(observation.keypoints, observation.camera, self._local)
+            self._points = self._sight.block
 
     def fit(
         self,
@@ -98,6 +107,27 @@ class IcpFitter:
         square = np.sum((self._coarse_matches.x[found] - self._coarse.points[found]) ** 2, axis=1)
         return float(1 - np.sum(1 / (1 + square / scale**2)) / max(len(found), 1))
 
+    def keypoint_trust(self, pose: Array) -> float:
+        """Return the trust in the keypoints of the observation at a pose (27,), 0 to 1.
+
+        It is 0 without keypoints.
+        """
+        if self._sight is None:
+            return 0.0
+        self._match(pose, self._coarse, self._coarse_matches, 1.0)
+        return self._trust(self._coarse_matches)
+
+    def _trust(self, correspondences: Correspondences) -> float:
+        """Return the trust in the keypoints, 0 to 1, by those of bodies with correspondences.
+
+        A set that contradicts what is observed, such as that of a hand of the other side, must not place hidden parts.
+        """
+        assert self._sight is not None
+        counts = np.bincount(correspondences.body[correspondences.body >= 0], minlength=BODY_COUNT)
+        agreement = self._sight.agreement(self._bodies, self.options.keypoint_scale, counts)
+        low, high = self.options.keypoint_trust
+        return float(np.clip((agreement - low) / (high - low), 0, 1))
+
     def _match(self, pose: Array, cloud: PointCloud, correspondences: Correspondences, progress: float) -> None:
         """Find the correspondences of a pose (27,), and accumulate their residuals."""
         kernel_scale, min_normal_cosine = self.options.annealed(progress)
@@ -105,6 +135,10 @@ class IcpFitter:
         self._surface.match(pose, self._bodies, cloud, min_normal_cosine, correspondences)
         clear(self._equations, self._bodies)
         add_correspondences(self._equations, correspondences, cloud, self.options.residual, kernel_scale)
+        if self._sight is not None:
+            share = len(cloud.points) / self.options.reference_count
+            weight = share * self.options.keypoint_weight * self._trust(correspondences)
+            self._sight.reweigh(self._bodies, weight, self.options.keypoint_scale)
 
     def _align(self, pose: Array) -> None:
         """Move the whole hand onto its correspondences, `pose` (27,) in place.

@@ -50,6 +50,14 @@ class IcpOptions:
     synergy_weight: float = option(
         3e-7, "Weight of the prior towards postures that the synergies make likely", unit="m^2"
     )
+    keypoint_weight: float = option(
+        0.1, "Weight of a keypoint from elsewhere on its line of sight, per 3000 points; 0 uses none", unit="points"
+    )
+    keypoint_scale: float = option(0.015, "Scale of the robust kernel of their distances from the hand's", unit="m")
+    keypoint_trust: tuple[float, float] = option(
+        (0.5, 0.75),
+        "Agreement of visible parts with keypoints up to which keypoints have no weight, and from which all of it",
+    )
     avoid_limits: bool = option(False, "Increase the damping towards joint limits", source=f"{_SCHROEDER}, Sec. IV-B")
     coarse_every: int = option(4, "The rigid alignment uses every n-th point", advanced=True)
     reference_count: float = option(
@@ -59,6 +67,11 @@ class IcpOptions:
     align_damping: float = option(1.0, "Damping of the fixed posture during the rigid alignment", advanced=True)
 
     def __post_init__(self) -> None:
+        if not (self.keypoint_weight >= 0 and self.keypoint_scale > 0):
+            raise InputError(
+                "keypoint_weight must be at least 0 and keypoint_scale positive, "
+                f"found {self.keypoint_weight} and {self.keypoint_scale}"
+            )
         for name in ("icp_iterations", "gn_iterations"):
             if not 1 <= getattr(self, name) <= 1000:
                 raise InputError(f"{name} must be between 1 and 1000, found {getattr(self, name)}")
@@ -81,9 +94,37 @@ PAPER_ICP = IcpOptions(
     damping=1e-6,
     temporal_weight=0.0,
     synergy_weight=0.0,
+    keypoint_weight=0.0,
     avoid_limits=True,
 )
 """Schroeder et al. 2014: point-to-point distances, equal weights, damping of the step, joint limit avoidance."""
+
+
+@dataclass(frozen=True)
+class LiftOptions:
+    """Fit of the hand to 2D keypoints and the depth near them."""
+
+    least_keypoints: int = option(8, "Fewer known keypoints are not lifted")
+    least_confidence: float = option(0.2, "Keypoints of a lower confidence count as unknown")
+    window: float = option(0.006, "Half the side of the window whose median depth is read at a keypoint", unit="m")
+    farthest: float = option(
+        0.12, "Readings farther from their median, on an average hand, are those of the background", unit="m"
+    )
+    rounds: int = option(8, "Rounds of robust weights")
+    scale: tuple[float, float] = option(
+        (0.06, 0.015), "Scale of the Geman-McClure robust kernel in the first and the last round", unit="m"
+    )
+    along_weight: float = option(0.5, "Weight of the depth of a keypoint, against its place across the line of sight")
+    spread: float = option(0.006, "Standard deviation of keypoints, which priors are weighed against", unit="m")
+    angle_motion: float = option(0.35, "Standard deviation of the angles about those of the last frame", unit="rad")
+
+    def __post_init__(self) -> None:
+        if self.least_keypoints < 4 or self.rounds < 1:
+            raise InputError(
+                f"a lift needs at least 4 keypoints and 1 round, found {self.least_keypoints} and {self.rounds}"
+            )
+        if min(*self.scale, self.window, self.spread, self.angle_motion) <= 0 or self.along_weight < 0:
+            raise InputError("the lengths, scales and weights of a lift must be positive")
 
 
 @dataclass(frozen=True)

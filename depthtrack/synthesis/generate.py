@@ -15,9 +15,11 @@ from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.options import check_seed
+from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.recording.writer import SequenceWriter
 from depthtrack.synthesis.backdrop import Backdrop
 from depthtrack.synthesis.held_object import HeldKind, HeldObject
+from depthtrack.synthesis.keypoints import KeypointErrors, detected_keypoints
 from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
 from depthtrack.synthesis.painting import Painter, SkinTone, flip_skin
 from depthtrack.synthesis.randomness import Stream, generator
@@ -48,6 +50,7 @@ class Synthesis:
     skin_flips: share of pixels with a flipped skin label, 0 to 1.
     frames: number of frames; None for the whole motion.
     rate: frames a second, Hz.
+    keypoints: errors of 2D keypoints that are written too; None for no keypoints.
     """
 
     motion: str = "everyday"
@@ -65,6 +68,7 @@ class Synthesis:
     frames: int | None = None
     rate: float = 30.0
     seed: int = 0
+    keypoints: KeypointErrors | None = None
 
     def __post_init__(self) -> None:
         kinds = {"background": BackgroundKind, "model": HandKind, "sensor": SensorName, "held_object": HeldKind}
@@ -94,6 +98,7 @@ class SyntheticFrame:
     exact_depth (h, w): rendered depth, metres.
     pose (27,): camera frame, see `hand.pose`.
     joints (21, 3): keypoints, metres, camera frame.
+    keypoints: as a detector finds them in the image, None without one.
     """
 
     timestamp: float
@@ -104,6 +109,7 @@ class SyntheticFrame:
     exact_depth: Array
     pose: Array
     joints: Array
+    keypoints: ImageKeypoints | None = None
 
 
 class Synthesiser:
@@ -166,6 +172,7 @@ class Synthesiser:
             exact_depth=surface.depth,
             pose=self.poses[index],
             joints=self.joints[index],
+            keypoints=self._keypoints(index),
         )
 
     def frames(self, threads: int = 2) -> Iterator[SyntheticFrame]:
@@ -183,9 +190,17 @@ class Synthesiser:
         """Return the content of `sequence.json`: all options and the program's version."""
         options = asdict(self.options) | {"distance": self.distance, "forearm": self.has_forearm, "frames": len(self)}
         options["hand"] = self.options.hand.side
+        if self.options.keypoints is None:
+            del options["keypoints"]
         if self.options.hand.rig is not None and self.options.model == "skin":
             options |= {"model": "rig", "rig": self.options.hand.rig.path.name, "sha256": self.options.hand.rig.sha256}
         return {"made_by": f"depthtrack {__version__} synth", "about": self.motion.about, **options}
+
+    def _keypoints(self, index: int) -> ImageKeypoints | None:
+        errors, random = self.options.keypoints, self._random(index, Stream.KEYPOINTS)
+        if errors is None:
+            return None
+        return detected_keypoints(self.joints[index], self.sensor.camera, self.options.hand.side, errors, random)
 
     def _backdrop(self, rng: np.random.Generator) -> Backdrop:
         backdrop = Backdrop.empty(self.sensor.camera, face=SkinTone.sample(rng).back)
@@ -258,4 +273,5 @@ def write_recording(
                 exact_depth=frame.exact_depth,
                 pose=frame.pose,
                 joints=frame.joints,
+                keypoints=frame.keypoints,
             )

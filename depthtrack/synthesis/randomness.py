@@ -26,7 +26,8 @@ class Stream(IntEnum):
     ARM = 8
     LIGHT = 9
     DEPTH_NOISE = 10
-    HELD = 11
+    KEYPOINTS = 11
+    HELD = 12
 
 
 def generator(seed: int, frame: int, stream: Stream) -> np.random.Generator:

@@ -7,12 +7,14 @@ from typing import ClassVar, Literal
 from depthtrack.errors import InputError
 from depthtrack.options import check_seed, option
 from depthtrack.rendering.options import ScoringOptions
-from depthtrack.solver.options import PAPER_ICP, SurfaceFitOptions, SwarmOptions
+from depthtrack.solver.options import PAPER_ICP, LiftOptions, SurfaceFitOptions, SwarmOptions
 from depthtrack.tracking.options import (
+    BranchOptions,
     FingerOptions,
     FitRound,
     FitSearchOptions,
     GlobalSearchOptions,
+    KeypointOptions,
     RecoveryOptions,
     Spread,
     SurfaceChoiceOptions,
@@ -77,6 +79,8 @@ class PsoConfig:
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(), "Swarms of a search", advanced=True)
     recovery: RecoveryOptions = option(RecoveryOptions(), "Local re-initialisation", advanced=True)
     fingers: FingerOptions = option(FingerOptions(), "Search of single fingers", advanced=True)
+    keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
@@ -115,6 +119,8 @@ class IkConfig:
         advanced=True,
     )
     fingers: FingerOptions = option(_FIT_FINGERS, "Search of single fingers", advanced=True)
+    keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
@@ -162,6 +168,8 @@ class HybridConfig:
     )
     routine_search: FitSearchOptions = option(_ROUTINE_FITS, "Surface fits of a routine local search", advanced=True)
     fingers: FingerOptions = option(_HYBRID_FINGERS, "Search of single fingers", advanced=True)
+    keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
+    branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers")
@@ -221,14 +229,32 @@ class Schroeder2014Config:
         check_seed(self.seed)
 
 
+@dataclass(frozen=True)
+class LiftConfig:
+    """Lift: poses from keypoints of another detector and the depth near them."""
+
+    name: ClassVar[str] = "lift"
+
+    lift: LiftOptions = option(LiftOptions(), "Fit of the hand to keypoints and the depth near them")
+    refine: bool = option(True, "Fit the lifted pose to the surface, and keep the one with the lower energy")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the lifted pose", advanced=True)
+    thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    seed: int = option(0, "Seed of the random numbers, which the lift does not use")
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+
+
 DEFAULT_TRACKER = "hybrid"
 
-TrackerConfig = HybridConfig | PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config
-TrackerName = Literal["hybrid", "pso", "ik", "oikonomidis2011", "schroeder2014"]
+TrackerConfig = HybridConfig | PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config | LiftConfig
+TrackerName = Literal["hybrid", "pso", "ik", "oikonomidis2011", "schroeder2014", "lift"]
 CONFIGURATIONS: dict[str, type[TrackerConfig]] = {
     "hybrid": HybridConfig,
     "pso": PsoConfig,
     "ik": IkConfig,
     "oikonomidis2011": Oikonomidis2011Config,
     "schroeder2014": Schroeder2014Config,
+    "lift": LiftConfig,
 }

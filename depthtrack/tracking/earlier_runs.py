@@ -1,9 +1,10 @@
 """Run folders of earlier layouts of `run.json`.
 
 Those without a format version hold flat options of the trackers pso and ik. Those of format 2 count the memory of a
-track in frames.
+track in frames. Before format 4, trackers followed no branches.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -40,8 +41,23 @@ def upgraded(fields: Mapping[str, Any], where: str) -> Mapping[str, Any]:
         InputError: if those versions had no such tracker.
     """
     if "format" not in fields:
-        return _nested(fields, where)
-    return _with_seconds(fields) if fields["format"] == 2 else fields
+        fields = _nested(fields, where)
+    if fields["format"] == 2:
+        fields = _with_seconds(fields)
+    return _without_branches(fields) if fields["format"] == 3 else fields
+
+
+def _without_branches(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the contents of format 3 without searches for branches."""
+    options, name = fields.get("options"), fields.get("tracker")
+    if isinstance(options, dict) and isinstance(name, str) and "branches" in _option_names(name):
+        options = {**options, "branches": {"interval": 0.0}}
+    return {**fields, "format": 4, "options": options}
+
+
+def _option_names(tracker: str) -> set[str]:
+    """Return the names of the options of a tracker; none if there is no such tracker."""
+    return {each.name for each in dataclasses.fields(CONFIGURATIONS[tracker])} if tracker in CONFIGURATIONS else set()
 
 
 def _with_seconds(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,12 +8,14 @@ import numpy as np
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
+from depthtrack.recording.branches import Branch
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
-from depthtrack.solver.options import SurfaceFitOptions, SurfaceName
+from depthtrack.solver.lifting import Lifter
+from depthtrack.solver.options import LiftOptions, SurfaceFitOptions, SurfaceName
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.state import TrackState
@@ -33,6 +35,7 @@ class Toolkit:
         self.synergies = synergies or load_synergies()
         self._coarse: dict[int, Scorer] = {}
         self._fitters: dict[SurfaceFitOptions, IcpFitter] = {}
+        self._lifters: dict[LiftOptions, Lifter] = {}
         self._targets: dict[object, Observation] = {}
 
     def set_target(self, observation: Observation) -> None:
@@ -70,6 +73,12 @@ class Toolkit:
             self._targets[options] = observation
         return fitter
 
+    def lifter(self, options: LiftOptions) -> Lifter:
+        """Return a lifter of keypoints with these options."""
+        if options not in self._lifters:
+            self._lifters[options] = Lifter(self.model, self.synergies, options)
+        return self._lifters[options]
+
     def close(self) -> None:
         """Free the renderers."""
         for scorer in (self.scorer, *self._coarse.values()):
@@ -83,6 +92,7 @@ class FrameContext:
     start_pose: (27,) pose given by the user, or None.
     predictions: candidates that `Predict` made, best first.
     restarted: whether a search replaced the track, so that the status becomes `started`.
+    branches: alternatives to the pose that the next frame goes on with.
     surface: surface that all fits of the frame use, None for that of their options.
     """
 
@@ -93,6 +103,7 @@ class FrameContext:
     start_pose: Array | None = None
     predictions: list[Candidate] = field(default_factory=list)
     restarted: bool = False
+    branches: tuple[Branch, ...] = ()
     surface: SurfaceName | None = None
 
     @cached_property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from depthtrack.errors import InputError
 from depthtrack.options import option
-from depthtrack.solver.options import IcpOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
+from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 
 Spread = tuple[float, float, float]
 """Standard deviations of position, rotation and angles."""
@@ -167,6 +167,29 @@ class FingerOptions:
 
 
 @dataclass(frozen=True)
+class BranchOptions:
+    """Alternatives to the tracked pose that are followed beside it."""
+
+    interval: float = option(1.0, "Time between two searches for alternatives; 0: never", unit="s")
+    search: GlobalSearchOptions = option(
+        GlobalSearchOptions(proposals=400, synergy_share=0.5), "Proposals of such a search"
+    )
+    turned: int = option(32, "Postures in which the tracked hand is turned over")
+    fits: FitSearchOptions = option(
+        FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 6))), "Surface fits of such a search"
+    )
+    least_distance: float = option(0.015, "Least mean distance of its joints from those of the tracked pose", unit="m")
+    carried: int = option(2, "Alternatives that are followed, at most")
+    admit: float = option(1.3, "Energy ratio to the tracked pose below which an alternative is followed")
+    give_up: float = option(1.4, "Mean energy ratio above which it is given up")
+    decide_after: float = option(0.3, "Time that an alternative is followed before it may be accepted", unit="s")
+    accept_at_once: float = option(0.75, "Mean energy ratio below which it replaces the tracked pose before")
+    accept: float = option(0.93, "Mean energy ratio below which it replaces the tracked pose")
+    accept_late: float = option(1.1, "Mean energy ratio above which it is given up after that time")
+    longest: float = option(0.9, "Longest time that an alternative is followed", unit="s")
+
+
+@dataclass(frozen=True)
 class SynergyOptions:
     """Hand synergies that a fit uses (Schroeder et al. 2014, Sec. V)."""
 
@@ -191,6 +214,20 @@ class SurfaceChoiceOptions:
     iterations: int = option(3, "Rounds of correspondences of each brief fit")
     scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
     accept: float = option(0.85, "Residual ratio below which another surface than the preferred one is used")
+
+
+@dataclass(frozen=True)
+class KeypointOptions:
+    """Proposals from keypoints of another detector: at starts, and if the pose contradicts them.
+
+    The robust cost of keypoints lies between 0, on their lines of sight, and 1.
+    """
+
+    lift: LiftOptions = option(LiftOptions(), "Fit of the hand to keypoints and the depth near them")
+    contradicted: float = option(0.25, "Robust cost of the keypoints above which they are lifted to other poses")
+    finger: float = option(0.5, "Robust cost of a finger's keypoints above which its lifted angles are tried")
+    accept: float = option(0.97, "Energy ratio below which a lifted pose is accepted")
+    tie: float = option(0.1, "Share of its energy that the robust cost of 1 adds to a pose that is compared")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.wrist import WristPlane
+from depthtrack.tracking.keypoint_guide import KeypointGuide
 from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
 
@@ -57,6 +58,7 @@ class Pipeline:
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._tracker, self._segmenter, self._model = tracker, segmenter, HandModel(hand)
+        self._keypoints = KeypointGuide(self._model)
         self._start_pose, self._clock = start_pose, clock
 
     def step(self, frame: Frame, known: Estimate | None = None) -> TrackedFrame:
@@ -64,7 +66,9 @@ class Pipeline:
 
         known: estimate that the tracker made of this frame before; the state is restored from it instead.
         """
-        observation, milliseconds = segment(frame, self._segmenter, self._model, self._tracker, self._clock)
+        observation, milliseconds = segment(
+            frame, self._segmenter, self._model, self._tracker, self._keypoints, self._clock
+        )
         if known is not None:
             self._tracker.restore([known])
             estimate = known
@@ -120,18 +124,28 @@ def replay_frames(
     guide: restores the ROI prior from the estimates.
     """
     model = HandModel(hand)
+    keypoints = KeypointGuide(model)
     for frame, estimate in frames:
-        observation, milliseconds = segment(frame, segmenter, model, guide, time.perf_counter)
+        observation, milliseconds = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
         yield TrackedFrame(frame, observation, estimate, milliseconds)
 
 
 def segment(
-    frame: Frame, segmenter: Segmenter, model: HandModel, guide: Guide, clock: Callable[[], float]
+    frame: Frame,
+    segmenter: Segmenter,
+    model: HandModel,
+    guide: Guide,
+    keypoints: KeypointGuide,
+    clock: Callable[[], float],
 ) -> tuple[Observation | None, float]:
-    """Return the observation of a frame near the prediction, and the time in milliseconds."""
+    """Return the observation of a frame, and the time in milliseconds.
+
+    It is near the prediction, else near the keypoints of the frame.
+    """
     begun = clock()
-    observation = segmenter.segment(frame, roi_prior(model, guide.predicted_pose(frame.timestamp)))
+    pose = guide.predicted_pose(frame.timestamp)
+    observation = segmenter.segment(frame, roi_prior(model, keypoints.pose(frame) if pose is None else pose))
     return observation, 1e3 * (clock() - begun)
 
 
@@ -163,6 +177,7 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
             estimate.pose,
             estimate.confidence,
             estimate.visibility,
+            estimate.branches,
         )
         run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
         yield each
@@ -171,6 +186,16 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
 def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
     """Return the estimates that a run folder holds."""
     return [
-        Estimate(row.pose, row.energy, row.agreement, row.status, {}, row.timestamp, row.confidence, row.visibility)
+        Estimate(
+            row.pose,
+            row.energy,
+            row.agreement,
+            row.status,
+            {},
+            row.timestamp,
+            row.confidence,
+            row.visibility,
+            row.branches,
+        )
         for row in rows
     ]

@@ -18,6 +18,7 @@ BUILDERS = {
     "ik": f"{_TRACKERS}.ik",
     "oikonomidis2011": f"{_TRACKERS}.papers",
     "schroeder2014": f"{_TRACKERS}.papers",
+    "lift": f"{_TRACKERS}.lift",
 }
 """Module with a function of the tracker's name that returns its `Stages`."""
 

@@ -10,12 +10,13 @@ from typing import Any
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
 from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking.configuration import TrackerConfig
+from depthtrack.tracking.configuration import LiftConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.run_configuration import RunConfiguration, camera_fields, versions
@@ -33,7 +34,7 @@ def configure(
 ) -> RunConfiguration:
     """Return the configuration of a run of the recording at `path`.
 
-    entries: `start`, `frames` and `on_damage` of `RunConfiguration`, if not the defaults.
+    entries: `start`, `frames`, `on_damage` and `keypoints` of `RunConfiguration`, if not the defaults.
     """
     return RunConfiguration(
         str(path.resolve()),
@@ -69,6 +70,10 @@ class TrackingRun(Closing):
         self.configuration, self.sequence, self._ahead = configuration, sequence, ahead
         self.hand = configuration.hand_shape()
         self._clock, self._start_pose = clock, true_start(sequence) if configuration.start == "truth" else None
+        named = configuration.keypoints
+        if named is None and isinstance(configuration.tracker, LiftConfig):
+            raise InputError("the tracker lift must have keypoints, found none: give --keypoints FILE.csv")
+        self._keypoints = None if named is None else read_keypoints(Path(named))
         self.tracker = wrap(create_tracker(configuration.tracker, self.hand, threads))
 
     def __len__(self) -> int:
@@ -96,7 +101,10 @@ class TrackingRun(Closing):
             yield from write_run(track_frames(self._frames(), pipeline, known), run)
 
     def _frames(self) -> Iterator[Frame]:
-        return read_ahead(islice(self.sequence, len(self)), self._ahead)
+        frames: Iterator[Frame] = islice(self.sequence, len(self))
+        if self._keypoints is not None:
+            frames = self._keypoints.attach(frames, self.sequence.timestamps)
+        return read_ahead(frames, self._ahead)
 
     def _pipeline(self, start_pose: Array | None) -> Pipeline:
         segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)

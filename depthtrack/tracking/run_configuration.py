@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 from depthtrack.errors import InputError
+from depthtrack.files import read_bounded
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import load_synergies
 from depthtrack.options import from_data, to_data
+from depthtrack.recording.keypoints import MAX_BYTES
 from depthtrack.recording.run_folder import Run, read_configuration
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
@@ -26,7 +28,7 @@ from depthtrack.tracking.configuration import (
 )
 from depthtrack.tracking.earlier_runs import upgraded
 
-FORMAT = 3
+FORMAT = 4
 """Version of the layout of `run.json`; runs without it were written before the options were nested."""
 
 LONGEST_PATH = 1024
@@ -41,6 +43,7 @@ class RunConfiguration:
 
     sequence: path of the recording.
     camera, hand: contents of `camera.json` and `hand.json`.
+    keypoints: path of a file of keypoints, see `recording.keypoints`; None for none.
     frames: number of frames to track; None for all.
     context: entries that do not change poses or only describe the run: label, seed of a comparison, machine, ...
     """
@@ -53,11 +56,15 @@ class RunConfiguration:
     start: Start = "auto"
     frames: int | None = None
     on_damage: OnDamage = "refuse"
+    keypoints: str | None = None
     context: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the choices. Raises InputError if one is out of range."""
-        _check_choices({"start": self.start, "frames": self.frames, "on_damage": self.on_damage}, "the run")
+        _check_choices(
+            {"start": self.start, "frames": self.frames, "on_damage": self.on_damage, "keypoints": self.keypoints},
+            "the run",
+        )
 
     @property
     def surfaces(self) -> tuple[SurfaceName, ...]:
@@ -86,6 +93,7 @@ class RunConfiguration:
             "start": self.start,
             "frames": self.frames,
             "on_damage": self.on_damage,
+            "keypoints": self.keypoints,
             "camera": dict(self.camera),
             "hand": dict(self.hand),
             "digests": digests(self),
@@ -111,9 +119,10 @@ class RunConfiguration:
         own = ("format", "tracker", "options", "digests", "segmentation")
         rest = {name: value for name, value in fields.items() if name not in own}
         known = {entry: rest.pop(entry) for entry in ("sequence", "camera", "hand")}
-        known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage") if entry in rest}
+        known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage", "keypoints") if entry in rest}
         _check_choices(known, where)
-        paths = {"sequence": known["sequence"], "skin_model": dict(fields.get("segmentation") or {}).get("skin_model")}
+        skin_model = dict(fields.get("segmentation") or {}).get("skin_model")
+        paths = {"sequence": known["sequence"], "keypoints": known.get("keypoints"), "skin_model": skin_model}
         for entry, path in paths.items():
             if isinstance(path, str) and (len(path) > LONGEST_PATH or "\0" in path):
                 raise InputError(f"{where}: expected a path as {entry}, found {path[:80]!r}")
@@ -166,13 +175,19 @@ def versions() -> dict[str, str]:
 
 
 def digests(configuration: RunConfiguration) -> dict[str, str]:
-    """Return SHA-256 of the files that a configuration names: synergies and skin colours."""
+    """Return SHA-256 of the files that a configuration names.
+
+    Raises:
+        InputError: if the file of keypoints is missing or too long.
+    """
     found = {}
     synergies = getattr(configuration.tracker, "synergies", None)
     if synergies is not None and synergies.synergies is not None:
         found["synergies"] = sha256(load_synergies(synergies.synergies).to_json().encode()).hexdigest()
     if configuration.segmentation.skin_model is not None:
         found["skin_model"] = sha256(Path(configuration.segmentation.skin_model).read_bytes()).hexdigest()
+    if configuration.keypoints is not None:
+        found["keypoints"] = sha256(read_bounded(Path(configuration.keypoints), MAX_BYTES)).hexdigest()
     return found
 
 
@@ -186,11 +201,13 @@ def _check_digests(configuration: RunConfiguration, stored: Mapping[str, str], f
 
 
 def _check_choices(entries: Mapping[str, Any], where: str) -> None:
-    frames = entries.get("frames")
+    frames, keypoints = entries.get("frames"), entries.get("keypoints")
     if entries.get("start", "auto") not in ("auto", "truth"):
         raise InputError(f"{where}: start must be auto or truth, found {entries['start']!r:.40}")
     if entries.get("on_damage", "refuse") not in ("refuse", "skip"):
         raise InputError(f"{where}: on_damage must be refuse or skip, found {entries['on_damage']!r:.40}")
+    if keypoints is not None and not isinstance(keypoints, str):
+        raise InputError(f"{where}: keypoints must be the path of a file, found {keypoints!r:.40}")
     if frames is not None and not (isinstance(frames, int) and frames >= 1):
         raise InputError(f"{where}: frames must be a whole number from 1, found {frames!r:.40}")
 

@@ -1,11 +1,12 @@
 """Tracker made of stages: lists of stages over candidates, and the state between frames."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.candidate import Candidate
@@ -16,7 +17,7 @@ from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.timing import StageClock
-from depthtrack.tracking.tracker import Estimate
+from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.types import Array
 
 
@@ -86,24 +87,32 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
+        It is absent if the stages find no candidate.
+
         pose: (27,) given by the user.
         """
         clock = StageClock(self.stages)
         self._tools.set_target(observation)
         clock.lap("target")
-        found: list[tuple[Candidate, Status]] = []
+        found: list[tuple[Candidate, Status, tuple[Branch, ...]]] = []
         for status, stages in lists.items():
             frame, candidates = FrameContext(observation, self._tools, self._state, self._seed, pose), list[Candidate]()
             for stage in stages:
                 candidates = stage(frame, candidates)
                 clock.lap(stage.name)
-            found.append((candidates[0], Status.STARTED if frame.restarted else status))
-        best, status = min(found, key=lambda pair: pair[0].energy)
+            if candidates:
+                found.append((candidates[0], Status.STARTED if frame.restarted else status, frame.branches))
+        if not found:
+            estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
+            self._state.update(estimate)
+            return estimate
+        best, status, branches = min(found, key=lambda pair: pair[0].energy)
         self.evidence, visibility = self._evidence(best, status, observation.timestamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")
         shares = tuple(map(float, visibility))
-        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, confidence, shares)
+        time = observation.timestamp
+        return self._state.commit(*best, status, clock.milliseconds, time, confidence, shares, branches)
 
     def _evidence(self, best: Candidate, status: Status, timestamp: float) -> tuple[Evidence, Array]:
         """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""

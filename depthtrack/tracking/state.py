@@ -11,6 +11,7 @@ from statistics import median
 import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
+from depthtrack.recording.branches import Branch
 from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.tracking.options import TrackingThresholds
@@ -28,6 +29,8 @@ class TrackState:
 
     pose: (27,) last pose, None if there is nothing to follow.
     energy: energy of the last pose.
+    time: of the last pose, s; NaN if there was none.
+    branches: alternatives to the last pose.
     last_trusted: (27,) last trusted pose; None after `memory` seconds without one, in which a hand hardly turns over.
     """
 
@@ -38,7 +41,8 @@ class TrackState:
         self.pose: Array | None = None
         self.energy = np.inf
         self.last_trusted: Array | None = None
-        self._time, self._started = math.nan, math.nan
+        self.branches: tuple[Branch, ...] = ()
+        self.time, self._started = math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
 
     def is_lost(self, energy: float, agreement: float, confidence: float = math.nan, previous: float = 0.0) -> bool:
@@ -81,11 +85,12 @@ class TrackState:
         timestamp: float = math.nan,
         confidence: float = math.nan,
         visibility: tuple[float, ...] = UNKNOWN_VISIBILITY,
+        branches: tuple[Branch, ...] = (),
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted."""
         previous = self._confidence if status is Status.TRACKED else 0.0
         status = Status.LOST if self.is_lost(energy, agreement, confidence, previous) else status
-        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, confidence, visibility)
+        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, confidence, visibility, branches)
         self.update(estimate)
         return estimate
 
@@ -93,6 +98,11 @@ class TrackState:
         """Return the time since the start of the track, s; 0 if a pose of this status starts one."""
         known = status is Status.TRACKED and timestamp >= self._started
         return timestamp - self._started if known else 0.0
+
+    @property
+    def is_new(self) -> bool:
+        """Whether the last pose started the track."""
+        return self.time == self._started
 
     def restore(self, estimates: Sequence[Estimate]) -> None:
         """Update the state with the estimates of earlier frames."""
@@ -106,9 +116,9 @@ class TrackState:
 
     def update(self, estimate: Estimate) -> None:
         """Update the state with the estimate of the next frame."""
-        elapsed = estimate.timestamp - self._time
+        elapsed = estimate.timestamp - self.time
         if estimate.pose is None or estimate.status is Status.LOST:
-            self.pose, self._motion = None, np.zeros(26)
+            self.pose, self._motion, self.branches = None, np.zeros(26), ()
             if elapsed > self._thresholds.memory + _SAME_TIME:
                 self.last_trusted = None
             return
@@ -118,20 +128,20 @@ class TrackState:
             self._motion, self._duration = np.zeros(26), math.nan
             self._started = estimate.timestamp
         self.pose, self.energy, self._agreement = estimate.pose, estimate.energy, estimate.agreement
-        self._confidence = estimate.confidence
-        self.last_trusted, self._time = estimate.pose, estimate.timestamp
+        self._confidence, self.branches = estimate.confidence, estimate.branches
+        self.last_trusted, self.time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 
     def is_stale(self, timestamp: float) -> bool:
         """Return whether the last pose is too old at `timestamp` (s) to be followed without a rival."""
-        return timestamp - self._time > self._thresholds.longest_gap + _SAME_TIME
+        return timestamp - self.time > self._thresholds.longest_gap + _SAME_TIME
 
     def motion_until(self, timestamp: float) -> Array:
         """Return the step (26,) that continues the last motion until `timestamp` (s).
 
         It is in the tangent space, and zero if the last pose is too old.
         """
-        elapsed = timestamp - self._time
+        elapsed = timestamp - self.time
         if self.is_stale(timestamp) or elapsed > self._thresholds.memory:
             return np.zeros(26)
         share = elapsed / self._duration if self._duration > 0 else 1.0

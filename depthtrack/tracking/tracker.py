@@ -7,6 +7,7 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.recording.branches import Branch
 from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
@@ -24,6 +25,7 @@ class Estimate:
     stage_ms: milliseconds spent in each stage of the tracker.
     confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
+    branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
     """
 
@@ -35,6 +37,7 @@ class Estimate:
     timestamp: float = math.nan
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
+    branches: tuple[Branch, ...] = ()
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)

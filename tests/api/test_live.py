@@ -9,6 +9,7 @@ import pytest
 
 import depthtrack as dt
 from depthtrack.cli import main
+from depthtrack.recording.keypoints import HEADER, keypoint_cells
 from depthtrack.tracking.configuration import CONFIGURATIONS
 from depthtrack.tracking.pipeline import NoTracker
 
@@ -22,7 +23,7 @@ def blind(**options: Any) -> dt.HandTracker:
     return dt.HandTracker(CAMERA, tracker=NoTracker(), **options)
 
 
-@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize("name", [name for name in CONFIGURATIONS if name != "lift"])
 def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, name: str) -> None:
     assert main(["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1"]) == 0
     run = dt.read_run(tmp_path / "run")
@@ -34,6 +35,37 @@ def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, 
             assert estimate.pose is not None
             assert estimate.pose.tobytes() == pose.tobytes()
             assert estimate.energy == energy
+
+
+def test_pushed_keypoints_give_the_bits_of_their_file(path: Path, tmp_path: Path) -> None:
+    recording, config = dt.open_recording(path), dt.tracker_config("lift", resolution=64)
+    truth, file = recording.ground_truth, tmp_path / "keypoints.csv"
+    assert truth is not None
+    assert truth.joints is not None
+    pixels = recording.camera.project(truth.joints).round(3)
+    found = [dt.ImageKeypoints(each, np.where(np.arange(21) == 3, 0.25, 0.9)) for each in pixels]
+    cells = [[str(time), *keypoint_cells(each)] for time, each in zip(recording.timestamps, found, strict=True)]
+    file.write_text("\n".join(",".join(row) for row in [list(HEADER), *cells]) + "\n")
+    run = dt.track(recording, dt.HandShape(), config, out=tmp_path / "run", keypoints=file)
+    with dt.HandTracker(recording.camera, tracker=config) as tracker:
+        for frame, keypoints, pose in zip(recording, found, run.poses, strict=True):
+            rows = np.column_stack([keypoints.pixels, keypoints.confidence])
+            estimate = tracker.update(frame.depth, frame.colour, timestamp=frame.timestamp, keypoints=rows)
+            assert estimate.pose is not None
+            assert estimate.pose.tobytes() == pose.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("keypoints", "message"),
+    [
+        (np.zeros((20, 3)), "x, y and confidence of 21 points"),
+        (np.full((21, 3), 2.0), "between 0 and 1"),
+        (dt.ImageKeypoints(np.zeros((21, 3)), np.zeros(21)), r"\(21, 2\) pixels"),
+    ],
+)
+def test_malformed_keypoints_are_rejected(keypoints: Any, message: str) -> None:
+    with blind() as tracker, pytest.raises(dt.InputError, match=message):
+        tracker.update(DEPTH, timestamp=0.0, keypoints=keypoints)
 
 
 def test_without_colour_the_bits_are_those_of_a_recording_without_colour(path: Path, tmp_path: Path) -> None:

@@ -60,8 +60,10 @@ def test_a_known_hand_is_measured_without_error(monkeypatch: pytest.MonkeyPatch)
         return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
 
     monkeypatch.setattr(measuring, "calibrate_either_side", calibrated)
+    monkeypatch.setattr(measuring, "CORRECTED_WITHIN", 8)
     row = measure(**TINY)
     assert (row["side_right"], row["side_sure"], row["starts"], row["starts_right"]) == (True, True, 2, 2)
+    assert (row["exchanged"], row["exchanged_corrected"]) == (2, 2)
     for name in measuring.TRACKERS:
         assert row[f"{name}_mean_mm"] < 3
         assert row[f"{name}_wrong_percent"] == 0

@@ -212,6 +212,17 @@ def test_a_dask_cluster_makes_the_same_runs(recording: Path, compared: Path, tmp
     assert len(json.loads((out / "results.json").read_text())) == 2
 
 
+def test_runs_of_a_comparison_use_their_keypoints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, out = synthesise(tmp_path / "made", 2, "--keypoints"), tmp_path / "out"
+    file = folder / "keypoints.csv"
+    command = ["compare", str(folder), "-o", str(out), "--trackers", "lift", "--side", "right", "--jobs", "1"]
+    assert main([*command, "--keypoints", str(file)]) == 0
+    (run,) = (out / "runs").iterdir()
+    assert Run.load(run).configuration["keypoints"] == str(file.resolve())
+    assert main([*command, "--keypoints", str(file), str(file)]) == 2
+    assert "--keypoints needs a file for each recording" in capsys.readouterr().err
+
+
 def test_other_options_need_another_folder(recording: Path, compared: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["compare", str(recording), "-o", str(compared), "--jobs", "1", "--trackers", QUICK, "--frames", "3"]
     assert main(arguments) == 2

@@ -17,7 +17,7 @@ from depthtrack.options import Parameter, from_data, parameters, to_data, with_o
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import read_configuration
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.configuration import CONFIGURATIONS, HybridConfig, IkConfig, PsoConfig, TrackerConfig
 from depthtrack.tracking.earlier_runs import upgraded
 from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
@@ -103,12 +103,14 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
     ("change", "expected"),
     [
         ({"tracker": "magic"}, "no tracker 'magic'"),
-        ({"format": 99}, "expected format 3"),
+        ({"format": 99}, "expected format 4"),
         ({"options": {"colour": "red"}}, "colour"),
         ({"options": {"seed": "many"}}, "seed"),
         ({"frames": -1}, "whole number"),
         ({"camera": 3}, "entry 'camera'"),
         ({"start": "guess"}, "auto or truth"),
+        ({"keypoints": 3}, "path of a file"),
+        ({"keypoints": "x" * 2000}, "expected a path as keypoints"),
     ],
 )
 def test_a_malformed_configuration_is_rejected(recording: Path, change: dict[str, Any], expected: str) -> None:
@@ -134,7 +136,8 @@ def test_runs_of_earlier_versions_are_read() -> None:
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
-    assert found.tracker == with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True})
+    expected = with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True, "interval": 0.0})
+    assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}
     paper = {"tracker": "ik", "variant": "paper", "rounds": 7, "model": "cylinders", "synergies": "leap", "soft": True}
@@ -205,3 +208,11 @@ def test_a_run_of_format_2_keeps_its_memory_in_seconds() -> None:
     fields = {"format": 2, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": options}
     thresholds = RunConfiguration.from_fields(fields, "run.json").tracker.thresholds
     assert (thresholds.memory, thresholds.energy, thresholds.longest_gap) == (1.0, 0.5, math.inf)
+
+
+@pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
+def test_a_run_of_format_3_follows_no_branches(name: str) -> None:
+    fields = {"format": 3, "sequence": "s", "camera": {}, "hand": {}, "tracker": name, "options": {"seed": 4}}
+    tracker = RunConfiguration.from_fields(fields, "run.json").tracker
+    assert isinstance(tracker, IkConfig | PsoConfig | HybridConfig)
+    assert (tracker.branches.interval, tracker.seed) == (0.0, 4)

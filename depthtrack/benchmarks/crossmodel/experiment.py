@@ -37,6 +37,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         PaperComparison("right sides among all", "", _share(rows, "side_right"), "%"),
         PaperComparison("starts of open hands on the right branch", "97 %", _ratio(rows, "open_starts"), "%"),
         PaperComparison("starts on the right branch", "90 %", _ratio(rows, "starts"), "%"),
+        PaperComparison("palms taken for backs that are corrected in 1 s", "", _exchanged(rows), "%"),
         *(
             PaperComparison(f"{name}: {what}", goal, value, unit)
             for name, line in ((each["tracker"], each) for each in tabulate(rows))
@@ -65,6 +66,11 @@ def _mean(rows: Sequence[Row], key: str) -> float | None:
 
 def _share(rows: Sequence[Row], key: str) -> float | None:
     return 100 * float(np.mean([row[key] for row in rows])) if rows else None
+
+
+def _exchanged(rows: Sequence[Row]) -> float | None:
+    total = sum(row["exchanged"] for row in rows)
+    return 100 * sum(row["exchanged_corrected"] for row in rows) / total if total else None
 
 
 def _ratio(rows: Sequence[Row], key: str) -> float | None:

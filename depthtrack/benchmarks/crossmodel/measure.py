@@ -19,13 +19,17 @@ from depthtrack.recording.sequence import Sequence
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.visibility import points_in_view
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.solver.keypoints import fit_poses
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stages.branches import PALM_AND_BACK, turned
 from depthtrack.types import Array, Mask
 
 TRACKERS = ("hybrid", "ik")
 WRONG = 0.02
 """Metres: mean joint error after removing offsets from which on a pose is on a wrong branch."""
+CORRECTED_WITHIN = 30
+"""Frames in which a start with palm and back exchanged should be corrected."""
 START_EVERY = 15
 """Frames between single-frame starts."""
 HALF_OPEN = np.radians(45)
@@ -47,6 +51,7 @@ def measure(**recording: Any) -> Row:
         joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
         visible = np.array([_visible(sequence, index, joints[index]) for index in range(len(sequence))])
         row |= _starts(sequence, found, joints)
+        row |= _corrections(sequence, found, joints)
         for name in TRACKERS:
             row |= {f"{name}_{key}": value for key, value in _tracks(sequence, found, name, joints, visible).items()}
     return row
@@ -91,6 +96,24 @@ def _starts(sequence: Sequence, found: Calibration, joints: Array) -> Row:
         "open_starts": int(half_open.sum()),
         "open_starts_right": int((right & half_open).sum()),
     }
+
+
+def _corrections(sequence: Sequence, found: Calibration, joints: Array) -> Row:
+    """Return how many starts had palm and back exchanged, and how many were corrected."""
+    model, segmenter = HandModel(found.hand), Segmenter.for_sequence(sequence)
+    stretches = [range(begun, begun + CORRECTED_WITHIN) for begun in range(0, len(sequence), CORRECTED_WITHIN)]
+    stretches = [stretch for stretch in stretches if stretch.stop <= len(sequence)]
+    corrected = 0
+    with closing(create_tracker(tracker_config("hybrid"), found.hand)) as tracker:
+        for stretch in stretches:
+            segmenter.reset()
+            first, last = fit_poses(model, joints[[stretch[0], stretch[-1]]]).poses
+            pipeline = Pipeline(tracker, segmenter, found.hand, turned(first, np.zeros((0, 20)))[PALM_AND_BACK])
+            *_, end = track_frames(sequence.frames(list(stretch)), pipeline)
+            if end.estimate.pose is not None:
+                apart = model.keypoints(np.stack([end.estimate.pose, last]))
+                corrected += bool(np.linalg.norm(apart[0] - apart[1], axis=1).mean() < WRONG)
+    return {"exchanged": len(stretches), "exchanged_corrected": corrected}
 
 
 def _tracks(sequence: Sequence, found: Calibration, name: str, joints: Array, visible: Mask) -> Row:

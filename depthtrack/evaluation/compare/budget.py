@@ -11,6 +11,7 @@ import numpy as np
 from depthtrack.evaluation.compare.cpu_time import CpuTimed
 from depthtrack.hand.shape import HandShape
 from depthtrack.options import with_options
+from depthtrack.recording.keypoints import KeypointFile
 from depthtrack.recording.sequence import Sequence as Recording
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
@@ -66,17 +67,24 @@ def scale_work(config: TrackerConfig, size: float) -> TrackerConfig:
 
 
 def calibrate(
-    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig, ms: float
+    recording: Recording,
+    count: int,
+    segmenter: Segmenter,
+    hand: HandShape,
+    config: TrackerConfig,
+    ms: float,
+    keypoints: KeypointFile | None = None,
 ) -> Budget:
     """Return the budget with which a frame takes `ms` of CPU time.
 
     count: number of frames of the recording to use.
     config: configuration with the default work.
+    keypoints: of the recording, from elsewhere.
 
     If even the least or the most work misses `ms`, the nearest time is chosen. If the hand is found nowhere, `config`
     is returned and the time is NaN.
     """
-    places = _stretches(recording, count, segmenter, hand, config)
+    places = _stretches(recording, count, segmenter, hand, config, keypoints)
     if not places:
         return Budget(config, float("nan"))
     return search(lambda size: scale_work(config, size), lambda chosen: _cost(places, hand, chosen), ms)
@@ -130,7 +138,12 @@ def _cost(places: Sequence[Stretch], hand: HandShape, config: TrackerConfig) -> 
 
 
 def _stretches(
-    recording: Recording, count: int, segmenter: Segmenter, hand: HandShape, config: TrackerConfig
+    recording: Recording,
+    count: int,
+    segmenter: Segmenter,
+    hand: HandShape,
+    config: TrackerConfig,
+    keypoints: KeypointFile | None,
 ) -> list[Stretch]:
     """Return evenly spaced stretches of the recording in which the tracker follows the hand."""
     length = min(STRETCH + 2, count)
@@ -140,6 +153,8 @@ def _stretches(
         segmenter.reset()
         with closing(create_tracker(config, hand)) as tracker:
             frames = recording.frames(range(first, first + length))
+            if keypoints is not None:
+                frames = keypoints.attach(frames, recording.timestamps)
             tracked = list(track_frames(frames, Pipeline(tracker, segmenter, hand)))
         observed = [each for each in tracked if each.observation is not None]
         if len(observed) >= 3 and observed[0].estimate.status.is_trusted:

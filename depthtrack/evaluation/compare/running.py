@@ -20,6 +20,7 @@ from depthtrack.machine import describe_machine
 from depthtrack.options import from_data, to_data
 from depthtrack.recording import open_sequence
 from depthtrack.recording.hand_choice import chosen_hand
+from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.run_folder import check_same, read_configuration, read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
@@ -40,6 +41,7 @@ class Source:
     hand, side: see `recording.hand_choice.chosen_hand`.
     skin_model: path of a skin colour model; published statistics if None.
     frames: number of frames; all if None.
+    keypoints: path of a file of keypoints from elsewhere; None for none.
     """
 
     path: str
@@ -49,6 +51,7 @@ class Source:
     skin_model: str | None = None
     frames: int | None = None
     side: Side | None = None
+    keypoints: str | None = None
 
     def open(self) -> Sequence:
         """Return the opened recording.
@@ -121,6 +124,7 @@ class PlannedRun:
             source.segmentation,
             frames=source.frames,
             on_damage=source.on_damage,
+            keypoints=source.keypoints,
         )
         return configuration.with_context(
             threads=1,
@@ -164,7 +168,8 @@ def calibrate_cell(cell: Cell) -> Row:
     cv2.setNumThreads(1)
     sequence, config = source.open(), from_data(CONFIGURATIONS[cell["tracker"]], cell["options"], "options")
     hand, segmenter = source.hand_of(sequence), source.segmenter(sequence)
-    budget = calibrate(sequence, source.count(sequence), segmenter, hand, config, cell["ms"])
+    keypoints = None if source.keypoints is None else read_keypoints(Path(source.keypoints))
+    budget = calibrate(sequence, source.count(sequence), segmenter, hand, config, cell["ms"], keypoints)
     # JSON has no NaN, which stands for a hand that was found nowhere.
     ms = round(budget.ms, 3) if math.isfinite(budget.ms) else None
     return {"chosen": to_data(budget.config), "calibrated_ms": ms}

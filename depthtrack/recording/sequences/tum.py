@@ -9,6 +9,7 @@
 | hand.json            | sizes of the hand; optional                 |
 | hand_poses.csv       | 27 pose values a timestamp; optional        |
 | joints.csv           | 21 keypoints a timestamp; optional          |
+| keypoints.csv        | 2D keypoints of a detector; optional        |
 | hand_mask/           | PNGs with the names of depth/; optional     |
 | exact_depth/         | 16-bit PNGs, likewise; optional             |
 

@@ -8,6 +8,8 @@ from dataclasses import replace
 from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.branches import CarryBranches
+from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
@@ -21,7 +23,7 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     """Return the stages of the hybrid tracker.
 
     The surface that the observed points lie on is chosen in each frame. The best prediction is fitted to it, then the
-    best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches.
+    best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches. Branches are followed.
     """
     fit = SurfaceFit(config.fit)
     chosen = FitChosenSurface(config.surface_choice, fit)
@@ -31,17 +33,20 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     routine = FitSearch(config.routine_search, sparse)
     in_turn = RefineFingers(near, config.recovery, config.fingers, refit=sparse)
     fingers = replace(in_turn, options=replace(config.fingers, turns=1, usual_turns=1))
-    start: list[Stage] = [SearchGlobally(search, config.search), chosen, fingers]
+    keypoints = KeypointProposals(config.keypoints, sparse)
+    start: list[Stage] = [SearchGlobally(search, config.search), keypoints, chosen, fingers]
     doubt = FitSearch(config.doubt_search, sparse)
-    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), chosen, fingers]
+    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), keypoints, chosen, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
             chosen,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
             SwarmProposals(config.proposals, fit),
+            keypoints,
             RecoverLocally(near, config.recovery, elsewhere=elsewhere, routine=routine),
             in_turn,
+            CarryBranches(config.branches, sparse),
         ],
         start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
         refine=[GivenPose(), replace(chosen, fit=replace(fit, hold_last=False, effort=2))],

@@ -7,6 +7,8 @@ from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.branches import CarryBranches
+from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
@@ -27,19 +29,22 @@ def ik(config: IkConfig, tools: Toolkit) -> Stages:
 def _all_angles(config: IkConfig) -> Stages:
     """Return the stages without synergies.
 
-    Frames that fit poorly trigger fits of the other predictions, then searches.
+    Frames that fit poorly trigger fits of the other predictions, then searches. Branches are followed beside.
     """
     fit = SurfaceFit(config.fit)
     search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
     fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
-    start: list[Stage] = [SearchGlobally(search, config.search), fingers]
+    keypoints = KeypointProposals(config.keypoints, config.fit)
+    start: list[Stage] = [SearchGlobally(search, config.search), keypoints, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
             fit,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
+            keypoints,
             RecoverLocally(near, config.recovery, elsewhere=start),
             fingers,
+            CarryBranches(config.branches, config.fit),
         ],
         start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
         refine=[GivenPose(), replace(fit, hold_last=False, effort=2)],

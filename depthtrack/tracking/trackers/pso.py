@@ -3,6 +3,8 @@
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import Stages
+from depthtrack.tracking.stages.branches import CarryBranches
+from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
 from depthtrack.tracking.stages.searches import SwarmSearch
@@ -15,20 +17,24 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
     """Return the stages of the PSO tracker.
 
     The swarm starts from the last pose, its linear prediction and the observed hand. Frames that fit poorly trigger a
-    search near the pose, then of single fingers; searches fit surfaces between their rounds.
+    search near the pose, then of single fingers; searches fit surfaces between their rounds. Branches are followed.
     """
     search = SwarmSearch(config.swarm_search)
     fingers = RefineFingers(search, config.recovery, config.fingers)
+    keypoints = KeypointProposals(config.keypoints, config.final_fit)
     refine: list[Stage] = [Refine(config.final_fit)] if config.refine else []
     return Stages(
         follow=[
             Swarm(config.swarm, config.spread, widen=config.widen),
+            keypoints,
             RecoverLocally(search, config.recovery),
             fingers,
             *refine,
+            CarryBranches(config.branches, config.swarm_search.fit),
         ],
         start=[
             SearchGlobally(search, config.search),
+            keypoints,
             fingers,
             ReinitialiseNearLast(search, config.recovery, fingers),
             *refine,
