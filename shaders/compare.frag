@@ -7,6 +7,7 @@ uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhou
 uniform ivec2 tile;               // pixels
 uniform ivec2 blocks;             // blocks of a tile
 uniform float match_depth, clamp_depth;  // d_m, d_M, metres
+uniform float hidden_cost;               // share of a hidden pixel that counts as drawn outside the silhouette
 
 out vec4 sums;  // clamped difference in metres, o_s and r_m, o_s or r_m
 
@@ -21,9 +22,10 @@ void main() {
             bool drawn = w > observed.b;
             float difference = abs(observed.r - (drawn ? 1.0 / w : 0.0));
             bool matched = drawn && (difference < match_depth || observed.r == 0.0);
-            sums.x += min(difference, clamp_depth);
+            float hidden = w > 0.0 && !drawn ? hidden_cost : 0.0;
+            sums.x += mix(min(difference, clamp_depth), clamp_depth, hidden);
             sums.y += matched ? observed.g : 0.0;
-            sums.z += matched ? 1.0 : observed.g;
+            sums.z += matched ? 1.0 : mix(observed.g, 1.0, hidden);
         }
     }
 }

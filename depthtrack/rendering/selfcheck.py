@@ -19,6 +19,7 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import TANGENT_SIZE, make_pose, retract
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import create_scorer
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.rendering.target import Target
@@ -29,6 +30,8 @@ _SEED = 11
 """The first seed from 0 that leaves no pixel within half a micrometre of d_m, where float32 rounding would decide."""
 _OCCLUDER = 0.477
 """Metres: depth of an object that hides half of what is drawn behind it, with no pixel within a micrometre."""
+_OBJECTIVE = Objective(hidden_cost=0.5)
+"""Hidden pixels count neither fully nor not at all, so that an error in either shows."""
 ENERGY_TOLERANCE = 1e-3
 DEPTH_TOLERANCE = 1e-4
 """Metres."""
@@ -90,7 +93,7 @@ def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:
         DepthtrackError: see `create_scorer`.
     """
     shape, target, poses = scene()
-    with create_scorer(name, shape, **options) as scorer, OracleScorer(shape) as oracle:
+    with create_scorer(name, shape, _OBJECTIVE, **options) as scorer, OracleScorer(shape, _OBJECTIVE) as oracle:
         scorer.set_target(target)
         oracle.set_target(target)
         energies = np.abs(scorer.score(poses) - oracle.score(poses))

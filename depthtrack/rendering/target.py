@@ -20,7 +20,7 @@ class Target:
     depth: (h, w) metres, 0 = no reading of the hand.
     occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
 
-    A hypothesis behind the occluder is not drawn there: Eq. (2) compares what a camera would observe.
+    What the occluder hides of a hypothesis counts in Eq. (2) as `Objective.hidden_cost` states.
 
     Raises:
         ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.

@@ -1,16 +1,20 @@
 """An occluder hides what lies behind it, and only there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import evaluate
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
+from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from tests.support.rendering import random_poses, window_on
+from tests.support.rendering import random_poses, target_of, window_on, with_occluder
 
 LINE = Camera(6, 1, 10.0, 10.0, 0.0, 0.0)
 
@@ -29,10 +33,41 @@ def test_sums_of_a_hand_counted_image_behind_an_occluder() -> None:
     assert (matched_silhouette, union) == (1, 4)
 
 
+@pytest.mark.parametrize("cost", [0.0, 0.25, 1.0])
+def test_hidden_pixels_count_as_a_share_of_pixels_outside_the_silhouette(cost: float) -> None:
+    # hidden | hidden, in the silhouette without a reading | hidden, with one | only observed | seen hand | nothing
+    silhouette = np.array([[False, True, True, True, True, False]])
+    observed = np.array([[0.0, 0.0, 0.03, 0.5, 0.5, 0.0]])
+    hidden = np.array([[True, True, True, False, False, False]])
+    visible = np.array([[0.0, 0.0, 0.0, 0.0, 0.5, 0.0]])
+    clamped, matched_silhouette, union = evaluate(Objective(hidden_cost=cost), silhouette, observed, visible, hidden)
+    assert clamped == pytest.approx(2 * cost * 0.04 + (0.03 + cost * 0.01) + 0.04)
+    assert (matched_silhouette, union) == (1, 4 + cost)
+
+
+def test_hidden_pixels_at_full_cost_score_like_those_of_no_occluder() -> None:
+    rng = np.random.default_rng(5)
+    shape, poses = HandShape(), random_poses(rng, 6, (0, 0, 0.5), 0.02)
+    target = with_occluder(target_of(shape, poses[0], window_on(shape, poses[0], 96), rng), 0.45, rng)
+    energies = []
+    for occluder, cost in ((None, 0.0), (target.occluder, 1.0), (target.occluder, 0.0)):
+        with RasterScorer(shape, Objective(hidden_cost=cost)) as scorer:
+            scorer.set_target(replace(target, occluder=occluder))
+            energies.append(scorer.score(poses))
+    np.testing.assert_allclose(energies[0], energies[1], rtol=1e-5)
+    assert np.abs(energies[0] - energies[2]).max() > 0.1
+
+
+@pytest.mark.parametrize("cost", [-0.1, 1.1, np.nan])
+def test_costs_of_hidden_pixels_beyond_their_range_are_rejected(cost: float) -> None:
+    with pytest.raises(InputError, match="objective hidden_cost must lie between 0 and 1"):
+        Objective(hidden_cost=cost)
+
+
 def test_a_hand_half_behind_an_object_scores_like_the_visible_half() -> None:
     shape, pose = HandShape(), random_poses(np.random.default_rng(4), 1, (0, 0, 0.5), 0.0)
     camera = window_on(shape, pose[0], 128)
-    with OracleScorer(shape) as oracle:
+    with OracleScorer(shape, Objective(hidden_cost=0.0)) as oracle:
         oracle.set_target(Target.blank(camera))
         depth = oracle.render(pose[0])
         left = np.tile(np.arange(128) < 64, (128, 1))

@@ -131,12 +131,18 @@ class Renderer:
         gl.glReadPixels(0, 0, width, height, gl.GL_RED, gl.GL_FLOAT, pixels)
 
     def sum(
-        self, gl: Any, which: int, grid: TileGrid, count: int, observation: int, match_depth: float, clamp_depth: float
+        self,
+        gl: Any,
+        which: int,
+        grid: TileGrid,
+        count: int,
+        observation: int,
+        limits: tuple[float, float, float],
     ) -> Array:
         """Return the sums (count, 3) of Eq. (2) over the tiles of an atlas; see `sums.sum_tiles`.
 
         observation: a texture written by `upload`.
-        match_depth, clamp_depth: d_m and d_M, metres.
+        limits: d_m, d_M, metres; `Objective.hidden_cost`.
 
         The first level of the pyramid compares and the next ones add, until one texel a tile is left (Sec. 2.5).
         """
@@ -150,7 +156,10 @@ class Renderer:
         gl.glBindTexture(gl.GL_TEXTURE_2D, observation)
         gl.glActiveTexture(gl.GL_TEXTURE0)
         tiles, (level, spare) = (min(count, grid.columns), grid.rows(count)), self._pyramid
-        self._compare.use(inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth)
+        match_depth, clamp_depth, hidden_cost = limits
+        self._compare.use(
+            inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth, hidden_cost=hidden_cost
+        )
         size = self._add_blocks(gl, self._compare, self._atlases[which], level, tiles, (grid.width, grid.height))
         while size != (1, 1):
             self._reduce.use(level=0)

@@ -18,6 +18,7 @@ def sum_tiles(
     empty: tuple[float, float, float],
     match_depth: float,
     clamp_depth: float,
+    hidden_cost: float,
     sums: Array,
 ) -> None:
     """Write the sums of Eq. (2) of B tiles.
@@ -27,11 +28,12 @@ def sum_tiles(
     depth: (h, w) metres, 0 = no reading.
     silhouette: (h, w) 0 or 1.
     hidden_from: (h, w) inverse depth, 1/m, that a visible surface exceeds; 0 without an occluder.
+    hidden_cost: see `Objective`.
     empty: sums of a tile in which nothing is drawn.
     sums: (B, 3) written: min(|o_d - r_d|, d_M) in metres, pixels of o_s and r_m, pixels of o_s or r_m.
     """
     height, width = depth.shape
-    match_, clamp = np.float32(match_depth), np.float32(clamp_depth)
+    match_, clamp, cost = np.float32(match_depth), np.float32(clamp_depth), np.float32(hidden_cost)
     zero, one = np.float32(0.0), np.float32(1.0)
     for n in range(regions.shape[0]):
         left, top = n % columns * width, n // columns * height
@@ -46,10 +48,11 @@ def sum_tiles(
                 drawn = w > hidden_row[u]
                 difference = abs(o - one / w)
                 change = min(difference, clamp) - min(o, clamp)
+                hidden = cost if (w > zero) & ~drawn else zero
                 hit = one if drawn & ((difference < match_) | (o == zero)) else zero
-                clamped += change if drawn else zero
+                clamped += change if drawn else hidden * (clamp - min(o, clamp))
                 on_silhouette += hit * s
-                off_silhouette += hit - hit * s
+                off_silhouette += (hit + hidden) * (one - s)
             sums[n, 0] += clamped
             sums[n, 1] += on_silhouette
             sums[n, 2] += off_silhouette

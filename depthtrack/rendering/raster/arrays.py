@@ -41,7 +41,7 @@ class KernelArrays:
     """Arguments of `kernel.score_poses`; workers refer to them, and not to the scorer.
 
     hand: see `hand_constants`.
-    objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
+    objective: (7,) see `kernel.score_poses`.
     """
 
     def __init__(self, hand: Array, objective: Array, tickets: Tickets) -> None:

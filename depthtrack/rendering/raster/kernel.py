@@ -108,11 +108,15 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth):
+def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
-    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
+    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. Of a
+    hidden pixel, the share `Objective.hidden_cost` counts as drawn outside the silhouette.
+
+    limits: d_m, d_M, metres; `Objective.hidden_cost`.
     """
+    match_depth, clamp_depth, hidden_cost = limits
     clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
     nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
     for tile_column in range(low.shape[0]):
@@ -135,6 +139,10 @@ def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows,
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
             on_silhouette = on_silhouette + hit * _load(silhouette, index)
+            if has_occluder:
+                hidden = select(w > 0.0, select(drawn, nothing, hidden_cost), 0.0)
+                in_column = in_column + hidden * (clamp_depth - vmin(o, clamp_depth))
+                matched = matched + hidden * (one - _load(silhouette, index))
             store(buffer, index, nothing)
         clamped = clamped + in_column
     return vsum(clamped), vsum(on_silhouette), vsum(matched)
@@ -174,14 +182,14 @@ def score_poses(
     has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
     hidden_from: inverse depth, 1/m, that a visible surface exceeds, tiled.
     empty: (3,) sums of Eq. (2) for an empty image.
-    objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
+    objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.hidden_cost`.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
 
     Other threads call this with the same batch, each with its own workspace. It holds `scratch` and `table` (see
     `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
     `low` and `high` have one element a tile column: the number of tile rows, and -1.
     """
-    match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
+    limits = np.float32(objective[0]), np.float32(objective[1]), np.float32(objective[6])
     while True:
         n = pop(tickets, thread, spin_limit)
         if n < 0:
@@ -190,11 +198,11 @@ def score_poses(
         # Constant arguments compile to two loops: the one without an occluder does not read `hidden_from`.
         if has_occluder[0]:
             clamped, on_silhouette, matched = _compare(
-                True, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
+                True, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
             )
         else:
             clamped, on_silhouette, matched = _compare(
-                False, observed, silhouette, hidden_from, buffer, tile_rows, low, high, match_depth, clamp_depth
+                False, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
             )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette

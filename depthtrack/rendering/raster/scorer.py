@@ -42,7 +42,15 @@ class RasterScorer(ScorerBase):
         self._objective = o = objective or Objective()
         self._threads, tickets = threads, new_tickets(threads)
         objective_constants = np.array(
-            [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.silhouette_weight, o.kinematic_weight]
+            [
+                o.match_depth,
+                o.clamp_depth,
+                o.depth_unit,
+                o.epsilon,
+                o.silhouette_weight,
+                o.kinematic_weight,
+                o.hidden_cost,
+            ]
         )
         self._arrays = KernelArrays(hand_constants(shape), objective_constants, tickets)
         self._workers = Workers(tickets, threads, self._arrays.score_tickets)
