@@ -11,9 +11,10 @@ import depthtrack as dt
 def main(path: str, tracker: str = "ik", hand: str | None = None) -> int:
     """Print a line per frame with a trusted pose; return the number of these frames."""
     recording = dt.open_recording(path)
-    model = dt.HandModel(dt.open_hand(hand, recording))
+    sizes = dt.calibrate(recording).hand if hand is None else dt.open_hand(hand, recording)
+    model = dt.HandModel(sizes)
     trusted = 0
-    for each in dt.track(recording, hand, tracker):
+    for each in dt.track(recording, sizes, tracker):
         if each.estimate.pose is None or not each.estimate.status.is_trusted:
             continue
         trusted += 1

@@ -24,7 +24,7 @@ def main(folder: str, frames: int = 90, distances: tuple[float, ...] = (0.5, 1.0
             frames=frames,
             overwrite=True,
         )
-        run = dt.track(recording, tracker="ik", out=place / "run", resume=True)
+        run = dt.track(recording, "truth", "ik", out=place / "run", resume=True)
         metric = dt.evaluate(run).metric("endpoint_error_mm")
         assert metric is not None  # a synthetic recording has ground truth
         errors[distance] = metric.statistics()["mean"]

@@ -17,7 +17,7 @@ from depthtrack.hand.pose import retract
 def main(folder: str, count: int = 1000, renderer: str = "raster") -> NDArray[np.float64]:
     """Return the energies (count,) of poses ever farther from the true one, the first."""
     recording = dt.synthesise("everyday", Path(folder) / "recording", frames=1, overwrite=True)
-    (tracked,) = dt.track(recording, start="truth")
+    (tracked,) = dt.track(recording, "truth", start="truth")
     assert tracked.observation is not None
     assert recording.ground_truth is not None
     assert recording.ground_truth.poses is not None

@@ -32,7 +32,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def run(recording: str, tmp_path_factory: pytest.TempPathFactory) -> str:
-    return str(dt.track(recording, tracker="ik", out=tmp_path_factory.mktemp("examples") / "run").folder)
+    return str(dt.track(recording, "truth", "ik", out=tmp_path_factory.mktemp("examples") / "run").folder)
 
 
 def example(number: int) -> ModuleType:
@@ -56,7 +56,7 @@ def test_examples_are_numbered_short_listed_and_tested() -> None:
 
 
 def test_01_a_replay_prints_each_frame(recording: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert example(1).main(recording) == FRAMES
+    assert example(1).main(recording, hand="truth") == FRAMES
     lines = capsys.readouterr().out.splitlines()
     assert all(400 < float(line.split()[-2]) < 600 for line in lines)
 

@@ -81,10 +81,8 @@ def run_all(folder: Path, only: list[str]) -> dict[str, str]:
                     file.unlink()
                 run.rmdir()
             run.parent.mkdir(parents=True, exist_ok=True)
-            if (
-                depthtrack(["track", str(path), "-o", str(run), "--side", "right", "--frames", str(FRAMES), *options])
-                != 0
-            ):
+            usual = ["--hand", "average", "--side", "right", "--frames", str(FRAMES)]
+            if depthtrack(["track", str(path), "-o", str(run), *usual, *options]) != 0:
                 sys.exit(f"{key}: track failed")
             digests[key] = digest(run)
             print(f"{key}: {digests[key][:16]} ({time.perf_counter() - begun:.1f} s)", file=sys.stderr, flush=True)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.hand.hand_file import load_hand
@@ -13,7 +14,6 @@ from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.registry import tracker_config
-from depthtrack.tracking.side_choice import choose_side
 
 Recording = Sequence | Path | str
 """A recording, or its path."""
@@ -87,25 +87,22 @@ def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShap
     return HandShape() if hand is None else load_hand(Path(hand))
 
 
-def tracked_hand(
-    hand: Hand,
+def measured_hand(
     recording: Sequence,
     segmentation: SegmentationOptions | None = None,
     threads: int = 1,
     frames: int | None = None,
 ) -> HandShape:
-    """Return the hand to track a recording with.
+    """Return the hand of a recording, measured while it is tracked.
 
-    It is `open_hand` of `hand`; if that is absent, the average adult's hand of the side that fits better.
+    The average adult's right hand takes its place where the recording does not show a hand well enough.
 
-    frames: number of first frames that show the side; all if absent.
-
-    Raises:
-        InputError: the file holds no hand, or the recording has no sizes.
+    frames: number of first frames that the hand is measured on; all if absent.
     """
-    if hand is not None:
-        return open_hand(hand, recording)
-    return HandShape(side=choose_side(recording, segmentation, threads, frames).side)
+    try:
+        return calibrate_either_side(recording, segmentation, threads=threads, frames=frames).hand
+    except InputError:
+        return HandShape()
 
 
 def as_config(tracker: str | TrackerConfig) -> TrackerConfig:

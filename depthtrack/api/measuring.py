@@ -4,7 +4,7 @@ from functools import partial
 
 from depthtrack.api.choices import Hand, Recording, as_recording, open_hand
 from depthtrack.calibration.calibrate import Calibration
-from depthtrack.calibration.calibrate import calibrate as calibrate_views
+from depthtrack.calibration.calibrate import calibrate as calibrate_side
 from depthtrack.calibration.pose_search import Progress, ScorerFactory
 from depthtrack.calibration.rig_calibration import RigCalibration
 from depthtrack.calibration.rig_calibration import calibrate_rig as calibrate_rig_on_views
@@ -26,6 +26,7 @@ def calibrate(
     segmentation: SegmentationOptions | None = None,
     seed: int = 0,
     threads: int | None = None,
+    frames: int | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Measure the hand of a recording: side, scale, fingers and palm.
@@ -36,6 +37,7 @@ def calibrate(
     segmentation: how the hand is found in a frame.
     seed: equal seeds give equal hands.
     threads: threads of the renderer, one per core if absent; the hand does not depend on it.
+    frames: number of first frames to use; all if absent.
     progress: called with the current stage and the share of the work that is done.
 
     Raises:
@@ -47,10 +49,10 @@ def calibrate(
         depthtrack.track("my-hand", calibration.hand, out="my-run")
     """
     sequence = as_recording(recording)
-    views, source = _views(sequence, segmentation, progress), f"calibrated on {sequence.name}"
+    threads = threads or usable_cores()
     if side is None:
-        return calibrate_either_side(sequence, views, _scorers(threads), segmentation, seed, source, progress)
-    return calibrate_views(views, _scorers(threads), side, seed, source, progress)
+        return calibrate_either_side(sequence, segmentation, seed, threads, frames, progress)
+    return calibrate_side(sequence, side, (), segmentation, seed, threads, frames, progress)
 
 
 def calibrate_rig(

@@ -1,10 +1,20 @@
 """Track recordings into run folders, and read, evaluate and export runs."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
-from depthtrack.api.choices import Hand, Recording, as_config, as_recording, on_damage_of, path_of, tracked_hand
+from depthtrack.api.choices import (
+    Hand,
+    Recording,
+    as_config,
+    as_recording,
+    measured_hand,
+    on_damage_of,
+    open_hand,
+    path_of,
+)
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
 from depthtrack.evaluation.replay import Replay, run_hand
@@ -15,7 +25,7 @@ from depthtrack.recording.run_folder import Run
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
 from depthtrack.tracking.pipeline import TrackedFrame
-from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run import TrackingRun, check_run, configure
 from depthtrack.tracking.run_configuration import Start
 
 
@@ -66,8 +76,8 @@ def track(
 ) -> Iterator[TrackedFrame] | Run:
     """Track the hand of a recording; the poses are those of `depthtrack track`.
 
-    hand: a hand, the path of a hand file or rigged mesh, or "truth". If absent, the average adult's hand of the side
-        that fits better in up to 160 frames.
+    hand: a hand, the path of a hand file or rigged mesh, or "truth". If absent, it is measured first, while it is
+        tracked in up to 160 frames. `HandShape()` is the average adult's.
     tracker: name or configuration of a tracker: see `tracker_config`.
     out: run folder to write; without it, frames are yielded as they are tracked.
     resume: continue the run that `out` holds.
@@ -94,13 +104,17 @@ def track(
         path_of(sequence),
         sequence,
         as_config(tracker),
-        tracked_hand(hand, sequence, segmentation, threads, frames),
+        open_hand(hand, sequence),
         segmentation,
         start=start,
         frames=frames,
         on_damage=on_damage_of(sequence),
         keypoints=None if keypoints is None else str(Path(keypoints).resolve()),
     )
+    if hand is None:
+        check_run(configuration, sequence, None if out is None else Path(out), resume)
+        measured = measured_hand(sequence, segmentation, threads, frames)
+        configuration = replace(configuration, hand=measured.to_fields())
     run = TrackingRun(configuration, sequence, threads)
     if out is None:
         return _tracked(run)

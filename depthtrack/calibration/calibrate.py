@@ -1,24 +1,32 @@
-"""Calibration of a hand of one side from views: scale, and sizes of fingers and palm.
+"""Calibration of a hand of one side while it is tracked: sizes of fingers and palm.
 
-Poses are searched in a few views with hands of several scales, and the best scale is kept. From there poses and all
-sizes are optimised jointly. The poses are then searched again with the hand that was found, since some of the first
-ones were wrong, and optimised once more.
+The average hand is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of these sizes is
+tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay. The alternation
+follows Tkach et al., "Online generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from collections.abc import Sequence as Views
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.options import CalibrationOptions
-from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, SCALE, hand_of, measures, prior_covariance
-from depthtrack.calibration.pose_search import Found, PoseSearcher, Progress, ScorerFactory
+from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures, prior_covariance
+from depthtrack.calibration.pose_search import Progress
+from depthtrack.calibration.residuals import CalibrationView
+from depthtrack.calibration.solid_hands import nearest_solid
+from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
-from depthtrack.types import Array, Index
+from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.stretches import TrackedView, track_stretches
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)
@@ -72,92 +80,95 @@ class Calibration:
 
 
 def calibrate(
-    observations: Sequence[Observation],
-    scorer: ScorerFactory,
+    sequence: Sequence,
     side: Side = "right",
+    views: Views[TrackedView] = (),
+    segmentation: SegmentationOptions | None = None,
     seed: int = 0,
-    source: str = "calibrated",
+    threads: int = 1,
+    frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
 ) -> Calibration:
-    """Return the calibration of the hand in observations.
+    """Return the calibration of the hand of a recording.
 
-    observations: most open hands first, see `views.choose_views`.
-    scorer: makes the scorer of a hand.
+    views: poses of the average hand of this side; without them, it is tracked first.
+    frames: number of first frames to use; all if None.
     progress: called with a description of the current stage, and the completed share.
 
-    Equal observations, seed and energies give an equal hand.
+    Equal recordings and seeds give an equal hand, for any number of threads.
 
     Raises:
-        InputError: if the observations do not resemble a hand.
+        InputError: if too few frames show a hand, or what they show does not resemble one.
     """
     report = progress or (lambda stage, share: None)
     options = options or CalibrationOptions()
-    searcher = PoseSearcher(list(observations), scorer, seed, options)
-    report(f"scale of a {side} hand", 0.0)
-    values, found = _initialise(searcher, side)
-    found.check_hand(options.hand_like)
-    before = _refined(searcher, found.poses, np.zeros(COUNT), side)
-    views, joint = searcher.views, options.joint
-
-    def fit(chosen_views: Index, poses: Array, values: Array, iterations: int, exact: bool = False) -> JointFit:
-        picked = [views[i] for i in chosen_views]
-        return fit_jointly(picked, poses, values, side, iterations, exact=exact, options=joint)
-
-    report("fingers and palm", 0.6)
-    first = found.best(options.good_views)
-    fitted = fit(first, found.poses[first], values, 8)
-    report("fingers and palm with better poses", 0.65)
-    found = searcher.improve(hand_of(fitted.values, side), found.poses)
-    good = found.best(options.good_views)
-    fitted = fit(good, found.poses[good], fitted.values, 6)
-    report("confidence", 0.9)
-    fitted = fit(good, fitted.poses, fitted.values, 4, exact=True)
+    stretches = replace(options.stretches, tracker=replace(options.stretches.tracker, seed=seed))
+    values, rounds = np.zeros(COUNT), options.rounds
+    for number in range(rounds):
+        if number > 0 or not views:
+            show = _part(report, number / rounds, 0.6 / rounds)
+            hand = hand_of(values, side)
+            views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show).views
+        _check_views(views, sequence, options)
+        report("fingers and palm", (number + 0.6) / rounds)
+        chosen = _best(views, options.good_views)
+        observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
+        fitted = fit_jointly(observed, poses, values, side, options.iterations, options=options.joint)
+        found = nearest_solid(fitted.values, side)
+        change, values = np.abs(found - values)[: WIDTHS.start].max(), found
+        if change < options.converged:
+            break
+    report("confidence", 0.95)
+    last, joint = options.exact_iterations, options.joint
+    fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint)
     values = with_usual_proportions(fitted.values)
-    after = _refined(searcher, found.poses, values, side)
+    before, after = (_refined(observed, fitted.poses, sizes, side, options) for sizes in (np.zeros(COUNT), values))
     report("done", 1.0)
     return Calibration(
-        hand_of(values, side, source),
+        hand_of(values, side, f"calibrated on {sequence.name}"),
         _measured(values, fitted.covariance),
         None,
-        1000 * float(np.median(before.distances[good])),
-        1000 * float(np.median(after.distances[good])),
-        tuple(searcher.observations[i] for i in good),
-        after.poses[good],
-        before.poses[good],
+        1000 * float(np.median(before.distances)),
+        1000 * float(np.median(after.distances)),
+        tuple(each.observation for each in chosen),
+        after.poses,
+        before.poses,
         options.sure_margin,
     )
 
 
-def _initialise(searcher: PoseSearcher, side: Side) -> tuple[Array, Found]:
-    """Return sizes (35,) from a few open hands, and the poses of such a hand in all views.
+def _part(report: Progress, begun: float, share: float) -> Callable[[int, int], None]:
+    """Return the progress of a part of the work that tracks frames."""
+    return lambda done, total: report("poses of the hand", begun + share * done / total)
 
-    A hand of wrong sizes often fits a view best in a wrong pose, with one finger in place of the next. So each likely
-    pose gets sizes of its own, and sizes are judged by their energies in the other views.
+
+def _best(views: Views[TrackedView], share: float) -> list[TrackedView]:
+    """Return the share of the views with the lowest energies, at least two, in order."""
+    order = np.argsort([each.energy for each in views], kind="stable")
+    return [views[i] for i in sorted(order[: max(2, round(share * len(views)))].tolist())]
+
+
+def _check_views(views: Views[TrackedView], sequence: Sequence, options: CalibrationOptions) -> None:
+    """Check that enough views show a hand.
+
+    Raises:
+        InputError: if they do not.
     """
-    options = searcher.options
-    first = searcher.views[: options.first]
-    likely: list[list[tuple[float, Array, float]]] = [[] for _ in first]
-    for scale in options.tried_scales:
-        for n, (poses, energies) in enumerate(searcher.candidates(HandShape(side=side, scale=scale), len(first))):
-            likely[n] += [(float(e), pose, scale) for pose, e in zip(poses, energies, strict=True)]
-    hands: list[tuple[float, Array]] = []
-    for n, view in enumerate(first):
-        for _, pose, scale in sorted(likely[n], key=lambda entry: entry[0])[: options.likely]:
-            values = np.zeros(COUNT)
-            values[SCALE] = np.log(scale)
-            fit = fit_jointly([view], pose[None], values, side, 6, options=options.joint)
-            hands.append((searcher.energy(hand_of(fit.values, side), n, fit.poses[0]), fit.values))
-    tried = [values for _, values in sorted(hands, key=lambda entry: entry[0])[: options.crossed]]
-    found = [searcher.find(hand_of(values, side), len(first)) for values in tried]
-    best = min(range(len(tried)), key=lambda k: found[k].energies.mean())
-    fit = fit_jointly(first, found[best].poses, tried[best], side, 6, options=options.joint)
-    return fit.values, searcher.find(hand_of(fit.values, side), attempts=2)
+    if len(views) < options.fewest:
+        raise InputError(
+            f"a hand was tracked in {len(views)} of {min(len(sequence), options.stretches.views)} frames of "
+            f"{sequence.name}: calibrating needs at least {options.fewest} frames that show a bare hand, "
+            "best with open fingers towards the camera"
+        )
+    check_resembles_hand([each.agreement for each in views], options.hand_like)
 
 
-def _refined(searcher: PoseSearcher, poses: Array, values: Array, side: Side) -> JointFit:
+def _refined(
+    views: Views[CalibrationView], poses: Array, values: Array, side: Side, options: CalibrationOptions
+) -> JointFit:
     """Return the fit of the poses alone, for a hand of fixed sizes."""
-    return fit_jointly(searcher.views, poses, values, side, 8, slice(0, 0), options=searcher.options.joint)
+    return fit_jointly(views, poses, values, side, 8, slice(0, 0), options=options.joint)
 
 
 def with_usual_proportions(values: Array) -> Array:

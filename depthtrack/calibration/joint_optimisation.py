@@ -14,6 +14,7 @@ import numpy as np
 from depthtrack.calibration.options import JointFitOptions
 from depthtrack.calibration.parameters import COUNT, hand_of, prior_covariance
 from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
+from depthtrack.calibration.solid_hands import solid_step
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import Side
@@ -52,7 +53,8 @@ def fit_jointly(
     poses: (V, 27) to start from.
     values: (35,) sizes to start from.
     free: the sizes that may change.
-    exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale.
+    exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale. The
+        sizes to start from must give a solid hand, and steps that do not are shortened.
     """
     options = options or JointFitOptions()
     soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale
@@ -69,7 +71,8 @@ def fit_jointly(
         gradient = np.sum([e.gradient for e in eliminated], axis=0)
         change = solve_free(information + prior, -(gradient + prior @ values), held)
         change *= min(1.0, options.largest_change / max(np.abs(change).max(), 1e-12))
-        values = values + change
+        before, values = values, solid_step(values, change, side) if exact else values + change
+        change = values - before
         tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
         poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])

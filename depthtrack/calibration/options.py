@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 from depthtrack.options import option
+from depthtrack.tracking.stretches import StretchOptions
 
 
 @dataclass(frozen=True)
 class ViewChoiceOptions:
-    """Choice of the frames that sizes are measured on."""
+    """Choice of the frames that the scale of a rig is measured on."""
 
     views: int = option(16, "Frames used, at most", unit="frames")
     inspected: int = option(240, "Frames that are segmented, at most, spread over the whole recording", unit="frames")
@@ -38,12 +39,30 @@ class JointFitOptions:
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """Search for scale and poses, and the acceptance of a result."""
+    """Rounds of tracking and joint optimisation, and the acceptance of a result."""
+
+    stretches: StretchOptions = option(StretchOptions(), "Frames that the hand is tracked in")
+    rounds: int = option(4, "Rounds of tracking and joint optimisation, at most")
+    iterations: int = option(5, "Iterations of the joint optimisation in each round")
+    exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")
+    converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
+    fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
+    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
+    hand_like: float = option(
+        0.55,
+        "Agreement of silhouettes below which no hand was found",
+        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
+    )
+    sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
+    joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
+
+
+@dataclass(frozen=True)
+class RigCalibrationOptions:
+    """Search for the scale of a rigged hand, and the acceptance of a result."""
 
     first: int = option(4, "Views with the most open hands, on which scales are tried")
-    tried_scales: tuple[float, ...] = option((0.76, 0.9, 1.06, 1.24), "Scales of the average hand that are tried")
-    likely: int = option(6, "Poses of each of those views that get sizes of their own")
-    crossed: int = option(6, "Sizes that are tried on the other views")
+    tried_scales: tuple[float, ...] = option((0.76, 0.9, 1.06, 1.24), "Multiples of the rig's scale that are tried")
     resolution: int = option(96, "Longest side of the image in which poses are searched", unit="px")
     good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
     hand_like: float = option(
@@ -51,6 +70,4 @@ class CalibrationOptions:
         "Agreement of silhouettes below which no hand was found",
         source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
     )
-    rig_margin: float = option(0.02, "Share by which the other side may fit better than that of a rig")
-    sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
-    joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
+    side_margin: float = option(0.02, "Share by which the other side may fit better than that of the rig")

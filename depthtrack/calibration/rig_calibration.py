@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from depthtrack.calibration.options import CalibrationOptions
+from depthtrack.calibration.options import RigCalibrationOptions
 from depthtrack.calibration.pose_search import PoseSearcher, Progress, ScorerFactory
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
@@ -74,7 +74,7 @@ def calibrate_rig(
     seed: int = 0,
     source: str = "scaled",
     progress: Progress | None = None,
-    options: CalibrationOptions | None = None,
+    options: RigCalibrationOptions | None = None,
 ) -> RigCalibration:
     """Return a rigged hand scaled to the hand in `observations`, the most open hands first.
 
@@ -86,7 +86,7 @@ def calibrate_rig(
     if rig.rig is None:
         raise InputError("the hand to scale must be a rigged mesh (.glb, .gltf) or a hand file of one")
     show = progress or (lambda stage, share: None)
-    options = options or CalibrationOptions()
+    options = options or RigCalibrationOptions()
     searcher = PoseSearcher(list(observations), scorer, seed, options)
     energies = {}
     for n, factor in enumerate(options.tried_scales):
@@ -97,7 +97,7 @@ def calibrate_rig(
     factor = min(options.tried_scales, key=lambda f: energies[rig.side, f])
     other = min(energy for (side, _), energy in energies.items() if side != rig.side)
     margin = other / energies[rig.side, factor] - 1
-    if margin < -options.rig_margin:
+    if margin < -options.side_margin:
         raise InputError(
             f"the recording must show a {rig.side} hand like the rig, but the other side fits {-margin:.0%} better: "
             "give a rig of the other hand"

@@ -5,27 +5,24 @@ calibrated and tracked. A few views alone leave it open often: a hand of adapted
 """
 
 from collections.abc import Callable
-from collections.abc import Sequence as Views
 from dataclasses import replace
 
 from depthtrack.calibration.calibrate import Calibration, calibrate
 from depthtrack.calibration.options import CalibrationOptions
-from depthtrack.calibration.pose_search import Progress, ScorerFactory
+from depthtrack.calibration.pose_search import Progress
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.side_choice import SideOptions, choose_side, energies_of_sides
+from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies, track_sides
 
 
 def calibrate_either_side(
     sequence: Sequence,
-    views: Views[Observation],
-    scorer: ScorerFactory,
     segmentation: SegmentationOptions | None = None,
     seed: int = 0,
-    source: str = "calibrated",
+    threads: int = 1,
+    frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
 ) -> Calibration:
@@ -36,47 +33,53 @@ def calibrate_either_side(
     Raises:
         InputError: if the observations resemble a hand of neither side.
     """
-    options = options or CalibrationOptions()
     report = progress or (lambda stage, share: None)
-    sides_options = SideOptions()
-    choice = choose_side(sequence, segmentation, options=sides_options, progress=_frames(report, 0.0, 0.25))
+    side_options = SideOptions()
+    choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.0, 0.25))
+    options = options or CalibrationOptions()
+
+    def measured(side: Side, begun: float, share: float) -> Calibration:
+        part = _part(report, begun, share)
+        views = choice.views.get(side, ())
+        return calibrate(sequence, side, views, segmentation, seed, threads, frames, part, options)
+
     if choice.sure:
-        part = _part(report, 0.25, 0.75)
-        measured = calibrate(views, scorer, choice.side, seed, source, part, options)
-        return replace(measured, side_margin=choice.margin, sure_margin=sides_options.sure_margin)
-    found: dict[Side, Calibration] = {}
+        found = measured(choice.side, 0.25, 0.75)
+        return replace(found, side_margin=choice.margin, sure_margin=side_options.sure_margin)
+    calibrations: dict[Side, Calibration] = {}
     failure: InputError | None = None
     sides: tuple[Side, ...] = ("right", "left")
     for n, side in enumerate(sides):
         try:
-            part = _part(report, 0.15 + 0.35 * n, 0.35)
-            found[side] = calibrate(views, scorer, side, seed, source, part, options)
+            calibrations[side] = measured(side, 0.25 + 0.3 * n, 0.3)
         except InputError as error:
             failure = error
     if failure is not None:
-        if not found:
+        if not calibrations:
             raise failure
-        return next(iter(found.values()))
-    return _cheaper(sequence, found, segmentation, _frames(report, 0.85, 0.15))
+        return next(iter(calibrations.values()))
+    hands = {side: each.hand for side, each in calibrations.items()}
+    tracked = track_sides(
+        sequence, hands, segmentation, threads, frames, options.stretches, _frames(report, 0.85, 0.15)
+    )
+    return _cheaper(calibrations, *mean_energies(tracked), choice)
 
 
 def _cheaper(
-    sequence: Sequence,
-    found: dict[Side, Calibration],
-    segmentation: SegmentationOptions | None,
-    progress: Callable[[int, int], None],
+    calibrations: dict[Side, Calibration], energies: dict[Side, float], frames: int, choice: SideChoice
 ) -> Calibration:
     """Return the calibration of the side that costs less.
 
-    The cost of a side is the product of two figures: the mean energy while its hand is tracked, and the median distance
-    of the views' points to its skin. The distance alone counts if no tracked frame shows a hand.
+    energies: mean energy of each side while its hand is tracked in `frames` frames.
+    choice: the comparison of the average hands.
+
+    The cost of a side is a product of three figures: that energy, the energy of its average hand, and the median
+    distance of the views' points to its skin. The energies do not count if no tracked frame shows a hand.
     """
-    hands = {side: each.hand for side, each in found.items()}
-    energies = energies_of_sides(sequence, hands, segmentation, progress=progress)
-    shown = all(len(each) for each in energies.values())
-    costs = {side: each.after_mm * (float(energies[side].mean()) if shown else 1.0) for side, each in found.items()}
-    side, other = sorted(found, key=lambda each: costs[each])
-    return replace(found[side], side_margin=costs[other] / costs[side] - 1)
+    costs = {side: each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()}
+    costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
+    side, other = sorted(calibrations, key=lambda each: costs[each])
+    return replace(calibrations[side], side_margin=costs[other] / costs[side] - 1)
 
 
 def _part(progress: Progress, begun: float, share: float) -> Progress:

@@ -1,12 +1,13 @@
 """Options that choose the hand of a tracker."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from depthtrack.cli.stated_default import stated_default
+from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
+    from depthtrack.calibration.calibrate import Calibration
     from depthtrack.hand.shape import HandShape, Side
     from depthtrack.recording import Sequence
     from depthtrack.segmentation.options import SegmentationOptions
@@ -17,8 +18,9 @@ if TYPE_CHECKING:
 class HandOptions:
     """Sizes and surface of the tracker's hand."""
 
-    hand: Annotated[str | None, stated_default(metavar="HAND.json|RIG.glb|truth")] = None
-    """A hand file, a rigged mesh, or the recording's own sizes (default: the average adult's hand)."""
+    hand: Annotated[str | None, stated_default(metavar="HAND.json|RIG.glb|truth|average")] = None
+    """A hand file, a rigged mesh, the recording's own sizes, or the average adult's (default: `track` measures the hand
+    first, other commands use the average)."""
     side: Literal["auto", "right", "left"] = "auto"
     """Side of the average hand, or of the hand to read from a rig with both. `auto` tracks both sides in up to 160
     frames and takes the one that fits better."""
@@ -50,9 +52,10 @@ class HandOptions:
         """Return the side of the hand in a recording; None if `hand` or `side` states it."""
         from depthtrack.cli.progress import percent_bar
         from depthtrack.machine import usable_cores
+        from depthtrack.recording.hand_choice import AVERAGE
         from depthtrack.tracking.side_choice import choose_side
 
-        if self.hand is not None or self.side != "auto":
+        if self.hand not in (None, AVERAGE) or self.side != "auto":
             return None
         with percent_bar() as show:
             return choose_side(
@@ -63,21 +66,52 @@ class HandOptions:
                 progress=lambda done, total: show("side of the hand", done / total),
             )
 
-    def note(self, sequence: "Sequence", path: Path, choice: "SideChoice | None") -> str | None:
-        """Return advice on the hand for the recording at `path`; None if one was given.
+    def measured(
+        self,
+        sequence: "Sequence",
+        segmentation: "SegmentationOptions",
+        threads: int | None = None,
+        frames: int | None = None,
+    ) -> "HandShape | None":
+        """Return the hand that is measured on a recording; None if `hand` states one.
 
-        choice: what `choose_side` returned.
+        Its figures are printed.
+
+        The average adult's hand is returned if the recording does not show a hand well enough.
         """
+        from depthtrack.cli.measuring import calibrate_sequence
+        from depthtrack.hand.shape import HandShape
+
         if self.hand is not None:
             return None
-        if choice is not None and not choice.sure:
-            return f"side: uncertain; give --side, or measure this hand with  depthtrack calibrate {path}"
-        own = sequence.hand
-        if own is None:
-            return f"sizes: the average adult's; measure this hand with  depthtrack calibrate {path}"
-        chosen = self.chosen(sequence, choice)
-        if own.side != chosen.side:
-            return f"side: the recording shows a {own.side} hand: give --side or --hand truth"
-        if own == chosen:
-            return None
-        return "sizes: the average adult's; the recording's own are used with  --hand truth"
+        try:
+            found = calibrate_sequence(sequence, segmentation, self.given_side, threads=threads, frames=frames)
+        except InputError as error:
+            side = self.given_side or "right"
+            print(f"the average adult's {side} hand is assumed: {error}", flush=True)
+            return HandShape(side=side)
+        print(measured_text(found), flush=True)
+        return found.hand
+
+
+def side_text(choice: "SideChoice") -> str:
+    """Return a line on the side of an average hand."""
+    if choice.frames == 0:
+        return "a right hand is assumed: no hand was found in the frames that were tried"
+    other = "left" if choice.side == "right" else "right"
+    uncertain = "" if choice.sure else "; the side is uncertain: give --side"
+    margin = f"a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames"
+    return f"a {choice.side} hand: {margin}{uncertain}"
+
+
+def measured_text(found: "Calibration") -> str:
+    """Return one or two lines on a measured hand."""
+    hand, other = found.hand, "left" if found.hand.side == "right" else "right"
+    margin = "" if found.side_margin is None else f", a {other} one fits {100 * found.side_margin:.0f} % worse"
+    length = found.measured["hand_length"]
+    sizes = (
+        f"a {hand.side} hand{margin}; {length.mm:.0f} mm long, standard deviation {length.sigma_mm:.0f} mm; "
+        f"{found.after_mm:.1f} mm from the skin of the points of {len(found.observations)} frames "
+        f"(average hand {found.before_mm:.1f} mm)"
+    )
+    return sizes if found.side_sure else f"{sizes}\nthe side is uncertain: give --side"

@@ -18,6 +18,7 @@ def calibrate_sequence(
     side: "Side | None" = None,
     seed: int = 0,
     threads: int | None = None,
+    frames: int | None = None,
 ) -> "Calibration":
     """Return the calibration of a recording's hand; both sides are tried if `side` is None.
 
@@ -27,7 +28,9 @@ def calibrate_sequence(
     from depthtrack.api.measuring import calibrate
 
     with percent_bar() as show:
-        return calibrate(sequence, side, segmentation=segmentation, seed=seed, threads=threads, progress=show)
+        return calibrate(
+            sequence, side, segmentation=segmentation, seed=seed, threads=threads, frames=frames, progress=show
+        )
 
 
 def calibrate_rig_on_sequence(

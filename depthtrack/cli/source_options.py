@@ -38,15 +38,17 @@ class SourceOptions:
             InputError: if the number of frames is below 1, or two cameras or an unreadable one are given.
         """
         from depthtrack.evaluation.compare.running import Source
+        from depthtrack.recording.hand_choice import AVERAGE, TRUTH
 
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
-        hand, skin_model = self.hands.hand, self.skin_model
+        hand = None if self.hands.hand == AVERAGE else self.hands.hand
+        skin_model = self.skin_model
         return Source(
             path=str(path.resolve()),
             camera=self._camera(),
             on_damage=self.on_damage,
-            hand=hand if hand in (None, "truth") else str(Path(hand).resolve()),
+            hand=hand if hand in (None, TRUTH) else str(Path(hand).resolve()),
             skin_model=None if skin_model is None else str(skin_model.resolve()),
             frames=self.frames,
             side=self.hands.given_side,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
-from depthtrack.cli.hand_options import HandOptions
+from depthtrack.cli.hand_options import HandOptions, side_text
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
 from depthtrack.cli.stated_default import stated_default
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
     from depthtrack.recording.sequence import Sequence as Recording
     from depthtrack.tracking.run_configuration import RunConfiguration
-    from depthtrack.tracking.side_choice import SideChoice
 
 
 @dataclass(frozen=True)
@@ -81,8 +80,7 @@ class TrackCommand:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
         tracker = self.tracker_config  # checked before the recording is opened
         sequence = self._open()
-        choice = None if self._stored is not None else self._choose_side(sequence)
-        configuration = self._configuration(sequence, tracker, choice)
+        configuration = self._configuration(sequence, tracker)
         with (
             TrackingRun(configuration, sequence, self.threads or usable_cores()) as run,
             counter(len(run), leave=True) as shown,
@@ -91,7 +89,7 @@ class TrackCommand:
             for each in run.write(self.out, resume=self.resume):
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
-        self._report(sequence, choice)
+        self._report()
 
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
@@ -113,37 +111,37 @@ class TrackCommand:
         where = str(self.out / "run.json")
         return RunConfiguration.from_fields(read_configuration(self.out), where).hand_shape(where)
 
-    def _choose_side(self, sequence: "Recording") -> "SideChoice | None":
-        choice = self.hands.choose_side(sequence, self.segmentation_options, self.threads, self.frames)
-        if choice is not None and choice.frames == 0:
-            print("a right hand is assumed: no hand was found in the frames that were tried", flush=True)
-        elif choice is not None:
-            other = "left" if choice.side == "right" else "right"
-            print(
-                f"a {choice.side} hand: a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames",
-                flush=True,
-            )
-        return choice
+    def _hand(self, sequence: "Recording") -> "HandShape":
+        """Return the hand to track with: a stored, a given or a measured one."""
+        if self._stored is not None:
+            return self._stored
+        options, segmentation = self.hands, self.segmentation_options
+        if (measured := options.measured(sequence, segmentation, self.threads, self.frames)) is not None:
+            return measured
+        choice = options.choose_side(sequence, segmentation, self.threads, self.frames)
+        if choice is not None:
+            print(side_text(choice), flush=True)
+        return options.chosen(sequence, choice)
 
-    def _configuration(
-        self, sequence: "Recording", tracker: TrackerConfig, choice: "SideChoice | None"
-    ) -> "RunConfiguration":
-        from depthtrack.tracking.run import configure
+    def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
+        from depthtrack.tracking.run import check_run, configure
 
-        hand = self._stored or self.hands.chosen(sequence, choice)
-        return configure(
+        configuration = configure(
             self.recording.path,
             sequence,
             tracker,
-            hand,
+            self._stored or self.hands.chosen(sequence),
             self.segmentation_options,
             start=self.start,
             frames=self.frames,
             on_damage=self.recording.on_damage,
             keypoints=None if self.keypoints is None else str(self.keypoints.resolve()),
         )
+        # To measure the hand takes long, so everything else is checked before.
+        check_run(configuration, sequence, self.out, self.resume)
+        return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
-    def _report(self, sequence: "Recording", choice: "SideChoice | None") -> None:
+    def _report(self) -> None:
         from depthtrack.recording.run_folder import read_rows
 
         rows = read_rows(self.out)
@@ -151,8 +149,6 @@ class TrackCommand:
             f"{self.out}: {len(rows)} frames, {sum(not row.status.is_trusted for row in rows)} without a trusted pose"
         )
         print(f"errors and timing:  depthtrack evaluate {self.out}")
-        if self._stored is None and (note := self.hands.note(sequence, self.recording.path, choice)) is not None:
-            print(note)
 
 
 def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]:

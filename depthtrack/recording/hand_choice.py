@@ -9,22 +9,24 @@ from depthtrack.recording.sequence import Sequence
 
 TRUTH = "truth"
 """The name that selects the recording's own sizes."""
+AVERAGE = "average"
+"""The name that selects the average adult's hand."""
 
 
 def chosen_hand(sequence: Sequence, hand: str | None = None, side: Side | None = None) -> HandShape:
     """Return the hand of a file, the recording's own, or the average adult's.
 
-    hand: path of a hand file (hand.json) or a rigged mesh (.glb, .gltf); "truth" for the recording's own; None for the
-        average adult's.
+    hand: path of a hand file (hand.json) or a rigged mesh (.glb, .gltf); "truth" for the recording's own; "average" or
+        None for the average adult's.
     side: the side of the average hand, right if None; otherwise the side that the hand must have.
 
     Raises:
         InputError: if the file holds no hand or the other side's, or if the recording has no sizes.
     """
-    if hand is None:
+    if hand in (None, AVERAGE):
         return HandShape(side=side or "right")
     if hand != TRUTH:
-        return load_hand(Path(hand), side)
+        return load_hand(Path(str(hand)), side)
     own = sequence.hand
     if own is None:
         raise InputError(

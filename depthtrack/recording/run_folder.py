@@ -78,9 +78,8 @@ class RunWriter(Closing):
         self.folder = folder
         self._stages = tuple(stages)
         self.rows: list[RunRow] = []
+        check_unused(folder, resume)
         started = (folder / "run.json").exists()
-        if started and not resume:
-            raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
         folder.mkdir(parents=True, exist_ok=True)
         if started:
             before = read_configuration(folder)
@@ -258,6 +257,16 @@ def _cells(row: RunRow) -> list[str]:
     pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
     shares = map(repr, (row.energy, row.agreement, row.confidence, *row.visibility))
     return [str(row.index), repr(row.timestamp), row.status, *shares, *pose]
+
+
+def check_unused(folder: Path, resume: bool) -> None:
+    """Check that a folder holds no run, unless it is resumed.
+
+    Raises:
+        InputError: if it holds one.
+    """
+    if not resume and (folder / "run.json").exists():
+        raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
 
 
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:

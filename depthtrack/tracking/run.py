@@ -12,7 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
-from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_folder import RunWriter, check_unused
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
@@ -113,6 +113,21 @@ class TrackingRun(Closing):
     def close(self) -> None:
         """Free the tracker."""
         self.tracker.close()
+
+
+def check_run(
+    configuration: RunConfiguration, sequence: Sequence, folder: Path | None = None, resume: bool = False
+) -> None:
+    """Check that a run can begin, before the hand is measured for it.
+
+    folder: where it will be written, if anywhere.
+
+    Raises:
+        InputError: as `TrackingRun`, or if the folder holds a run and `resume` is false.
+    """
+    if folder is not None:
+        check_unused(folder, resume)
+    TrackingRun(configuration, sequence).close()
 
 
 def true_start(sequence: Sequence) -> Array:

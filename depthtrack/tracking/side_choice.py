@@ -5,8 +5,7 @@ hand moves, the fingers of the wrong hand would have to bend backwards, and its 
 """
 
 from collections.abc import Callable, Mapping
-from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,27 +13,16 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.options import option
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking.configuration import HybridConfig, TrackerConfig
-from depthtrack.tracking.pipeline import Pipeline, track_frames
-from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, track_stretches
 from depthtrack.types import Array
 
 
 @dataclass(frozen=True)
 class SideOptions:
-    """Frames that both sides are tracked in, and the tracker."""
+    """Frames that both sides are tracked in, and the margin of a certain side."""
 
-    stretches: int = option(8, "Stretches of the recording, evenly spread")
-    stretch_frames: int = option(20, "Frames of each stretch", unit="frames")
+    stretches: StretchOptions = option(StretchOptions(), "Frames that both sides are tracked in")
     sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
-    tracker: TrackerConfig = option(HybridConfig(), "Tracker of both sides")
-
-    def frames(self, length: int) -> list[int]:
-        """Return the frames to track of a recording with `length` frames."""
-        starts = np.linspace(0, max(0, length - self.stretch_frames), self.stretches).round().astype(int)
-        chosen = {index for start in starts for index in range(start, min(length, start + self.stretch_frames))}
-        return sorted(map(int, chosen))
 
 
 DEFAULTS = SideOptions()
@@ -47,12 +35,14 @@ class SideChoice:
     margin: share by which the mean energy of the other side is higher.
     sure: whether that is enough.
     frames: number of frames that both were tracked in.
+    views: poses of the average hand of each side.
     """
 
     side: Side
     margin: float
     sure: bool
     frames: int
+    views: Mapping[Side, tuple[TrackedView, ...]] = field(default_factory=dict, repr=False, compare=False)
 
 
 def choose_side(
@@ -69,38 +59,50 @@ def choose_side(
     progress: called with the number of tracked frames, and of all frames to track.
     """
     hands: dict[Side, HandShape] = {"right": HandShape(), "left": HandShape(side="left")}
-    energies = energies_of_sides(sequence, hands, segmentation, threads, frames, options, progress)
-    if not len(energies["right"]):
-        return SideChoice("right", 0.0, False, 0)
-    means = {side: float(values.mean()) for side, values in energies.items()}
+    tracked = track_sides(sequence, hands, segmentation, threads, frames, options.stretches, progress)
+    views = {side: each.views for side, each in tracked.items()}
+    means, count = mean_energies(tracked)
+    if count == 0:
+        return SideChoice("right", 0.0, False, 0, views)
     side, other = sorted(means, key=lambda each: means[each])
     margin = means[other] / means[side] - 1
-    return SideChoice(side, margin, margin >= options.sure_margin, len(energies[side]))
+    return SideChoice(side, margin, margin >= options.sure_margin, count, views)
 
 
-def energies_of_sides(
+def track_sides(
     sequence: Sequence,
     hands: Mapping[Side, HandShape],
     segmentation: SegmentationOptions | None = None,
     threads: int = 1,
     frames: int | None = None,
-    options: SideOptions = DEFAULTS,
+    options: StretchOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[Side, Array]:
-    """Return the energies (N,) of hands of both sides, in frames in which both were observed.
+) -> dict[Side, TrackedStretches]:
+    """Return the stretches of a recording tracked with hands of both sides.
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
     """
-    indices = options.frames(min(len(sequence), frames or len(sequence)))
-    energies = np.full((len(hands), len(indices)), np.nan)
-    for row, hand in enumerate(hands.values()):
-        segmenter = Segmenter.for_sequence(sequence, segmentation)
-        with closing(create_tracker(options.tracker, hand, threads)) as tracker:
-            pipeline = Pipeline(tracker, segmenter, hand)
-            for column, each in enumerate(track_frames(sequence.frames(indices), pipeline)):
-                energies[row, column] = each.estimate.energy
-                if progress is not None:
-                    progress(row * len(indices) + column + 1, len(hands) * len(indices))
+
+    def part(number: int) -> Callable[[int, int], None] | None:
+        if progress is None:
+            return None
+        return lambda done, total: progress(number * total + done, len(hands) * total)
+
+    return {
+        side: track_stretches(sequence, hand, segmentation, threads, frames, options, part(number))
+        for number, (side, hand) in enumerate(hands.items())
+    }
+
+
+def mean_energies(tracked: Mapping[Side, TrackedStretches]) -> tuple[dict[Side, float], int]:
+    """Return the mean energy of each side, and the number of frames with both poses.
+
+    Other frames do not count.
+    """
+    energies: Array = np.array([each.energies for each in tracked.values()])
     known = np.isfinite(energies).all(axis=0)
-    return {side: energies[row, known] for row, side in enumerate(hands)}
+    if not known.any():
+        return dict.fromkeys(tracked, np.inf), 0
+    means = energies[:, known].mean(axis=1).tolist()
+    return dict(zip(tracked, means, strict=True)), int(known.sum())

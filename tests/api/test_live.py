@@ -25,7 +25,8 @@ def blind(**options: Any) -> dt.HandTracker:
 
 @pytest.mark.parametrize("name", [name for name in CONFIGURATIONS if name != "lift"])
 def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, name: str) -> None:
-    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1"]) == 0
+    command = ["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1", "--hand", "truth"]
+    assert main(command) == 0
     run = dt.read_run(tmp_path / "run")
     recording = dt.open_recording(path)
     with dt.HandTracker(recording.camera, tracker=name) as tracker:
@@ -72,7 +73,7 @@ def test_without_colour_the_bits_are_those_of_a_recording_without_colour(path: P
     shutil.copytree(path, tmp_path / "grey")
     (tmp_path / "grey" / "rgb.txt").unlink()
     config, recording = dt.tracker_config("ik", resolution=64), dt.open_recording(path)
-    expected = [each.estimate.pose for each in dt.track(tmp_path / "grey", tracker=config)]
+    expected = [each.estimate.pose for each in dt.track(tmp_path / "grey", dt.HandShape(), config)]
     with dt.HandTracker(recording.camera, tracker=config) as tracker:
         found = [tracker.update(frame.depth, timestamp=frame.timestamp).pose for frame in recording]
     np.testing.assert_array_equal(found, expected)

@@ -15,19 +15,28 @@ def test_the_arguments_reach_the_calibration(path: Path, monkeypatch: pytest.Mon
     seen: list[Any] = []
     stages: list[str] = []
 
-    def calibrate(views: Any, scorer: Any, side: Any, seed: Any, source: Any, progress: Any) -> str:
-        seen.extend((len(views), side, seed, source))
-        with scorer(dt.HandShape()):
-            progress("measuring", 1.0)
+    def calibrate(
+        sequence: Any,
+        side: Any,
+        views: Any,
+        segmentation: Any,
+        seed: Any,
+        threads: Any,
+        frames: Any,
+        progress: Any,
+    ) -> str:
+        seen.extend((len(sequence), side, seed, threads, frames))
+        progress("measuring", 1.0)
         return "a calibration"
 
-    monkeypatch.setattr(measuring, "choose_views", lambda sequence, segmenter: list(sequence))
-    monkeypatch.setattr(measuring, "calibrate_views", calibrate)
+    monkeypatch.setattr(measuring, "calibrate_side", calibrate)
     recording: Recording = dt.open_recording(path) if as_object else str(path)
-    found: Any = dt.calibrate(recording, "left", seed=3, progress=lambda stage, share: stages.append(stage))
+    found: Any = dt.calibrate(
+        recording, "left", seed=3, threads=1, frames=2, progress=lambda stage, share: stages.append(stage)
+    )
     assert found == "a calibration"
-    assert seen == [4, "left", 3, "calibrated on everyday"]
-    assert stages == ["choosing frames", "measuring"]
+    assert seen == [4, "left", 3, 1, 2]
+    assert stages == ["measuring"]
 
 
 def test_only_rigs_are_scaled(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,10 @@ import pytest
 
 from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly
+from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.parameters import (
     COUNT,
+    KNUCKLES,
     LENGTHS,
     SCALE,
     hand_of,
@@ -18,6 +20,7 @@ from depthtrack.calibration.parameters import (
     prior_covariance,
 )
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise
+from depthtrack.calibration.solid_hands import is_solid, nearest_solid, solid_step
 from depthtrack.calibration.views import choose_views, finger_area
 from depthtrack.cli import main
 from depthtrack.cli.calibrate import _text
@@ -30,17 +33,17 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
-from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.stretches import StretchOptions
 from depthtrack.viewing.calibration_picture import shown_views
 from tests.support.observations import observe
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("calibration")]
 
 
 def _rendered(pose: np.ndarray) -> Observation:
@@ -75,17 +78,21 @@ TRUE_HAND = hand_of(_sizes(), "right")
 
 @pytest.fixture(scope="module")
 def made() -> Synthesiser:
-    return Synthesiser(Synthesis(model="skin", hand=TRUE_HAND))
+    return Synthesiser(Synthesis(model="skin", hand=TRUE_HAND, frames=160))
 
 
 @pytest.fixture(scope="module")
-def calibration(made: Synthesiser) -> Calibration:
-    return calibrate([observe(made, i) for i in range(5, 355, 80)], RasterScorer, "right")
+def calibration(made: Synthesiser, tmp_path_factory: pytest.TempPathFactory) -> Calibration:
+    """Three stretches are tracked, at most three times."""
+    folder = tmp_path_factory.mktemp("calibration") / "everyday"
+    write_recording(made, folder)
+    options = CalibrationOptions(stretches=StretchOptions(stretches=3), rounds=3)
+    return calibrate(open_sequence(folder), "right", options=options)
 
 
 def test_scale_lengths_and_side_are_recovered(calibration: Calibration) -> None:
     hand = calibration.hand
-    assert hand.side == "right"
+    assert (hand.side, hand.source) == ("right", "calibrated on everyday")
     assert hand.scale == pytest.approx(0.9, rel=0.02)
     found, true = hand.lengths.sum(axis=1) * hand.scale, TRUE_HAND.lengths.sum(axis=1) * TRUE_HAND.scale
     np.testing.assert_allclose(found, true, atol=0.0025)
@@ -184,6 +191,19 @@ def test_the_true_hand_in_its_true_pose_has_no_residuals(made: Synthesiser) -> N
     average = linearise(CalibrationView(observation), PosedSkin(HandShape()), made.poses[40], 0.006)
     assert true.distance < 1e-4 < average.distance
     assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
+
+
+def test_fingers_that_grow_together_are_parted() -> None:
+    """The bases of three fingers are moved to the same place."""
+    values, across = _sizes(), slice(KNUCKLES.start, KNUCKLES.start + 6, 2)
+    values[across] = -0.02, 0.0, 0.02
+    assert not is_solid(values, "left")
+    parted = nearest_solid(values, "left")
+    assert is_solid(parted, "left")
+    assert parted[SCALE] == values[SCALE]
+    assert -0.02 < parted[KNUCKLES.start] < 0
+    assert nearest_solid(_sizes(), "left").tolist() == _sizes().tolist()
+    assert is_solid(solid_step(_sizes(), values - _sizes(), "left"), "left")
 
 
 def test_open_hands_are_chosen_before_fists() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +13,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.run_folder import read_configuration
-from depthtrack.segmentation.observation import Observation
+from depthtrack.recording.sequence import Sequence
 from tests.support.runs import synthesise
 
 
@@ -63,16 +62,15 @@ def test_the_hand_of_a_users_recording_is_calibrated_once_and_used(
     """The calibration itself is replaced."""
     calls: list[int] = []
 
-    def measured(sequence: object, observations: Sequence[Observation], *_: Any) -> SimpleNamespace:
-        calls.append(len(observations))
+    def measured(sequence: Sequence, *_: Any) -> SimpleNamespace:
+        calls.append(len(sequence))
         hand = HandShape(scale=1.07)
         return SimpleNamespace(hand=hand, to_json=hand.to_json)
 
     monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", measured)
-    monkeypatch.setattr("depthtrack.api.measuring.choose_views", lambda *_: [None] * 5)
     for _ in range(2):
         assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
-    assert calls == [5]
+    assert calls == [3]
     for run in (tmp_path / "demo" / "runs").iterdir():
         assert read_configuration(run)["hand"]["scale"] == 1.07
 
@@ -83,7 +81,7 @@ def test_the_average_hand_is_used_if_the_calibration_fails(
     def refused(*_: Any) -> None:
         raise InputError("this recording shows no open hand")
 
-    monkeypatch.setattr("depthtrack.api.measuring.choose_views", refused)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", refused)
     assert main(["demo", str(own), "-o", str(tmp_path / "demo"), "--jobs", "1"]) == 0
     assert "shows no open hand" in capsys.readouterr().out
     for run in (tmp_path / "demo" / "runs").iterdir():

@@ -11,16 +11,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import depthtrack as dt
+from depthtrack.calibration.calibrate import Calibration, Measured
 from depthtrack.cli import main
+from depthtrack.errors import InputError
 from depthtrack.evaluation.replay import Replay
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run_folder import Run
+from depthtrack.recording.run_folder import Run, read_configuration
 from depthtrack.rendering.raster import RasterScorer
 from tests.support.runs import synthesise
 
 FRAMES = 14
 RESOLUTION = 64
 _QUICK = (
+    "--hand",
+    "average",
+    "--side",
+    "right",
     "--tracker",
     "pso",
     "--resolution",
@@ -117,20 +125,71 @@ def test_a_recording_without_true_poses_cannot_start_from_them(
     assert not (tmp_path / "run").exists()
 
 
-def test_a_recording_without_hand_sizes_gets_advice_to_calibrate(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_hand_is_measured_unless_one_is_given(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    import shutil
+    """The measurement itself is replaced; its tests are in tests/calibration."""
+    hand, nothing = HandShape(side="left", scale=0.93), np.zeros((0, 27))
+    sizes = {"hand_length": Measured(178.0, 2.0, 0.9)}
+    found = Calibration(hand, sizes, 0.12, 3.0, 1.0, (), nothing, nothing)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", lambda *_: found)
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_side", lambda *_: found)
+    short = ("--tracker", "ik", "--frames", "1", "--resolution", str(RESOLUTION))
+    run = tmp_path / "run"
+    assert main(["track", str(recording), "-o", str(run), *short]) == 0
+    printed = capsys.readouterr().out
+    assert "a left hand, a right one fits 12 % worse; 178 mm long" in printed
+    assert "the side is uncertain: give --side" in printed
+    assert read_configuration(run)["hand"]["scale"] == 0.93
+    assert main(["track", str(recording), "-o", str(run), *short, "--resume"]) == 0
+    assert "mm long" not in capsys.readouterr().out
+    assert main(["track", str(recording), "-o", str(tmp_path / "given"), *short, "--hand", "truth"]) == 0
+    assert "mm long" not in capsys.readouterr().out
 
-    unsized = tmp_path / "unsized"
-    shutil.copytree(recording, unsized)
-    (unsized / "hand.json").unlink()
-    short = (*_QUICK, "--frames", "1")
-    for path, more, advised in ((unsized, (), True), (unsized, ("--hand", str(recording / "hand.json")), False)):
-        assert main(["track", str(path), "-o", str(tmp_path / f"run{advised}"), *short, *more]) == 0
-        assert (f"measure this hand with  depthtrack calibrate {unsized}" in capsys.readouterr().out) == advised
-    assert main(["track", str(recording), "-o", str(tmp_path / "sized"), *short]) == 0
-    assert "average" not in capsys.readouterr().out
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (["-o", "{run}"], "already holds a run"),
+        (["-o", "{new}", "--tracker", "ik", "--synergies", "leap", "--components", "99"], "components"),
+        (["-o", "{new}", "--tracker", "lift"], "must have keypoints"),
+    ],
+)
+def test_mistakes_are_found_before_the_hand_is_measured(
+    recording: Path,
+    run: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    more: list[str],
+    expected: str,
+) -> None:
+    def measured(*_: object) -> None:
+        raise AssertionError("the hand was measured")
+
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_either_side", measured)
+    options = [each.format(run=run, new=tmp_path / "new") for each in more]
+    assert main(["track", str(recording), *options]) == 2
+    assert expected in capsys.readouterr().err
+    tracker = dt.tracker_config("ik", synergies="leap", components=99)
+    monkeypatch.setattr("depthtrack.api.choices.calibrate_either_side", measured)
+    with pytest.raises(InputError):
+        dt.track(recording, tracker=tracker)
+    with pytest.raises(InputError, match="already holds a run"):
+        dt.track(recording, out=run)
+
+
+def test_the_average_hand_is_tracked_if_none_can_be_measured(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(*_: object) -> None:
+        raise InputError("a hand was tracked in 2 of 32 frames")
+
+    monkeypatch.setattr("depthtrack.api.measuring.calibrate_side", refused)
+    command = ["track", str(recording), "-o", str(tmp_path / "run"), "--tracker", "ik", "--frames", "1"]
+    assert main([*command, "--side", "left"]) == 0
+    assert "the average adult's left hand is assumed: a hand was tracked in 2 of" in capsys.readouterr().out
+    assert read_configuration(tmp_path / "run")["hand"]["side"] == "left"
 
 
 def test_errors_are_one_sentence_without_traceback(

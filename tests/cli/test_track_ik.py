@@ -20,7 +20,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def track(recording: str, run: Path, *more: str) -> int:
-    return main(["track", recording, "-o", str(run), "--tracker", "ik", "--start", "truth", *more])
+    return main(["track", recording, "-o", str(run), "--tracker", "ik", "--start", "truth", "--hand", "truth", *more])
 
 
 def test_a_run_restricted_to_synergies_stays_in_their_space_and_stores_them(recording: str, tmp_path: Path) -> None:

@@ -131,7 +131,10 @@ def test_runs_without_frames_raise_an_input_error(recording: Path, tmp_path: Pat
 
 
 def test_runs_without_labels_are_named_by_their_options(recording: Path, tmp_path: Path) -> None:
-    """Runs are named by options that differ from the defaults, else by their folders."""
+    """Runs are named by options that differ from the defaults, else by their folders.
+
+    These runs have the layout of an earlier version, whose trackers followed no branches.
+    """
     poses = true_poses(recording)
     more: dict[str, Any] = {"variant": "default", "particles": 64, "seed": 0}
     runs = [
@@ -143,10 +146,10 @@ def test_runs_without_labels_are_named_by_their_options(recording: Path, tmp_pat
     ]
     results = tracker_results([evaluate_run(run, residuals=False) for run in runs])
     assert [(result.label, len(result.evaluations)) for result in results] == [
-        ("PSO", 1),
+        ("PSO interval=0.0", 1),
         ("OIKONOMIDIS2011", 2),
-        ("IK, ik_a", 1),
-        ("IK, ik_b", 1),
+        ("IK interval=0.0, ik_a", 1),
+        ("IK interval=0.0, ik_b", 1),
     ]
 
 

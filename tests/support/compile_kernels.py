@@ -21,7 +21,9 @@ def compile_kernels() -> int:
             codes.append(depthtrack(["synth", "everyday", recording, "--frames", "3", *scene]))
             for tracker, (name, *options) in enumerate(TRACKERS):
                 run = str(Path(folder) / f"run-{number}-{tracker}")
-                codes.append(depthtrack(["track", recording, "-o", run, "--tracker", name, *options]))
+                codes.append(
+                    depthtrack(["track", recording, "-o", run, "--tracker", name, "--hand", "truth", *options])
+                )
     return max(codes)
 
 

@@ -108,7 +108,7 @@ def test_a_restored_tracker_returns_the_same_bits(everyday_skin: Synthesiser) ->
 def test_a_run_is_resumed_with_its_own_keypoints_only(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = synthesise(tmp_path / "made", 4, "--keypoints")
     file, run = made / "keypoints.csv", tmp_path / "run"
-    command = ["track", str(made), "--tracker", "ik", "--resolution", "64", "--side", "right", "--threads", "1"]
+    command = ["track", str(made), "--tracker", "ik", "--resolution", "64", "--hand", "truth", "--threads", "1"]
     assert main([*command, "-o", str(run), "--keypoints", str(file)]) == 0
     whole = Run.load(run).poses
     lines = (run / "poses.csv").read_text().splitlines(keepends=True)

@@ -13,11 +13,11 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
-from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
+from depthtrack.tracking.stretches import StretchOptions, TrackedStretches
 
-OPTIONS = SideOptions(stretches=2, stretch_frames=3, tracker=HybridConfig())
+OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
 
 
 def recorded(folder: Path, side: Side) -> Path:
@@ -29,8 +29,8 @@ def recorded(folder: Path, side: Side) -> Path:
 
 
 def test_frames_are_spread_over_the_recording() -> None:
-    assert SideOptions(stretches=3, stretch_frames=2).frames(11) == [0, 1, 4, 5, 9, 10]
-    assert SideOptions(stretches=3, stretch_frames=20).frames(5) == [0, 1, 2, 3, 4]
+    assert StretchOptions(stretches=3, stretch_frames=2).frames(11) == [0, 1, 4, 5, 9, 10]
+    assert StretchOptions(stretches=3, stretch_frames=20).frames(5) == [0, 1, 2, 3, 4]
 
 
 @pytest.mark.slow
@@ -41,11 +41,12 @@ def test_the_side_is_found_and_its_hand_tracked(tmp_path: Path, side: Side, caps
     assert (choice.side, choice.frames) == (side, 6)
     assert choice.margin > 0.05
     assert choice.sure == (choice.margin >= OPTIONS.sure_margin)
-    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik"]) == 0
+    command = ["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik", "--hand", "average"]
+    assert main(command) == 0
     assert f"a {side} hand: a " in capsys.readouterr().out
     run = Run.load(tmp_path / "run")
     assert RunConfiguration.of(run).hand_shape().side == side
-    assert main(["track", str(path), "-o", str(tmp_path / "run"), "--frames", "4", "--tracker", "ik", "--resume"]) == 0
+    assert main([*command, "--resume"]) == 0
 
 
 def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -55,7 +56,7 @@ def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys:
             writer.append(index / 30, np.zeros(made.sensor.camera.shape, np.float32))
     assert choose_side(open_sequence(tmp_path / "empty"), options=OPTIONS) == SideChoice("right", 0.0, False, 0)
     assert main(["track", str(tmp_path / "empty"), "-o", str(tmp_path / "run"), "--tracker", "ik"]) == 0
-    assert "a right hand is assumed" in capsys.readouterr().out
+    assert "the average adult's right hand is assumed" in capsys.readouterr().out
     assert Run.load(tmp_path / "run").status == ("absent",) * 3
 
 
@@ -72,16 +73,17 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
 
     tried = list[Side]()
 
-    def calibrate(views: object, scorer: object, side: Side, *rest: object) -> Measured:
+    def calibrate(sequence: object, side: Side, *rest: object) -> Measured:
         tried.append(side)
         return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side])
 
     monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
     monkeypatch.setattr(sides, "calibrate", calibrate)
-    energies = {"right": np.array([11.0]), "left": np.array([10.0])}
-    monkeypatch.setattr(sides, "energies_of_sides", lambda *rest, **more: energies)
-    found = calibrate_either_side(None, [], None)  # type: ignore[arg-type]
+    energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
+    tracked = {side: TrackedStretches(values, ()) for side, values in energies.items()}
+    monkeypatch.setattr(sides, "track_sides", lambda *rest, **more: tracked)
+    found = calibrate_either_side(None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
     assert found.hand.side == ("left" if sure else "right")
-    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / 11 - 1)
+    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)

@@ -4,7 +4,6 @@ Each recording is tracked with three hands: the calibrated one, the same of the 
 """
 
 from contextlib import closing
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,11 @@ import numpy as np
 from depthtrack.benchmarks.crossmodel.measure import TRACKERS, true_joints
 from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import calibrate
-from depthtrack.calibration.views import choose_views
 from depthtrack.evaluation.metrics import without_offsets
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording.sequence import Sequence
-from depthtrack.rendering.raster import RasterScorer
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -33,10 +30,9 @@ def measure_evidence(cell: Cell) -> Row:
     Constant offsets of the joints are removed from the errors of hands of the right side.
     """
     with made_recording(**cell) as sequence:
-        views = choose_views(sequence, Segmenter.for_sequence(sequence))
         side: Side = cell["side"]
         other: Side = "left" if side == "right" else "right"
-        calibrated = calibrate(views, partial(RasterScorer, threads=1), side).hand
+        calibrated = calibrate(sequence, side).hand
         hands = {"calibrated": calibrated, "mirrored": calibrated.with_(side=other), "average": HandShape(side=side)}
         joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
         frames: list[Any] = []

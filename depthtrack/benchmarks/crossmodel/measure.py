@@ -1,7 +1,6 @@
 """Measurements of one recording: side, starts, and tracks with a calibrated hand."""
 
 from contextlib import closing
-from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -10,13 +9,11 @@ import numpy as np
 from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.sides import calibrate_either_side
-from depthtrack.calibration.views import choose_views
 from depthtrack.evaluation.metrics import without_offsets
 from depthtrack.evaluation.sweep.rows import Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.recording.sequence import Sequence
-from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.visibility import points_in_view
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
@@ -40,8 +37,7 @@ def measure(**recording: Any) -> Row:
     """Return the figures of a recording, whose options are those of `made_recording`."""
     with made_recording(**recording) as sequence:
         begun = perf_counter()
-        views = choose_views(sequence, Segmenter.for_sequence(sequence))
-        found = calibrate_either_side(sequence, views, partial(RasterScorer, threads=1))
+        found = calibrate_either_side(sequence)
         row: Row = {
             "side_right": found.hand.side == recording["side"],
             "side_sure": found.side_sure,
