@@ -16,7 +16,7 @@ class Objective:
     """Constants of Oikonomidis et al. 2011, Eq. (1) and (2).
 
     Raises:
-        InputError: if a depth, the unit or epsilon is not above 0 and at most 10, or the hidden cost not within 0 to 1.
+        InputError: if a depth, the unit or epsilon is not above 0 and at most 10, or the cost not within 0 to 100.
     """
 
     match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
@@ -32,18 +32,17 @@ class Objective:
         "Depth behind an occluder from which it hides the hand: above a sensor's noise, below a finger's radius",
         unit="m",
     )
-    hidden_cost: float = option(
+    before_cost: float = option(
         1.0,
-        "Cost of a drawn pixel that an occluder hides, as a share of that of a pixel outside the silhouette",
-        source="best of 0, 0.1, 0.25, 0.5 and 1 on seeds 10 to 12 of `everyday` with a sphere",
+        "Further cost of a pixel drawn before or inside an occluder, in costs of a pixel outside the silhouette",
     )
 
     def __post_init__(self) -> None:
         for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon", "hidden_depth"):
             if not 0 < getattr(self, name) <= 10:
                 raise InputError(f"objective {name} must be above 0 and at most 10, found {getattr(self, name)!r}")
-        if not 0 <= self.hidden_cost <= 1:
-            raise InputError(f"objective hidden_cost must lie between 0 and 1, found {self.hidden_cost!r}")
+        if not 0 <= self.before_cost <= 100:
+            raise InputError(f"objective before_cost must lie between 0 and 100, found {self.before_cost!r}")
 
     @property
     def clamp(self) -> float:

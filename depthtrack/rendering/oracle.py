@@ -37,8 +37,8 @@ class OracleScorer(ScorerBase):
 
     def _sums(self, pose: Array) -> tuple[float, float, float]:
         target, drawn = self.target, self._depth(pose)
-        visible = target.unhidden(drawn, self._objective.hidden_depth)
-        return evaluate(self._objective, target.silhouette, target.depth, visible, (drawn > 0) & (visible == 0))
+        before = target.before_occluder(drawn, self._objective.hidden_depth)
+        return evaluate(self._objective, target.silhouette, target.depth, drawn, before)
 
     def render(self, pose: ArrayLike) -> Depth:
         return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)

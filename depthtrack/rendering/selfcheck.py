@@ -30,8 +30,8 @@ _SEED = 11
 """The first seed from 0 that leaves no pixel within half a micrometre of d_m, where float32 rounding would decide."""
 _OCCLUDER = 0.477
 """Metres: depth of an object that hides half of what is drawn behind it, with no pixel within a micrometre."""
-_OBJECTIVE = Objective(hidden_cost=0.5)
-"""Hidden pixels count neither fully nor not at all, so that an error in either shows."""
+_OBJECTIVE = Objective(before_cost=0.5)
+"""Pixels before the object count neither once more nor not at all, so that an error in either shows."""
 ENERGY_TOLERANCE = 1e-3
 DEPTH_TOLERANCE = 1e-4
 """Metres."""

@@ -20,7 +20,7 @@ class Target:
     depth: (h, w) metres, 0 = no reading of the hand.
     occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
 
-    What the occluder hides of a hypothesis counts in Eq. (2) as `Objective.hidden_cost` states.
+    A hypothesis may lie behind the occluder. What lies before it or inside it costs more in Eq. (2).
 
     Raises:
         ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
@@ -92,13 +92,6 @@ class Target:
             return np.zeros(self.camera.shape, np.float32)
         return np.where(self.occluder > 0, np.float32(1) / (self.occluder + np.float32(behind)), np.float32(0))
 
-    def with_occluder(self, rendered: Depth) -> Depth:
-        """Return the nearer of a rendered depth map (h, w), metres, and the occluder."""
-        if self.occluder is None:
-            return rendered
-        before = (self.occluder > 0) & ((rendered == 0) | (self.occluder < rendered))
-        return np.where(before, self.occluder, rendered)
-
     def unhidden(self, rendered: ArrayLike, behind: float) -> Array:
         """Return a rendered depth map (h, w), metres, with 0 where the occluder hides it.
 
@@ -108,6 +101,15 @@ class Target:
         if self.occluder is None:
             return depth
         return np.where((self.occluder > 0) & (depth >= self.occluder.astype(np.float64) + behind), 0.0, depth)
+
+    def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
+        """Return where a rendered depth map (h, w), metres, lies before or inside the occluder; None without one.
+
+        behind: depth behind the occluder's readings, metres.
+        """
+        if self.occluder is None:
+            return None
+        return np.asarray((self.occluder > 0) & (self.unhidden(rendered, behind) > 0), dtype=np.bool_)
 
 
 def _nearest(position: NDArray[np.floating], size: int) -> Index:

@@ -88,7 +88,7 @@ class Segmenter:
             masks = replace(masks, readings=masks.readings & valid, silhouette=masks.silhouette & valid)
         if not masks.readings.any():
             return None
-        if has_colour and self._options.occluder.enabled:
+        if has_colour and self._options.occluder.find_occluder:
             place = located.surface_centre, located.wrist, self._locator.hand
             occluder = find_occluder(frame, masks, *place, self._options.occluder)
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)

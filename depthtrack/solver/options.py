@@ -142,9 +142,6 @@ class SurfaceOptions:
     hidden_depth: float = option(
         0.008, "Depth behind the nearest point of its cell at which a point is hidden", unit="m"
     )
-    occluder_depth: float = option(
-        0.005, "Depth behind an occluder at which a point is hidden, as in the objective", unit="m"
-    )
     cylinder_hidden_depth: float = option(
         0.006, "Depth behind the rendered hand at which cylinders are hidden", unit="m"
     )

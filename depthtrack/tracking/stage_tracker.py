@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.candidate import Candidate, seen_part
 from depthtrack.tracking.confidence import Evidence, evidence_of, finger_visibility, fitted_model
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
@@ -18,7 +18,7 @@ from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.timing import StageClock
 from depthtrack.tracking.tracker import ABSENT, Estimate
-from depthtrack.types import Array
+from depthtrack.types import Array, Depth
 
 
 @dataclass(frozen=True)
@@ -107,17 +107,22 @@ class StageTracker:
             self._state.update(estimate)
             return estimate
         best, status, branches = min(found, key=lambda pair: pair[0].energy)
-        self.evidence, visibility = self._evidence(best, status, observation.timestamp)
+        rendered = self._tools.scorer.render(best.pose)
+        seen = seen_part(best, rendered, self._tools.scorer.target, self._tools.scoring.objective)
+        self.evidence, visibility = self._evidence(seen, rendered, status, observation.timestamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")
         shares = tuple(map(float, visibility))
         time = observation.timestamp
-        return self._state.commit(*best, status, clock.milliseconds, time, confidence, shares, branches)
+        return self._state.commit(*best, status, clock.milliseconds, time, confidence, shares, branches, seen)
 
-    def _evidence(self, best: Candidate, status: Status, timestamp: float) -> tuple[Evidence, Array]:
-        """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""
-        tools, state = self._tools, self._state
-        target, rendered = tools.scorer.target, tools.scorer.render(best.pose)
+    def _evidence(self, best: Candidate, rendered: Depth, status: Status, timestamp: float) -> tuple[Evidence, Array]:
+        """Return the evidence of the chosen pose, and the visibility (5,) of its fingers.
+
+        best: with the energy of the part that no object hides.
+        rendered: (h, w) depth of the posed hand, metres.
+        """
+        tools, state, target = self._tools, self._state, self._tools.scorer.target
         visibility = finger_visibility(tools.model, best.pose, rendered, target)
         rendered = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
         usual = state.median_energy if state.median_energy < np.inf else best.energy

@@ -69,12 +69,12 @@ def assert_window_agrees(platform: Platform, seed: int, reduced: int | None) -> 
     assert_agrees(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
 
 
-def assert_occluded_window_agrees(platform: Platform, seed: int, hidden_cost: float) -> None:
+def assert_occluded_window_agrees(platform: Platform, seed: int, before_cost: float) -> None:
     """A window on a hand that an object hides in part."""
     rng = np.random.default_rng(seed)
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
     target = with_occluder(target_of(shape, poses[0], window_on(shape, poses[0], 224), rng), 0.5, rng)
-    assert_agrees(platform, shape, target, poses, Objective(hidden_cost=hidden_cost))
+    assert_agrees(platform, shape, target, poses, Objective(before_cost=before_cost))
 
 
 def assert_any_camera_agrees(platform: Platform, seed: int) -> None:

@@ -1,6 +1,7 @@
-"""A hand behind an object that it holds is tracked, and hiding may cost less."""
+"""A hand behind an object that it holds is tracked, and lying before the object costs more."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.candidate import evaluate, seen_part
 from depthtrack.tracking.pipeline import roi_prior
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
@@ -38,18 +40,34 @@ def observations(made: Synthesiser) -> list[Observation]:
     return [each for each in found if each is not None]
 
 
-def test_the_true_pose_costs_less_if_hidden_pixels_cost_nothing(
+def test_only_a_hand_before_the_object_costs_more_than_without_it(
     made: Synthesiser, observations: list[Observation]
 ) -> None:
     first = observations[0]
     assert first.occluder is not None
-    energies = []
-    for cost in (0.0, 0.5, 1.0):
-        with create_scorer("raster", HOLDING.hand, Objective(hidden_cost=cost)) as scorer:
-            scorer.set_target(first)
-            energies.append(scorer.score(made.poses[:1])[0])
-    assert energies[0] < energies[1] < energies[2]
-    assert energies[0] < 0.9 * energies[2]
+    nearer = made.poses[0].copy()
+    nearer[2] -= 0.05
+    with create_scorer("raster", HOLDING.hand) as scorer:
+        scorer.set_target(first)
+        true, before = scorer.score(np.stack([made.poses[0], nearer]))
+        scorer.set_target(replace(first, occluder=None))
+        free_true, free_before = scorer.score(np.stack([made.poses[0], nearer]))
+    assert true < 1.02 * free_true
+    assert before > free_before + 0.1
+
+
+def test_what_the_object_hides_does_not_count_against_a_pose(
+    made: Synthesiser, observations: list[Observation]
+) -> None:
+    first, pose = observations[0], made.poses[0]
+    with create_scorer("raster", HOLDING.hand) as scorer:
+        scorer.set_target(first)
+        rendered, (whole,) = scorer.render(pose), evaluate(scorer, pose[None])
+    seen = seen_part(whole, rendered, first, Objective())
+    assert seen.energy < 0.9 * whole.energy
+    assert seen.agreement > whole.agreement
+    free = replace(first, occluder=None)
+    assert seen_part(whole, rendered, free, Objective()) is whole
 
 
 @pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])

@@ -142,7 +142,7 @@ class Renderer:
         """Return the sums (count, 3) of Eq. (2) over the tiles of an atlas; see `sums.sum_tiles`.
 
         observation: a texture written by `upload`.
-        limits: d_m, d_M, metres; `Objective.hidden_cost`.
+        limits: d_m, d_M, metres; `Objective.before_cost`.
 
         The first level of the pyramid compares and the next ones add, until one texel a tile is left (Sec. 2.5).
         """
@@ -156,9 +156,9 @@ class Renderer:
         gl.glBindTexture(gl.GL_TEXTURE_2D, observation)
         gl.glActiveTexture(gl.GL_TEXTURE0)
         tiles, (level, spare) = (min(count, grid.columns), grid.rows(count)), self._pyramid
-        match_depth, clamp_depth, hidden_cost = limits
+        match_depth, clamp_depth, before_cost = limits
         self._compare.use(
-            inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth, hidden_cost=hidden_cost
+            inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth, before_cost=before_cost
         )
         size = self._add_blocks(gl, self._compare, self._atlases[which], level, tiles, (grid.width, grid.height))
         while size != (1, 1):
@@ -195,7 +195,8 @@ class Renderer:
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
         """Write an observation (h, w, 3) to a texture.
 
-        It holds depth (metres), silhouette (0 or 1), and the inverse depth (1/m) that a visible surface exceeds.
+        It holds depth (metres), silhouette (0 or 1), and the inverse depth (1/m) that a surface before or inside
+        an occluder exceeds.
         """
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)

@@ -142,7 +142,7 @@ class OpenGLScorer(ScorerBase):
 
     def _sum(self, gl: Any, which: int, grid: TileGrid, regions: Index, sums: Array) -> None:
         o, target = self._objective, self.target
-        limits = o.match_depth, o.clamp_depth, float(o.hidden_cost)
+        limits = o.match_depth, o.clamp_depth, float(o.before_cost)
         if self.sums == "gpu":
             sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], limits)
         else:

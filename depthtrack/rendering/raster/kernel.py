@@ -111,12 +111,12 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
-    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. Of a
-    hidden pixel, the share `Objective.hidden_cost` counts as drawn outside the silhouette.
+    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. A pixel
+    before or inside an occluder counts `Objective.before_cost` times more, as outside the silhouette.
 
-    limits: d_m, d_M, metres; `Objective.hidden_cost`.
+    limits: d_m, d_M, metres; `Objective.before_cost`.
     """
-    match_depth, clamp_depth, hidden_cost = limits
+    match_depth, clamp_depth, before_cost = limits
     clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
     nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
     for tile_column in range(low.shape[0]):
@@ -128,7 +128,7 @@ def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows,
         for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             w = _load(buffer, index)
             o = _load(observed, index)
-            drawn = w > _load(hidden_from, index) if has_occluder else w > 0.0
+            drawn = w > 0.0
             z = estimated_reciprocal(w)
             z = z + z * (one - w * z)
             difference = vabs(o - z)
@@ -140,9 +140,10 @@ def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows,
             matched = matched + hit
             on_silhouette = on_silhouette + hit * _load(silhouette, index)
             if has_occluder:
-                hidden = select(w > 0.0, select(drawn, nothing, hidden_cost), 0.0)
-                in_column = in_column + hidden * (clamp_depth - vmin(o, clamp_depth))
-                matched = matched + hidden * (one - _load(silhouette, index))
+                behind = _load(hidden_from, index)
+                before = select(both(behind > 0.0, w > behind), _fill(before_cost), 0.0)
+                in_column = in_column + before * clamp_depth
+                matched = matched + before * (one - _load(silhouette, index))
             store(buffer, index, nothing)
         clamped = clamped + in_column
     return vsum(clamped), vsum(on_silhouette), vsum(matched)
@@ -180,9 +181,9 @@ def score_poses(
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     silhouette: 0 or 1, tiled.
     has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
-    hidden_from: inverse depth, 1/m, that a visible surface exceeds, tiled.
+    hidden_from: inverse depth, 1/m, that a surface before or inside an occluder exceeds, tiled; 0 without one.
     empty: (3,) sums of Eq. (2) for an empty image.
-    objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.hidden_cost`.
+    objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.before_cost`.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
 
     Other threads call this with the same batch, each with its own workspace. It holds `scratch` and `table` (see

@@ -49,7 +49,7 @@ class RasterScorer(ScorerBase):
                 o.epsilon,
                 o.silhouette_weight,
                 o.kinematic_weight,
-                o.hidden_cost,
+                o.before_cost,
             ]
         )
         self._arrays = KernelArrays(hand_constants(shape), objective_constants, tickets)

@@ -54,7 +54,7 @@ class Distances(NamedTuple):
 
 
 class RenderedHand(NamedTuple):
-    """Depth map of the rendered hand and of the occluder before it.
+    """Depth map of the rendered hand.
 
     depth: (h, w) metres, 0 for none.
     lens: fx, fy, cx, cy, pixels.
@@ -91,8 +91,7 @@ class CapsuleSurface:
         min_normal_cosine: float,
         correspondences: Correspondences,
     ) -> None:
-        nearest = self._scorer.target.with_occluder(self._scorer.render(pose))
-        rendered = RenderedHand(nearest, self._lens, self._options.cylinder_hidden_depth)
+        rendered = RenderedHand(self._scorer.render(pose), self._lens, self._options.cylinder_hidden_depth)
         pose_capsules(self._capsules, bodies, self._posed)
         measure(cloud.points, self._capsules, self._posed, self._distances)
         limits = (self._max_distance, min_normal_cosine)
@@ -215,7 +214,7 @@ def surface_point(points: Array, i: int, capsules: Capsules, posed: PosedCapsule
 
 @kernel_part
 def _hidden(x: Array, i: int, rendered: RenderedHand) -> bool:
-    """Return whether the rendered hand or the occluder hides row i of x (N, 3)."""
+    """Return whether the rendered hand hides row i of x (N, 3)."""
     fx, fy, cx, cy = rendered.lens
     z = x[i, 2]
     u, v = round(x[i, 0] / z * fx + cx), round(x[i, 1] / z * fy + cy)

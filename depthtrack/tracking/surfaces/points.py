@@ -1,8 +1,7 @@
 """Correspondences with the visible points of a surface given by points with normals.
 
-A posed point is visible if it faces the camera and neither a nearer point nor an occluder hides it. The visible points
-are sorted into cells of the image. The search visits the cells around an observed point until no other cell can contain
-a closer point.
+A posed point is visible if it faces the camera and no nearer point hides it. The visible points are sorted into cells
+of the image. The search visits the cells around an observed point until no other cell can contain a closer point.
 """
 
 import math
@@ -13,13 +12,12 @@ from scipy.spatial import cKDTree
 
 from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
-from depthtrack.rendering.target import Target
 from depthtrack.segmentation.observation import Observation
 from depthtrack.simd.vectors import kernel_part
 from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
-from depthtrack.types import Array, Array32, Depth, Index
+from depthtrack.types import Array, Array32, Index
 
 
 class SurfacePoints(NamedTuple):
@@ -88,26 +86,6 @@ class Cells(NamedTuple):
     columns: int
 
 
-class Occluder(NamedTuple):
-    """Depth map of an object before the hand.
-
-    depth: (h, w) metres, 0 for none; (0, 0) without an object.
-    lens: fx, fy, cx, cy, pixels.
-    behind: depth behind it from which on a point is hidden, metres.
-    """
-
-    depth: Depth
-    lens: tuple[float, float, float, float]
-    behind: float
-
-    @staticmethod
-    def of(target: Target, behind: float) -> "Occluder":
-        """Return the occluder of a target."""
-        c = target.camera
-        depth = np.zeros((0, 0), np.float32) if target.occluder is None else target.occluder
-        return Occluder(depth, (float(c.fx), float(c.fy), float(c.cx), float(c.cy)), behind)
-
-
 class PointSurface:
     """Surface given by points: see `correspondences.Surface`."""
 
@@ -118,7 +96,6 @@ class PointSurface:
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         self._max_distance = max_distance
         self._cells = cells_over(cloud.points, self._options.cell, max_distance)
-        self._occluder = Occluder.of(observation, self._options.occluder_depth)
 
     def match(
         self,
@@ -129,7 +106,7 @@ class PointSurface:
         correspondences: Correspondences,
     ) -> None:
         limits = (self._options.hidden_depth, self._max_distance, min_normal_cosine)
-        match_points(self._points, bodies, self._posed, self._cells, self._occluder, cloud, limits, correspondences)
+        match_points(self._points, bodies, self._posed, self._cells, cloud, limits, correspondences)
 
 
 @compiled(nogil=True)
@@ -138,7 +115,6 @@ def match_points(
     bodies: BodyPoses,
     posed: Posed,
     cells: Cells,
-    occluder: Occluder,
     cloud: PointCloud,
     limits: tuple[float, float, float],
     correspondences: Correspondences,
@@ -149,7 +125,7 @@ def match_points(
     """
     tolerance, max_distance, min_normal_cosine = limits
     pose_points(points, bodies, posed)
-    visible = sort_visible(posed, cells, tolerance, occluder)
+    visible = sort_visible(posed, cells, tolerance)
     closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, correspondences.body)
     resolve_bodies(points, posed, visible, correspondences)
 
@@ -212,26 +188,11 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
     return Cells(low_u - around, low_v - around, side, rows, columns)
 
 
-@kernel_part
-def _hides(occluder: Occluder, x: float, y: float, z: float) -> bool:
-    """Return whether the occluder hides a point, metres, camera frame."""
-    height, width = occluder.depth.shape
-    if height == 0:
-        return False
-    fx, fy, cx, cy = occluder.lens
-    u, v = round(x / z * fx + cx), round(y / z * fy + cy)
-    if 0 <= u < width and 0 <= v < height:
-        front = occluder.depth[v, u]
-        return front > 0.0 and z > front + occluder.behind
-    return False
-
-
 @compiled(nogil=True)
-def sort_visible(posed: Posed, cells: Cells, tolerance: float, occluder: Occluder) -> Visible:
+def sort_visible(posed: Posed, cells: Cells, tolerance: float) -> Visible:
     """Return the visible points, sorted by cell.
 
-    A point is hidden if it faces away, lies behind the occluder, or lies more than `tolerance` (m) behind the nearest
-    point of its cell.
+    A point is hidden if it faces away, or lies more than `tolerance` (m) behind the nearest point of its cell.
     """
     count = posed.x.shape[0]
     cell = np.empty(count, np.int64)
@@ -240,7 +201,7 @@ def sort_visible(posed: Posed, cells: Cells, tolerance: float, occluder: Occlude
         x, y, z = posed.x[v, 0], posed.x[v, 1], posed.x[v, 2]
         cell[v] = -1
         facing = posed.n[v, 0] * x + posed.n[v, 1] * y + posed.n[v, 2] * z
-        if z <= 1e-3 or facing >= 0.0 or _hides(occluder, x, y, z):
+        if z <= 1e-3 or facing >= 0.0:
             continue
         column, row = math.floor((x / z - cells.u) / cells.size), math.floor((y / z - cells.v) / cells.size)
         if 0 <= column < cells.columns and 0 <= row < cells.rows:

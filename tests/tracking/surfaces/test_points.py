@@ -1,23 +1,19 @@
 """Posed skin points and closest visible points, compared with searches over all vertices."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.geometry.camera import Camera
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.rendering.target import Target
 from depthtrack.solver import closest_points as closest
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.tracking.surfaces import points as surface
-from depthtrack.tracking.surfaces.points import Cells, Occluder, Posed, SurfacePoints, Visible
+from depthtrack.tracking.surfaces.points import Cells, Posed, SurfacePoints, Visible
 from depthtrack.tracking.surfaces.skin import mesh_points
 from tests.support.hands import random_pose
 
@@ -25,7 +21,6 @@ SHAPE = HandShape()
 SKIN = Skin.of(SHAPE)
 MODEL = mesh_points(SKIN, 0.004)
 TOLERANCE = 0.008
-NO_OCCLUDER = Occluder(np.zeros((0, 0), np.float32), (1.0, 1.0, 0.0, 0.0), 0.0)
 
 
 def posed_hand(pose: np.ndarray, model: SurfacePoints = MODEL) -> Posed:
@@ -93,7 +88,7 @@ def test_visible_vertices_are_sorted_by_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
     cells = surface.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
-    seen = surface.sort_visible(posed, cells, TOLERANCE, NO_OCCLUDER)
+    seen = surface.sort_visible(posed, cells, TOLERANCE)
     predicted_pose = _seen_slowly(posed, cells)
     assert seen.first[-1] == len(seen.vertex) == sum(map(len, predicted_pose.values()))
     for cell in range(cells.rows * cells.columns):
@@ -109,28 +104,11 @@ def test_vertices_behind_another_finger_are_not_visible() -> None:
     flat = make_pose([0, 0, 0.5], [np.sqrt(0.5), 0, np.sqrt(0.5), 0], np.zeros(20))
     posed = posed_hand(flat)
     cells = surface.cells_over(posed.x, 0.004, 0.01)
-    seen = surface.sort_visible(posed, cells, TOLERANCE, NO_OCCLUDER)
+    seen = surface.sort_visible(posed, cells, TOLERANCE)
     facing = np.einsum("vi,vi->v", posed.x, posed.n) < 0
     middle = np.isin(MODEL.bodies[:, 0], [7, 8, 9])
     assert middle[seen.vertex].sum() < 0.5 * (facing & middle).sum()
     assert len(seen.vertex) < 0.75 * facing.sum()
-
-
-def test_vertices_behind_an_occluder_are_not_visible() -> None:
-    posed = posed_hand(make_pose([0, 0, 0.5], [0, 1, 0, 0], np.zeros(20)))
-    camera = Camera(200, 200, 400.0, 400.0, 100.0, 100.0)
-    depth = np.zeros(camera.shape, np.float32)
-    depth[:, :100] = 0.3
-    occluder = Occluder.of(replace(Target.blank(camera), occluder=depth), 0.005)
-    cells = surface.cells_over(posed.x, 0.004, 0.01)
-    every = surface.sort_visible(posed, cells, TOLERANCE, NO_OCCLUDER).vertex
-    seen = surface.sort_visible(posed, cells, TOLERANCE, occluder).vertex
-    pixels = np.rint(camera.project(posed.x[every])).astype(int)
-    hidden = (pixels[:, 0] >= 0) & (pixels[:, 0] < 100) & (pixels[:, 1] >= 0) & (pixels[:, 1] < 200)
-    assert 0.2 < hidden.mean() < 0.8
-    assert set(seen) == set(every[~hidden])
-    behind = surface.sort_visible(posed, cells, TOLERANCE, occluder._replace(behind=0.3)).vertex
-    np.testing.assert_array_equal(behind, every)
 
 
 @given(
@@ -147,7 +125,7 @@ def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
     cloud = cloud_near(posed, rng, spread=0.5 * max_distance)
     cells = surface.cells_over(cloud.points, cell, max_distance)
     seen, correspondences = (
-        surface.sort_visible(posed, cells, TOLERANCE, NO_OCCLUDER),
+        surface.sort_visible(posed, cells, TOLERANCE),
         Correspondences.allocate(len(cloud.points)),
     )
     closest.closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, correspondences.body)
