@@ -103,8 +103,9 @@ class Target:
         return np.where((self.occluder > 0) & (depth >= self.occluder.astype(np.float64) + behind), 0.0, depth)
 
     def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
-        """Return where a rendered depth map (h, w), metres, lies before or inside the occluder; None without one.
+        """Return where (h, w) a surface lies before or inside the occluder; None without one.
 
+        rendered: (h, w) its depth, metres, 0 for none.
         behind: depth behind the occluder's readings, metres.
         """
         if self.occluder is None:

@@ -11,7 +11,7 @@ from depthtrack.recording import Frame
 from depthtrack.rendering.backends import create_scorer
 from depthtrack.rendering.options import Objective
 from depthtrack.segmentation.observation import Observation
-from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.options import OccluderOptions, SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
@@ -30,7 +30,7 @@ def made() -> Synthesiser:
 @pytest.fixture(scope="module")
 def observations(made: Synthesiser) -> list[Observation]:
     """Return the observations of the first frames, segmented around the true hand."""
-    options, model = SegmentationOptions(), HandModel(HOLDING.hand)
+    options, model = SegmentationOptions(occluder=OccluderOptions(True)), HandModel(HOLDING.hand)
     segmenter = Segmenter(SkinColourModel.default(options.skin_colour.prior), options)
     found = []
     for index in range(3):

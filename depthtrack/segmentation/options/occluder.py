@@ -10,7 +10,7 @@ from depthtrack.segmentation.options.checks import check_numbers
 class OccluderOptions:
     """Objects that may hide the hand, in recordings with colour."""
 
-    find_occluder: bool = option(True, "Find objects that may hide the hand")
+    find_occluder: bool = option(False, "Find objects that may hide the hand")
     reach_margin: float = option(0.03, "Distance beyond the hand's reach up to which readings are an object", unit="m")
     least_breadth: float = option(
         0.01, "Smallest breadth of an object: thinner parts are errors of the hand's outline", unit="m"
