@@ -41,7 +41,7 @@ _AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(9, 2)
 class BonesInView(NamedTuple):
     """The bones of a posed hand, at the far end and the middle of each, beside the observation.
 
-    visible: (5, 3, 2) whether no other part of the hand hides the point.
+    visible: (5, 3, 2) whether no other part of the hand and no occluder hides the point.
     differences: (5, 3, 2) of rendered and observed depth around it, clipped, metres.
     spread: (21,) root mean square distance of the keypoints from the truth, metres. A normal distribution has about
         68 % of its points closer than that, in one dimension or three.
@@ -73,6 +73,9 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
     ends = model.endpoints(pose).reshape(5, 4, 3)
     points = np.stack([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=2)
     visible = points_in_view(points, rendered, target.camera)
+    if target.occluder is not None:
+        # Bones lie inside the fingers: none is behind an object that does not hide its finger.
+        visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
     differences = depth_differences(points, rendered, target)
     own = visible & (depth_below(points, rendered, target.camera) < bone_radii(model.shape) + OWN_FLESH)
     spread = keypoint_spread(model, pose, points, own & (differences < AGREES))

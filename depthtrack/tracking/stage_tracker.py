@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.candidate import Candidate, seen_part
 from depthtrack.tracking.confidence import Evidence, evidence_of, fitted_model
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
@@ -103,11 +104,12 @@ class StageTracker:
             self._state.update(estimate)
             return estimate
         best, status, branches = min(found, key=lambda pair: pair[0].energy)
-        tools, rendered = self._tools, self._tools.scorer.render(best.pose)
-        bones = bones_in_view(tools.model, best.pose, rendered, tools.scorer.target)
-        energy = best.energy / tools.scoring.objective.clamp
-        self.evidence = evidence_of(best.pose, rendered, tools.scorer.target, bones, energy)
+        tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
+        seen = seen_part(best, rendered, target, tools.scoring.objective)
+        bones = bones_in_view(tools.model, best.pose, rendered, target)
+        unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
+        self.evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")
         figures = confidence, tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
-        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, *figures, branches)
+        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, *figures, branches, seen)

@@ -14,6 +14,7 @@ from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.run_folder import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
+from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
@@ -87,10 +88,15 @@ class TrackState:
         visibility: tuple[float, ...] = UNKNOWN_VISIBILITY,
         spread: tuple[float, ...] = UNKNOWN_SPREAD,
         branches: tuple[Branch, ...] = (),
+        seen: Candidate | None = None,
     ) -> Estimate:
-        """Update the state with the next pose; return its estimate, lost if it is not trusted."""
+        """Update the state with the next pose; return its estimate, lost if it is not trusted.
+
+        seen: energy and agreement that decide this; those of the pose if None.
+        """
         previous = self._confidence if status is Status.TRACKED else 0.0
-        status = Status.LOST if self.is_lost(energy, agreement, confidence, previous) else status
+        judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
+        status = Status.LOST if self.is_lost(*judged, confidence, previous) else status
         figures = confidence, visibility, spread, branches
         estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures)
         self.update(estimate)

@@ -1,6 +1,7 @@
 """Spread of the keypoints: visible ones are measured, hidden ones follow the prior."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,6 +57,19 @@ def test_folded_fingers_are_hidden_behind_the_back_of_the_hand(everyday_skin: Sy
     palm = [0, 5, 9, 13, 17]
     np.testing.assert_allclose(shown.spread[palm], hidden.spread[palm], rtol=0.5)
     assert np.all(shown.differences[shown.visible] == 0)
+
+
+def test_fingers_behind_an_object_are_hidden(everyday_skin: Synthesiser) -> None:
+    observation, model = observe(everyday_skin, 20), HandModel(everyday_skin.options.hand)
+    pose, nothing = everyday_skin.poses[20], np.zeros(observation.camera.shape, np.float32)
+    tips = observation.camera.project(model.endpoints(pose).reshape(5, 4, 3)[:, -1])
+    u, v = np.meshgrid(*map(np.arange, nothing.shape[::-1]))
+    ball = np.hypot(u - tips[1, 0], v - tips[1, 1]) < 25
+    for distance, hides in ((0.3, True), (0.7, False)):
+        occluder = np.where(ball, distance, 0).astype(np.float32)
+        bones = bones_in_view(model, pose, nothing, replace(observation, occluder=occluder))
+        assert (bones.finger_visibility[1] < 0.8) == hides
+    assert bones_in_view(model, pose, nothing, observation).finger_visibility.min() == 1
 
 
 @pytest.mark.parametrize("finger", range(5))
