@@ -54,6 +54,8 @@ RIM = 16
 """Points of each rim of the cylinder."""
 ENDING = ("palm_wrist_cap", "thumb_ellipsoid")
 """Ellipsoids that reach the wrist."""
+OVERLAP = 0.004
+"""Metres: largest part of one beyond the wrist."""
 HARD = 100.0
 """Weight of distances that must vanish, against 1 for that of a vertex."""
 RANDOM_POSTURES = 2
@@ -129,7 +131,7 @@ def beyond_wrist(proportions: Proportions) -> float:
     rest = make_pose(np.zeros(3), (1, 0, 0, 0), np.zeros(20))
     T = primitives.transforms(model.transforms(rest))[[primitives.names.index(name) for name in ENDING]]
     lowest = T[:, 1, 3] - np.linalg.norm(T[:, 1, :3], axis=1)
-    return float(1e3 * np.maximum(model.wrist(rest)[1] - lowest, 0).sum())
+    return float(1e3 * np.maximum(model.wrist(rest)[1] - lowest - OVERLAP, 0).sum())
 
 
 def distance(kind: int, T: Array, points: Array) -> Array:
