@@ -136,11 +136,8 @@ def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale:
     errors, distances = (np.concatenate([getattr(part, name) for part in parts]) for name in ("errors", "distances"))
     weights = geman_mcclure(distances**2, kernel_scale)
     found = on_surface.distances
-    return Evidence(
-        *weighted_sums(a, weights, errors),
-        len(errors),
-        float(np.median(found)) if len(found) else np.inf,
-    )
+    H, g = weighted_sums(a, weights, errors)
+    return Evidence(H, g, len(errors), float(np.median(found)) if len(found) else np.inf)
 
 
 @compiled(nogil=True)

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
@@ -27,6 +28,7 @@ class Estimate:
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
     branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
+    hand: hand that was tracked, if its sizes change while it is tracked.
     """
 
     pose: Array | None
@@ -38,6 +40,7 @@ class Estimate:
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
     branches: tuple[Branch, ...] = ()
+    hand: HandShape | None = None
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)
