@@ -32,8 +32,8 @@ class HandTracker(Closing):
 
     Equal frames give equal bits. With a given hand, all frames of a recording give the poses that `depthtrack track`
     writes. Without one, the hand is measured while it is tracked: the average adult's hands of both sides are tracked
-    first, then those of the sizes so far. The first measured hand is used after the hand was visible for two seconds,
-    the next ones after 4, 8, 16... seconds. `depthtrack track` measures the hand before it tracks the first frame.
+    first, then those of the sizes so far. A hand is first measured after it was visible for three seconds, then every
+    two seconds, and less often when its sizes stay. `depthtrack track` measures it before it tracks the first frame.
     Frames are numbered from 0 as they arrive; the random numbers of a frame depend on its number.
     The segmentation uses colour if the first frame has colour.
 

@@ -1,7 +1,7 @@
 """Sizes of a hand measured while it is tracked: slow states beside the pose.
 
-Views are kept from the frames that were tracked. Sizes and poses are optimised jointly in them, again and again at
-intervals that double. Each time the poses come from a hand of better sizes, and the views are spread over a longer
+Views are kept from the frames that were tracked. Sizes and poses are optimised jointly in them, again and again, less
+often when the sizes stay. Each time the poses come from a hand of better sizes, and the views are spread over a longer
 time. Sizes as slow states with an uncertainty follow Tkach et al., "Online generative model personalization for hand
 tracking", SIGGRAPH Asia 2017; the prior is that of `parameters`.
 """
@@ -52,7 +52,7 @@ class KeptViews:
     """Trusted poses with their observations, evenly spread over the time in which the hand was visible."""
 
     def __init__(self, options: OngoingOptions) -> None:
-        self._most, self._interval, self._next = options.views, options.interval, 0.0
+        self._most, self._period, self._next = options.views, options.view_period, 0.0
         self.views: tuple[TrackedView, ...] = ()
 
     def add(self, tracked: TrackedFrame, visible: float) -> None:
@@ -66,9 +66,9 @@ class KeptViews:
         # A copy holds neither the point cloud nor the whole frame.
         kept = replace(observation, silhouette=observation.silhouette.copy())
         self.views = (*self.views, TrackedView(kept, estimate.pose, estimate.energy, estimate.agreement))
-        self._next = visible + self._interval
+        self._next = visible + self._period
         if len(self.views) == self._most:
-            self.views, self._interval = self.views[::2], 2 * self._interval
+            self.views, self._period = self.views[::2], 2 * self._period
 
 
 def measure(views: Sequence[TrackedView], sizes: OngoingSizes, options: OngoingOptions) -> OngoingSizes:

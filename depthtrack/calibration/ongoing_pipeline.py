@@ -4,7 +4,7 @@ Hands of both sides are tracked, each with its own sizes, until the energy of on
 at first, since a flat hand looks alike from either side.
 
 Sizes are measured in another thread. A measurement is used at a fixed visible time after its begin, when the next one
-begins, and that time doubles. If it is not there by then, the frame waits for it. So equal frames give equal bits.
+begins. If it is not there by then, the frame waits for it. So equal frames give equal bits.
 """
 
 from collections import deque
@@ -83,18 +83,19 @@ class OngoingHand(Closing):
 
         return measured
 
-    def use(self, sizes: OngoingSizes) -> None:
-        """Go on with these sizes.
+    def use(self, sizes: OngoingSizes) -> bool:
+        """Go on with these sizes. Return whether they differ from those so far.
 
         The new tracker restores the last two estimates: the pose, and the motion to it.
         """
         if not sizes.differs(self.sizes, self._options.least_change):
             self.sizes = replace(self.sizes, measured=sizes.measured)
-            return
+            return False
         tracker = self._make(sizes.hand)
         tracker.restore(self._last)
         self._tracker.close()
         self._tracker, self.sizes, self._pipeline, self._start_pose = tracker, sizes, None, None
+        return True
 
     def close(self) -> None:
         """Free the tracker."""
@@ -122,7 +123,8 @@ class OngoingPipeline(Closing):
         self._hands = {side: OngoingHand(side, make, make_segmenter, start_pose, self._options) for side in sides}
         self._energies: dict[Side, float] = dict.fromkeys(sides, 0.0)
         self.side: Side = "right"
-        self._visible, self._time, self._due = 0.0, float("nan"), self._options.begin
+        self._visible, self._time = 0.0, float("nan")
+        self._due, self._period = self._options.begin, self._options.period
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="measurement")
         self._pending: Future[dict[Side, OngoingSizes]] | None = None
 
@@ -154,7 +156,7 @@ class OngoingPipeline(Closing):
             self._give_up_side()
             self._use_measurement()
             self._begin_measurement()
-            self._due = max(self._options.use, 2 * self._due)
+            self._due += self._period
         return found
 
     def _compare(self, tracked: dict[Side, TrackedFrame]) -> None:
@@ -174,9 +176,10 @@ class OngoingPipeline(Closing):
         """Wait for the sizes that are being measured, and go on with them."""
         if self._pending is None:
             return
-        for side, sizes in self._pending.result().items():
-            if side in self._hands:
-                self._hands[side].use(sizes)
+        found = self._pending.result()
+        changed = [hand.use(found[side]) for side, hand in self._hands.items()]
+        if not any(changed):
+            self._period *= 2
         self._energies = {side: self._options.kept_evidence * each for side, each in self._energies.items()}
 
     def _begin_measurement(self) -> None:

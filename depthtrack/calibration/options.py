@@ -62,8 +62,10 @@ class OngoingOptions:
     """Measurements of a hand while it is tracked."""
 
     begin: float = option(1.0, "Visible time at which the first measurement begins", unit="s")
-    use: float = option(3.0, "Visible time at which it is used and the next begins; it doubles each time", unit="s")
-    interval: float = option(
+    period: float = option(
+        2.0, "Visible time from its begin to its use, when the next begins; it doubles when the hand stays", unit="s"
+    )
+    view_period: float = option(
         0.1, "Visible time between two views at first; it doubles when the views are full", unit="s"
     )
     longest_step: float = option(0.1, "Time that one frame adds to the visible time, at most", unit="s")

@@ -29,7 +29,7 @@ from tests.support.synthesis import synthesiser
 
 STEP = 0.125
 """Seconds between two frames: a binary fraction, so that sums are exact."""
-OPTIONS = OngoingOptions(begin=1.0, use=2.0, interval=0.25, longest_step=STEP, sure_after=4.0)
+OPTIONS = OngoingOptions(begin=1.0, period=1.0, view_period=0.25, longest_step=STEP, sure_after=4.0)
 SCALE = 0.9
 
 
@@ -171,13 +171,13 @@ def test_measurements_are_used_at_fixed_times_and_no_frame_is_lost(
     observation: Observation, measured_scales: list[float]
 ) -> None:
     scene = Scene(observation, {"right": even, "left": even})
-    _, estimates = scene.run(9.0)
+    _, estimates = scene.run(4.5)
     hands = [each.hand for each in estimates]
     scales = [each.scale for each in hands if each is not None]
     assert len(scales) == len(estimates)
     changes = [n for n in range(1, len(scales)) if scales[n] != scales[n - 1]]
     # The first frame adds no time, and a hand is used from the next frame on.
-    assert [STEP * (n - 1) for n in changes] == [2.0, 4.0, 8.0]
+    assert [STEP * (n - 1) for n in changes] == [2.0, 3.0, 4.0]
     np.testing.assert_allclose([scales[n] for n in [0, *changes]], [1.0, 0.9, 0.81, 0.729])
     assert all(each.pose is not None and each.status is Status.TRACKED for each in estimates)
     right = [each for each in scene.trackers if each.hand.side == "right"]
@@ -185,6 +185,25 @@ def test_measurements_are_used_at_fixed_times_and_no_frame_is_lost(
     for before, after in pairwise(right):
         assert before.closed
         assert [each.timestamp for each in after.restored] == before.tracked[-2:]
+
+
+def test_the_next_measurements_are_rarer_when_the_hand_stays(
+    observation: Observation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    latest = list[float]()
+
+    def same(views: Sequence[TrackedView], before: OngoingSizes, options: OngoingOptions) -> OngoingSizes:
+        if before.hand.side == "right":
+            latest.append(views[-1].observation.timestamp)
+        return before
+
+    monkeypatch.setattr(ongoing_pipeline, "measure", same)
+    monkeypatch.setattr(ongoing_pipeline, "make_surface", lambda name, hand: None)
+    pipeline, _ = Scene(observation, {"right": even, "left": even}).run(17.5)
+    # The last one, begun at 16 s, may be cancelled.
+    np.testing.assert_allclose(latest[:4], [1.0, 2.0, 4.0, 8.0], atol=0.5)
+    assert len(latest) <= 5
+    assert pipeline.hand == HandShape()
 
 
 def test_a_slow_measurement_changes_no_estimate(
