@@ -74,8 +74,7 @@ def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShap
     """Return the hand that a path or name stands for.
 
     hand: path of a hand file (hand.json) or rigged mesh (.glb, .gltf), "truth" for the recording's own sizes, or
-        "average" for the average adult's right hand, which is also returned if it is absent. A hand is returned as it
-        is.
+        "average". The average adult's right hand is also returned if it is absent. A hand is returned as it is.
 
     Raises:
         InputError: the file holds no hand, or the recording has no sizes.

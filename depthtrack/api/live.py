@@ -130,7 +130,7 @@ class HandTracker(Closing):
 
     @property
     def hand(self) -> HandShape:
-        """The given hand, or the measured one so far, which the next frame is tracked with."""
+        """The given hand, or the measured one so far."""
         return self._tracker.hand if isinstance(self._tracker, OngoingPipeline) else self._given
 
     @property
@@ -140,7 +140,7 @@ class HandTracker(Closing):
 
     @property
     def measured(self) -> dict[str, Measured]:
-        """Each measured length and width by name, with its standard deviation; empty if none was measured so far."""
+        """Each measured length and width by name; empty if none was measured so far."""
         return self._tracker.measured if isinstance(self._tracker, OngoingPipeline) else {}
 
     @property

@@ -44,19 +44,19 @@ class OngoingSizes:
         return cls(np.zeros(COUNT), HandShape(side=side), {})
 
     def differs(self, other: "OngoingSizes", least: float) -> bool:
-        """Return whether the logarithm of the scale or of a length differs by at least `least`."""
+        """Return whether the scale or a length differs by at least `least`, in its logarithm."""
         return bool(np.abs(self.values - other.values)[: WIDTHS.start].max() >= least)
 
 
 class KeptViews:
-    """Trusted poses with their observations, evenly spread over the time in which the hand was visible."""
+    """Trusted poses with their observations, evenly spread over the visible time."""
 
     def __init__(self, options: OngoingOptions) -> None:
         self._most, self._period, self._next = options.views, options.view_period, 0.0
         self.views: tuple[TrackedView, ...] = ()
 
     def add(self, tracked: TrackedFrame, visible: float) -> None:
-        """Keep a tracked frame if the next view is due. Every second view is dropped when they are full.
+        """Keep a tracked frame if a view is due. When they are full, drop every second.
 
         visible: time in which the hand was visible so far, s.
         """

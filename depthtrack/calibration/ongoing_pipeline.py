@@ -1,4 +1,4 @@
-"""Pipeline of a hand whose side and sizes are unknown: both are measured while it is tracked.
+"""Pipeline of a hand whose side and sizes are unknown, and measured while it is tracked.
 
 Hands of both sides are tracked, each with its own sizes, until the energy of one is clearly lower. The right one leads
 at first, since a flat hand looks alike from either side.
@@ -103,7 +103,7 @@ class OngoingHand(Closing):
 
 
 class OngoingPipeline(Closing):
-    """Pipeline that measures the hand; `step` is that of `Pipeline`, and each estimate names its hand.
+    """Pipeline that measures the hand. Each estimate names the hand that it was made with.
 
     make: returns the tracker of a hand.
     make_segmenter: returns the segmenter for frames like the first one.
@@ -160,7 +160,10 @@ class OngoingPipeline(Closing):
         return found
 
     def _compare(self, tracked: dict[Side, TrackedFrame]) -> None:
-        """Add the energies of a frame with both poses; the side of the clearly lower energy leads from here on."""
+        """Add the energies of a frame with both poses.
+
+        The side of the clearly lower energy leads from here on.
+        """
         estimates = {side: each.estimate for side, each in tracked.items()}
         if self.side_sure or any(each.pose is None for each in estimates.values()):
             return

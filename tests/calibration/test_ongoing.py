@@ -113,7 +113,7 @@ class Scene:
 
 @pytest.fixture
 def measured_scales(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The scales of the sizes that the measurements started from; each measures a hand smaller by a tenth."""
+    """The scales that measurements of a hand smaller by a tenth started from."""
     scales: list[float] = []
 
     def recorded(views: Sequence[TrackedView], before: OngoingSizes, options: OngoingOptions) -> OngoingSizes:
