@@ -69,11 +69,11 @@ class OngoingOptions:
         0.1, "Visible time between two views at first; it doubles when the views are full", unit="s"
     )
     longest_step: float = option(0.1, "Time that one frame adds to the visible time, at most", unit="s")
-    views: int = option(24, "Views kept of each side, at most", unit="frames")
+    views: int = option(16, "Views kept of each side, at most", unit="frames")
     good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
     fewest: int = option(3, "Views below which no size is measured", unit="frames")
     iterations: int = option(8, "Iterations of the joint optimisation in each measurement")
-    least_change: float = option(0.015, "Change of the logarithm of scale or of a length below which the hand stays")
+    least_change: float = option(0.01, "Change of the logarithm of scale or of a length below which the hand stays")
     lead_margin: float = option(0.1, "Share by which the energy of a side is higher when the other one takes its place")
     sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
     sure_after: float = option(4.0, "Visible time before which both sides are tracked", unit="s")

@@ -29,7 +29,7 @@ from tests.support.synthesis import synthesiser
 
 STEP = 0.125
 """Seconds between two frames: a binary fraction, so that sums are exact."""
-OPTIONS = OngoingOptions(begin=1.0, period=1.0, view_period=0.25, longest_step=STEP, sure_after=4.0)
+OPTIONS = OngoingOptions(begin=1.0, period=1.0, view_period=0.25, views=64, longest_step=STEP, sure_after=4.0)
 SCALE = 0.9
 
 
