@@ -7,6 +7,7 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.run_folder import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
@@ -28,6 +29,7 @@ class Estimate:
     spread: distance (21,) of the keypoints from the truth that about 68 % stay below, metres; NaN if unknown.
     branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
+    hand: hand that was tracked, if its sizes change while it is tracked.
     """
 
     pose: Array | None
@@ -40,6 +42,7 @@ class Estimate:
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
     spread: tuple[float, ...] = UNKNOWN_SPREAD
     branches: tuple[Branch, ...] = ()
+    hand: HandShape | None = None
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)
