@@ -65,6 +65,13 @@ class Segmenter:
             located = self._locator.locate(frame)
         return None if located is None else self._observation(frame, located)
 
+    def set_lost(self, lost: bool, timestamp: float) -> None:
+        """State whether the tracker lost the hand in the frame of `timestamp` (s).
+
+        After `search.lost_lifetime` the hand is located anew.
+        """
+        self._locator.set_lost(lost, timestamp)
+
     def reset(self) -> None:
         """Discard the last position, the sizes of the hand and the adaptation to its colours."""
         self._locator.reset()

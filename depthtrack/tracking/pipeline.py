@@ -17,6 +17,7 @@ from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunRow, RunWriter
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
@@ -79,6 +80,7 @@ class Pipeline:
             estimate = self._tracker.start(observation, self._start_pose)
         else:
             estimate = self._tracker.track(observation)
+        self._segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         if estimate.pose is not None:
             self._start_pose = None
         return TrackedFrame(frame, observation, estimate, milliseconds)
@@ -128,6 +130,7 @@ def replay_frames(
     for frame, estimate in frames:
         observation, milliseconds = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
+        segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         yield TrackedFrame(frame, observation, estimate, milliseconds)
 
 
