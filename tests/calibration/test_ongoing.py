@@ -101,6 +101,8 @@ class Scene:
     def segment(self, frame: Frame, prior: object = None) -> Observation:
         return replace(self.observation, timestamp=frame.timestamp, frame_index=frame.index)
 
+    def set_lost(self, lost: bool, timestamp: float) -> None: ...
+
     def frames(self, seconds: float) -> Iterator[Frame]:
         for n in range(round(seconds / STEP)):
             yield Frame(n, n * STEP, np.zeros((1, 1), np.float32), None, self.observation.camera)

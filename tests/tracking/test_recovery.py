@@ -58,7 +58,7 @@ def _shifted(made: Synthesiser, pose: np.ndarray) -> np.ndarray:
 
 def test_recovery_leaves_a_local_minimum_of_the_swarm(made: Synthesiser) -> None:
     """In one frame, a swarm of the same spread stays at the pose shifted by one finger."""
-    frame, wrong = 11, _shifted(made, made.poses[11])
+    frame, wrong = 23, _shifted(made, made.poses[23])
     o = observe(made, frame)
     with RasterScorer(made.options.hand) as scorer:
         scorer.set_target(o.reduced(96))
