@@ -9,7 +9,7 @@ from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import replace_atomically
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.recording.ground_truth import JOINTS_HEADER
-from depthtrack.recording.run_folder import SPREAD_COLUMNS, VISIBILITY_COLUMNS
+from depthtrack.recording.run_rows import SPREAD_COLUMNS, VISIBILITY_COLUMNS
 
 HEADER = (
     *("index", "timestamp", "status", "energy", "agreement", "confidence"),

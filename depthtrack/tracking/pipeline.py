@@ -15,7 +15,8 @@ from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.run_folder import RunRow, RunWriter
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize

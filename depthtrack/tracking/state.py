@@ -12,7 +12,7 @@ import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.recording.branches import Branch
-from depthtrack.recording.run_folder import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
+from depthtrack.recording.run_rows import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.options import TrackingThresholds

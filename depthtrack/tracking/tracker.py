@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import Branch
-from depthtrack.recording.run_folder import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
+from depthtrack.recording.run_rows import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array

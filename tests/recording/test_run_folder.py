@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.run_folder import Run, RunRow, RunWriter, read_rows
+from depthtrack.recording.run_folder import Run, RunWriter
+from depthtrack.recording.run_rows import RunRow, read_rows
 from depthtrack.recording.status import Status
 
 CONFIGURATION = {"tracker": "pso", "seed": 3, "hand": json.loads(HandShape().to_json()), "threads": 2}

@@ -11,7 +11,8 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, read_branches
-from depthtrack.recording.run_folder import RunRow, RunWriter, read_rows
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_rows import RunRow, read_rows
 from depthtrack.recording.run_tables import rewrite_table
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesiser
