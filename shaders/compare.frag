@@ -2,10 +2,12 @@
 // Sums of Oikonomidis et al. 2011, Eq. (2), over blocks of 4 x 4 pixels, clipped at the tile's edge.
 
 uniform sampler2D inverse_depth;  // 1/m, 0 = nothing drawn; tiles of the atlas
-uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1
+uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1;
+                                  // inverse depth that a surface before an occluder exceeds, 1/m, 0 = no occluder
 uniform ivec2 tile;               // pixels
 uniform ivec2 blocks;             // blocks of a tile
 uniform float match_depth, clamp_depth;  // d_m, d_M, metres
+uniform float before_cost;               // further cost of a pixel before an occluder, in pixels outside the silhouette
 
 out vec4 sums;  // clamped difference in metres, o_s and r_m, o_s or r_m
 
@@ -15,13 +17,15 @@ void main() {
     sums = vec4(0.0);
     for (int y = first.y; y < last.y; ++y) {
         for (int x = first.x; x < last.x; ++x) {
-            vec2 observed = texelFetch(observation, ivec2(x, y), 0).rg;
+            vec3 observed = texelFetch(observation, ivec2(x, y), 0).rgb;
             float w = texelFetch(inverse_depth, corner * tile + ivec2(x, y), 0).r;
-            float difference = abs(observed.r - (w > 0.0 ? 1.0 / w : 0.0));
-            bool matched = w > 0.0 && (difference < match_depth || observed.r == 0.0);
-            sums.x += min(difference, clamp_depth);
+            bool drawn = w > 0.0;
+            float difference = abs(observed.r - (drawn ? 1.0 / w : 0.0));
+            bool matched = drawn && (difference < match_depth || observed.r == 0.0);
+            float before = observed.b > 0.0 && w > observed.b ? before_cost : 0.0;
+            sums.x += min(difference, clamp_depth) + before * clamp_depth;
             sums.y += matched ? observed.g : 0.0;
-            sums.z += matched ? 1.0 : observed.g;
+            sums.z += (matched ? 1.0 : observed.g) + before * (1.0 - observed.g);
         }
     }
 }

@@ -101,7 +101,7 @@ def test_figures_of_readme_are_those_of_the_benchmarks() -> None:
         set(re.findall(r"\d+(?:\.\d+)?", part))
         for part in (table, (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"))
     )
-    assert len(table.splitlines()) == 1 + 5
+    assert len(table.splitlines()) == 1 + 6
     assert named - known == set()
 
 

@@ -23,7 +23,8 @@ from depthtrack.files import (
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
-from depthtrack.recording.run_folder import read_configuration, read_rows
+from depthtrack.recording.run_folder import read_configuration
+from depthtrack.recording.run_rows import read_rows
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.motion_file import read_table
 

@@ -3,9 +3,12 @@
 Usage: fit_confidence.py FOLDER [--rig RIG.glb ...] [--seeds N] [--frames N]
 
 The folder holds the evidence of each recording, from which an interrupted run continues. The fit is logistic
-regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual never raises
-the confidence, a more visible finger never lowers it. Printed are the area under the ROC curve (AUROC) of recordings
-left out of the fit, and the reliability in ten bins. The result is written to `depthtrack/tracking/confidence.json`.
+regression with equal weight for each recording. The sign of each coefficient is fixed: a larger residual or spread
+never raises the confidence. The result is written to `depthtrack/tracking/confidence.json`.
+
+Printed are the area under the ROC curve (AUROC) of recordings left out of the fit, and the reliability in ten bins. The
+shares of keypoints within their spread follow, and the threshold of a trusted pose. The constants of
+`depthtrack/tracking/spread.py` were chosen by these shares.
 """
 
 import argparse
@@ -28,8 +31,6 @@ from depthtrack.types import Array, Mask
 RIDGE = 1e-2
 """Weight of the squared coefficients of standardised evidence."""
 FOLDS = 6
-RAISES = ("visible", "least_visible", "area", "pixels", "age")
-"""Evidence that raises the confidence; the rest lowers it."""
 OUT = Path(__file__).parents[1] / "depthtrack" / "tracking" / "confidence.json"
 
 
@@ -50,7 +51,7 @@ def fit(evidence: Array, good: Mask, weights: Array) -> tuple[Array, float]:
         gradient = np.append(features.T @ slope + 2 * RIDGE * weights.sum() * parameters[:-1], slope.sum())
         return float(value), gradient
 
-    bounds = [(0, None) if name in RAISES else (None, 0) for name in Evidence._fields]
+    bounds = [(None, 0.0)] * evidence.shape[1]
     start = np.zeros(evidence.shape[1] + 1)
     found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[*bounds, (None, None)]).x
     scaled = found[:-1] / spread
@@ -82,8 +83,17 @@ def main() -> None:
     for kind in ("calibrated", "mirrored", "average"):
         part = kinds == kind
         print(f"AUROC, {kind} hand: {auroc(left_out[part], good[part]):.3f} ({100 * good[part].mean():.0f} % good)")
+    measured = kinds != "average"
+    print(f"AUROC, calibrated and mirrored hands: {auroc(left_out[measured], good[measured]):.3f}")
     print(f"AUROC, all: {auroc(left_out, good):.3f}")
     probability = 1 / (1 + np.exp(-left_out))
+    counts = np.array([frame[5:] for frame in frames])
+    for kind in ("calibrated", "average"):
+        shown, shown_within, hidden, hidden_within = counts[kinds == kind].sum(axis=0)
+        print(
+            f"within the spread, {kind} hand: {shown_within / shown:.2f} visible, {hidden_within / hidden:.2f} hidden"
+        )
+    print(f"half of the lowest confidence of a good pose: {probability[good].min() / 2:.3f}")
     for low in np.arange(0, 1, 0.1):
         part = (probability >= low) & (probability < low + 0.1)
         if part.any():

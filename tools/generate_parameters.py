@@ -13,7 +13,7 @@ from typing import Any
 # The checkout that this script lies in, whatever is installed.
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from depthtrack.calibration.options import CalibrationOptions, ViewChoiceOptions
+from depthtrack.calibration.options import CalibrationOptions, OngoingOptions, ViewChoiceOptions
 from depthtrack.options import Parameter, parameters
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER
@@ -50,6 +50,9 @@ def page() -> str:
         "## Calibration\n",
         "Fields of `ViewChoiceOptions` and `CalibrationOptions`, which are set in Python.\n",
         _table([*parameters(ViewChoiceOptions()), *parameters(CalibrationOptions())], flag=False),
+        "## Calibration while live frames are tracked\n",
+        "Fields of `OngoingOptions`, which are set in Python.\n",
+        _table(parameters(OngoingOptions()), flag=False),
     ]
     return "\n".join(parts)
 

@@ -7,7 +7,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.hand_choice import chosen_hand
+from depthtrack.recording.hand_choice import AVERAGE, chosen_hand
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
@@ -18,7 +18,10 @@ from depthtrack.tracking.registry import tracker_config
 Recording = Sequence | Path | str
 """A recording, or its path."""
 Hand = HandShape | Path | str | None
-"""A hand, the path of a hand file or rigged mesh, or None for the average adult's right hand."""
+"""A hand, the path of a hand file or rigged mesh, or "average" for the average adult's right hand.
+
+None measures the hand where one is tracked, else it is the average one.
+"""
 
 
 def open_recording(
@@ -70,8 +73,8 @@ def on_damage_of(recording: Sequence) -> OnDamage:
 def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShape:
     """Return the hand that a path or name stands for.
 
-    hand: path of a hand file (hand.json) or rigged mesh (.glb, .gltf), or "truth" for the recording's own sizes.
-        A hand is returned as it is. The average adult's right hand is returned if it is absent.
+    hand: path of a hand file (hand.json) or rigged mesh (.glb, .gltf), "truth" for the recording's own sizes, or
+        "average". The average adult's right hand is also returned if it is absent. A hand is returned as it is.
 
     Raises:
         InputError: the file holds no hand, or the recording has no sizes.
@@ -84,7 +87,7 @@ def open_hand(hand: Hand = None, recording: Recording | None = None) -> HandShap
         return hand
     if recording is not None:
         return chosen_hand(as_recording(recording), None if hand is None else str(hand))
-    return HandShape() if hand is None else load_hand(Path(hand))
+    return HandShape() if hand in (None, AVERAGE) else load_hand(Path(str(hand)))
 
 
 def measured_hand(

@@ -1,15 +1,19 @@
 """Track frames that come from any source, one call per frame."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.api.choices import Hand, as_config, open_hand
+from depthtrack.calibration.calibrate import Measured
+from depthtrack.calibration.ongoing_pipeline import OngoingPipeline
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
 from depthtrack.machine import usable_cores
 from depthtrack.recording.sequence import Frame, ImageKeypoints
 from depthtrack.segmentation.observation import Observation
@@ -26,7 +30,10 @@ from depthtrack.types import Array, Depth, Image
 class HandTracker(Closing):
     """Tracks a hand in frames that come from any source: a sensor, a network, a program.
 
-    Equal frames give equal bits. All frames of a recording give the poses that `depthtrack track` writes.
+    Equal frames give equal bits. With a given hand, all frames of a recording give the poses that `depthtrack track`
+    writes. Without one, the hand is measured while it is tracked: the average adult's hands of both sides are tracked
+    first, then those of the sizes so far. A hand is first measured after it was visible for three seconds, then every
+    two seconds, and less often when its sizes stay. `depthtrack track` measures it before it tracks the first frame.
     Frames are numbered from 0 as they arrive; the random numbers of a frame depend on its number.
     The segmentation uses colour if the first frame has colour.
 
@@ -50,8 +57,10 @@ class HandTracker(Closing):
     ) -> None:
         """Make a tracker for the frames of one camera.
 
-        hand: a hand, or the path of a hand file or rigged mesh; the average adult's right hand if absent.
-        tracker: name or configuration of a tracker, or a tracker of your own, made for the same hand.
+        hand: a hand, the path of a hand file or rigged mesh, or "average" for the average adult's right hand. If
+            absent, its side and sizes are measured while it is tracked.
+        tracker: name or configuration of a tracker, or a tracker of your own, made for the same hand. Its hand stays,
+            the average one if `hand` is absent.
         segmentation: how the hand is found in a frame.
         start_pose: (27,) pose in the first frame, metres, quaternion and radians, camera frame; searched if absent.
         threads: threads of the renderer, one per core if absent; poses do not depend on it.
@@ -59,13 +68,16 @@ class HandTracker(Closing):
         Raises:
             InputError: there is no such tracker, or a file cannot be read.
         """
-        self.camera, self.hand = camera, open_hand(hand)
-        if isinstance(tracker, str | TrackerConfig):
-            tracker = create_tracker(as_config(tracker), self.hand, threads or usable_cores())
-        self._tracker, self._model = tracker, HandModel(self.hand)
-        self._segmentation = segmentation or SegmentationOptions()
+        self.camera, self._given, self._segmentation = camera, open_hand(hand), segmentation or SegmentationOptions()
         self._start_pose = None if start_pose is None else checked_pose(start_pose)
-        self._pipeline: Pipeline | None = None
+        self._tracker: Tracker | OngoingPipeline
+        if isinstance(tracker, str | TrackerConfig):
+            make = partial(create_tracker, as_config(tracker), threads=threads or usable_cores())
+            measured = hand is None
+            self._tracker = OngoingPipeline(make, self._segmenter, self._start_pose) if measured else make(self._given)
+        else:
+            self._tracker = tracker
+        self._pipeline: Pipeline | OngoingPipeline | None = None
         self._last: TrackedFrame | None = None
         self._closed = False
 
@@ -103,17 +115,33 @@ class HandTracker(Closing):
             None if keypoints is None else _checked_keypoints(keypoints),
         )
         if self._pipeline is None:
-            segmenter = Segmenter.from_options(self._segmentation, has_colour=colour is not None)
-            self._pipeline = Pipeline(self._tracker, segmenter, self.hand, self._start_pose)
+            self._pipeline = self._pipeline_for(frame)
         self._last = self._pipeline.step(frame)
         return self._last.estimate
 
     def keypoints(self, estimate: Estimate) -> Array:
         """Return the keypoints (21, 3) of an estimate, metres, camera frame, in MediaPipe's order.
 
-        They are NaN if the estimate has no pose.
+        They are those of the hand that the estimate was made with, and NaN if the estimate has no pose.
         """
-        return np.full((21, 3), np.nan) if estimate.pose is None else self._model.keypoints(estimate.pose)
+        if estimate.pose is None:
+            return np.full((21, 3), np.nan)
+        return HandModel(estimate.hand or self._given).keypoints(estimate.pose)
+
+    @property
+    def hand(self) -> HandShape:
+        """The given hand, or the measured one so far."""
+        return self._tracker.hand if isinstance(self._tracker, OngoingPipeline) else self._given
+
+    @property
+    def side_sure(self) -> bool:
+        """Whether the side was given, or the hand of the other side fits clearly worse."""
+        return not isinstance(self._tracker, OngoingPipeline) or self._tracker.side_sure
+
+    @property
+    def measured(self) -> dict[str, Measured]:
+        """Each measured length and width by name; empty if none was measured so far."""
+        return self._tracker.measured if isinstance(self._tracker, OngoingPipeline) else {}
 
     @property
     def last(self) -> TrackedFrame | None:
@@ -130,6 +158,16 @@ class HandTracker(Closing):
         if not self._closed:
             self._closed = True
             self._tracker.close()
+
+    def _pipeline_for(self, first: Frame) -> Pipeline | OngoingPipeline:
+        """Return the pipeline for frames like the first one."""
+        if isinstance(self._tracker, OngoingPipeline):
+            return self._tracker
+        return Pipeline(self._tracker, self._segmenter(first), self._given, self._start_pose)
+
+    def _segmenter(self, frame: Frame) -> Segmenter:
+        """Return a segmenter that uses colour if the frame has it."""
+        return Segmenter.from_options(self._segmentation, has_colour=frame.colour is not None)
 
 
 def _checked_time(timestamp: float, last: float | None) -> float:

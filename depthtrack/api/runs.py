@@ -76,8 +76,8 @@ def track(
 ) -> Iterator[TrackedFrame] | Run:
     """Track the hand of a recording; the poses are those of `depthtrack track`.
 
-    hand: a hand, the path of a hand file or rigged mesh, or "truth". If absent, it is measured first, while it is
-        tracked in up to 160 frames. `HandShape()` is the average adult's.
+    hand: a hand, the path of a hand file or rigged mesh, "truth", or "average" for the average adult's right hand. If
+        absent, it is measured first, while it is tracked in up to 160 frames.
     tracker: name or configuration of a tracker: see `tracker_config`.
     out: run folder to write; without it, frames are yielded as they are tracked.
     resume: continue the run that `out` holds.

@@ -112,7 +112,7 @@ def calibrate(
             views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show).views
         _check_views(views, sequence, options)
         report("fingers and palm", (number + 0.6) / rounds)
-        chosen = _best(views, options.good_views)
+        chosen = best_views(views, options.good_views)
         observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
         fitted = fit_jointly(observed, poses, values, side, options.iterations, options=options.joint)
         found = nearest_solid(fitted.values, side)
@@ -127,7 +127,7 @@ def calibrate(
     report("done", 1.0)
     return Calibration(
         hand_of(values, side, f"calibrated on {sequence.name}"),
-        _measured(values, fitted.covariance),
+        measured_sizes(values, fitted.covariance),
         None,
         1000 * float(np.median(before.distances)),
         1000 * float(np.median(after.distances)),
@@ -143,7 +143,7 @@ def _part(report: Progress, begun: float, share: float) -> Callable[[int, int], 
     return lambda done, total: report("poses of the hand", begun + share * done / total)
 
 
-def _best(views: Views[TrackedView], share: float) -> list[TrackedView]:
+def best_views(views: Views[TrackedView], share: float) -> list[TrackedView]:
     """Return the share of the views with the lowest energies, at least two, in order."""
     order = np.argsort([each.energy for each in views], kind="stable")
     return [views[i] for i in sorted(order[: max(2, round(share * len(views)))].tolist())]
@@ -188,7 +188,7 @@ def with_usual_proportions(values: Array) -> Array:
     return out
 
 
-def _measured(values: Array, covariance: Array) -> dict[str, Measured]:
+def measured_sizes(values: Array, covariance: Array) -> dict[str, Measured]:
     """Return each length and width, with its standard deviation and confidence."""
     prior = prior_covariance()
     table = {}

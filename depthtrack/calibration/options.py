@@ -58,6 +58,35 @@ class CalibrationOptions:
 
 
 @dataclass(frozen=True)
+class OngoingOptions:
+    """Measurements of a hand while it is tracked."""
+
+    begin: float = option(1.0, "Visible time at which the first measurement begins", unit="s")
+    period: float = option(
+        2.0, "Visible time from its begin to its use, when the next begins; it doubles when the hand stays", unit="s"
+    )
+    view_period: float = option(
+        0.1, "Visible time between two views at first; it doubles when the views are full", unit="s"
+    )
+    longest_step: float = option(0.1, "Time that one frame adds to the visible time, at most", unit="s")
+    views: int = option(16, "Views kept of each side, at most", unit="frames")
+    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
+    fewest: int = option(3, "Views below which no size is measured", unit="frames")
+    iterations: int = option(8, "Iterations of the joint optimisation in each measurement")
+    least_change: float = option(0.01, "Change of the logarithm of scale or of a length below which the hand stays")
+    lead_margin: float = option(0.1, "Share by which the energy of a side is higher when the other one takes its place")
+    sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
+    sure_after: float = option(4.0, "Visible time before which both sides are tracked", unit="s")
+    kept_evidence: float = option(0.5, "Share of the energies so far that still count after a measurement")
+    hand_like: float = option(
+        0.55,
+        "Agreement of silhouettes below which no hand was found",
+        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
+    )
+    joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
+
+
+@dataclass(frozen=True)
 class RigCalibrationOptions:
     """Search for the scale of a rigged hand, and the acceptance of a result."""
 

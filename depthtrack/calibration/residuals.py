@@ -13,6 +13,7 @@ from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
 from depthtrack.calibration.parameters import COUNT, motion_of
+from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
@@ -135,12 +136,32 @@ def linearise(view: CalibrationView, skin: PosedSkin, pose: Array, kernel_scale:
     errors, distances = (np.concatenate([getattr(part, name) for part in parts]) for name in ("errors", "distances"))
     weights = geman_mcclure(distances**2, kernel_scale)
     found = on_surface.distances
-    return Evidence(
-        (a * weights[:, None]).T @ a,
-        a.T @ (weights * errors),
-        len(errors),
-        float(np.median(found)) if len(found) else np.inf,
-    )
+    H, g = weighted_sums(a, weights, errors)
+    return Evidence(H, g, len(errors), float(np.median(found)) if len(found) else np.inf)
+
+
+@compiled(nogil=True)
+def weighted_sums(a: Array, weights: Array, errors: Array) -> tuple[Array, Array]:
+    """Return the weighted sums H (n, n) of a a^T and g (n,) of a e.
+
+    A library's matrix product of this size waits for its threads: 47 ms in place of 1 ms on busy cores.
+
+    a: (N, n) gradients.
+    """
+    n = a.shape[1]
+    H, g = np.zeros((n, n)), np.zeros(n)
+    for k in range(len(a)):
+        row, weight = a[k], weights[k]
+        for i in range(n):
+            share = weight * row[i]
+            if share != 0.0:
+                g[i] += share * errors[k]
+                for j in range(i, n):
+                    H[i, j] += share * row[j]
+    for i in range(n):
+        for j in range(i):
+            H[i, j] = H[j, i]
+    return H, g
 
 
 def _stretches(shape: HandShape, average: HandShape) -> Array:

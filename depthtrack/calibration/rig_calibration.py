@@ -12,11 +12,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from depthtrack.calibration.options import RigCalibrationOptions
-from depthtrack.calibration.pose_search import PoseSearcher, Progress, ScorerFactory
+from depthtrack.calibration.pose_search import Found, PoseSearcher, Progress, ScorerFactory
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
@@ -38,7 +38,7 @@ _CLIPPED = 0.04
 class RigCalibration:
     """Rigged hand at the scale of a recording.
 
-    `side_margin`: relative extra energy of the other side.
+    `side_margin`: share by which the rig of the other side disagrees more, its poses fitted to the point clouds.
     `before`, `after`: mean disagreement (0 to 1) at the rig's own scale and at the measured one.
     `poses_before`, `poses` (V, 27): the poses at these scales in the `observations`, camera frame.
     """
@@ -88,15 +88,21 @@ def calibrate_rig(
     show = progress or (lambda stage, share: None)
     options = options or RigCalibrationOptions()
     searcher = PoseSearcher(list(observations), scorer, seed, options)
-    energies = {}
+    tries: dict[tuple[Side, float], Found] = {}
+    sides: tuple[Side, ...] = ("right", "left")
     for n, factor in enumerate(options.tried_scales):
         show("trying scales", 0.4 * n / len(options.tried_scales))
-        for side in ("right", "left"):
-            tried = rig.with_(scale=rig.scale * factor, side=side)
-            energies[side, factor] = float(searcher.find(tried, options.first).energies.mean())
-    factor = min(options.tried_scales, key=lambda f: energies[rig.side, f])
-    other = min(energy for (side, _), energy in energies.items() if side != rig.side)
-    margin = other / energies[rig.side, factor] - 1
+        for side in sides:
+            tries[side, factor] = searcher.find(rig.with_(scale=rig.scale * factor, side=side), options.first)
+    disagreements: dict[Side, float] = {}
+    best_factors: dict[Side, float] = {}
+    for side in sides:
+        best_factors[side] = min(options.tried_scales, key=lambda f: float(tries[side, f].energies.mean()))
+        poses = tries[side, best_factors[side]].poses
+        first = _ScaleFit(rig.with_(side=side), searcher.observations[: options.first], poses)
+        disagreements[side] = first.at(rig.scale * best_factors[side])[1]
+    factor, other = best_factors[rig.side], sides[rig.side == "right"]
+    margin = disagreements[other] / disagreements[rig.side] - 1
     if margin < -options.side_margin:
         raise InputError(
             f"the recording must show a {rig.side} hand like the rig, but the other side fits {-margin:.0%} better: "

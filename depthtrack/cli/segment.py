@@ -106,7 +106,7 @@ class SegmentCommand:
         ):
             rows: csv.DictWriter[str] | None = None
             for result in bar(results, total=len(sequence)):
-                annotated = AnnotatedFrame(result.frame, result.mask)
+                annotated = AnnotatedFrame(result.frame, result.mask, occluder=result.occluder)
                 video.write(panel(annotated, ("depth", "mask"), 360, near, far))
                 if result.frame.index in chosen:
                     shown.append(annotated)

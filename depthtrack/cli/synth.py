@@ -36,6 +36,10 @@ class Command:
     forearm: Literal["auto", "on", "off"] = "auto"
     """Draw the bare forearm, which a tracker must cut off. With auto it is drawn before a wall and in a room."""
 
+    held_object: Literal["none", "sphere", "box", "cylinder"] = "none"
+    """Object in the palm, of another colour than skin. It moves with the palm, and the fingers stop at it."""
+    held_size: Annotated[float, tyro.conf.arg(metavar="MM")] = 60.0
+    """Size of that object: the diameter of a sphere, the longest side of a box, 1.4 diameters of a cylinder."""
     distance: Annotated[float | None, stated_default(metavar="METRES")] = None
     """Camera-to-hand distance (default: 0.5, or 0.65 for kinect2, whose minimum range is 0.5)."""
     viewpoint: Annotated[int, tyro.conf.arg(metavar="0..7")] = 0
@@ -96,6 +100,8 @@ class Command:
             forearm={"auto": None, "on": True, "off": False}[self.forearm],
             background=self.background,
             sensor=self.sensor,
+            held_object=self.held_object,
+            held_size=self.held_size / 1000,
             depth_noise=self.depth_noise / 1000,
             skin_flips=self.skin_flips / 100,
             frames=self.frames,

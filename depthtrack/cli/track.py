@@ -142,7 +142,7 @@ class TrackCommand:
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
     def _report(self) -> None:
-        from depthtrack.recording.run_folder import read_rows
+        from depthtrack.recording.run_rows import read_rows
 
         rows = read_rows(self.out)
         print(

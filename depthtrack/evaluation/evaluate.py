@@ -22,6 +22,7 @@ from depthtrack.evaluation.metrics import (
     joint_errors,
     stage_times,
     visible_and_hidden,
+    within_spread,
 )
 from depthtrack.evaluation.replay import Replay, ReplayedFrame
 from depthtrack.evaluation.residuals import run_residuals
@@ -120,6 +121,8 @@ def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | N
     metrics = [*truth_metrics]
     if points is not None and (visible := _visible(replay, true_points)) is not None:
         metrics += visible_and_hidden(points, visible)
+        if np.isfinite(run.spread).any():
+            metrics += within_spread(points, run.spread, visible)
     if residuals:
         replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
         metrics += run_residuals(replayed, replay.surface(), len(run.index)).metrics()

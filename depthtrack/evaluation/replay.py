@@ -135,6 +135,7 @@ def estimate_of(run: Run, row: int) -> Estimate:
         float(run.timestamps[row]),
         float(run.confidence[row]),
         tuple(map(float, run.visibility[row])),
+        tuple(map(float, run.spread[row])),
     )
 
 

@@ -8,8 +8,9 @@ from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhoue
 from depthtrack.evaluation.replay import ReplayedFrame
 from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.hand_surface import HandSurface
+from depthtrack.rendering.options import Objective
 from depthtrack.segmentation.observation import Observation
-from depthtrack.types import Array
+from depthtrack.types import Array, Mask
 
 _SPACING = 0.001
 """Spacing of the points on the model's surface, m, at which the nearest point stands for the surface."""
@@ -38,9 +39,23 @@ def frame_residuals(
     camera: camera of the whole image.
     """
     observed = observation.whole_mask(camera.shape)
-    rendered = surface.silhouette(pose, camera)
+    rendered = visible_silhouette(surface, pose, observation, camera)
     model_points = visible_points(surface, pose, camera)
     return e3d(observation.points, model_points), e2d(rendered, observed), silhouette_iou(rendered, observed)
+
+
+def visible_silhouette(surface: HandSurface, pose: Array, observation: Observation, camera: Camera) -> Mask:
+    """Return the pixels (h, w) that the posed hand covers and no object hides.
+
+    pose: (27,).
+    camera: camera of the whole image.
+    """
+    rendered = surface.silhouette(pose, camera)
+    if observation.occluder is None:
+        return rendered
+    depth = surface.render(pose, observation.camera).depth
+    hidden = (depth > 0) & (observation.unhidden(depth, Objective().hidden_depth) == 0)
+    return rendered & ~observation.region.paste(hidden, camera.rect)
 
 
 def visible_points(surface: HandSurface, pose: Array, camera: Camera) -> Array:

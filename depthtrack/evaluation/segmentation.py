@@ -32,6 +32,11 @@ class SegmentedFrame:
     iou: float | None
     ms: float
 
+    @property
+    def occluder(self) -> Mask | None:
+        """The object (h, w) of the whole frame that may hide the hand; None without any."""
+        return None if self.observation is None else self.observation.whole_occluder(self.frame.depth.shape)
+
     def row(self) -> dict[str, Any]:
         """Return the columns of a table: centre in metres, area in pixels."""
         x, y, z = (None,) * 3 if self.observation is None else (float(c) for c in self.observation.centre)

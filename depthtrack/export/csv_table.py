@@ -9,15 +9,16 @@ from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import replace_atomically
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.recording.ground_truth import JOINTS_HEADER
-from depthtrack.recording.run_folder import VISIBILITY_COLUMNS
+from depthtrack.recording.run_rows import SPREAD_COLUMNS, VISIBILITY_COLUMNS
 
 HEADER = (
     *("index", "timestamp", "status", "energy", "agreement", "confidence"),
     *VISIBILITY_COLUMNS,
     *POSE_NAMES,
     *JOINTS_HEADER[1:],
+    *SPREAD_COLUMNS,
 )
-"""Columns: figures of a run's row, the 27 pose values, then x, y, z of each keypoint.
+"""Columns: figures of a run's row, the 27 pose values, x, y, z of each keypoint, then the spread of each.
 
 Keypoints are named as in a recording's `joints.csv`.
 """
@@ -34,7 +35,7 @@ def write(track: JointTrack, path: Path) -> None:
         table.writerow(HEADER)
         for row, index in enumerate(track.index):
             figures = [track.energy[row], track.agreement[row], track.confidence[row], *track.visibility[row]]
-            numbers = [*figures, *track.poses[row], *track.keypoints[row].ravel()]
+            numbers = [*figures, *track.poses[row], *track.keypoints[row].ravel(), *track.spread[row]]
             table.writerow([int(index), float(track.timestamps[row]), track.status[row], *map(_cell, numbers)])
 
 

@@ -19,6 +19,7 @@ class JointTrack:
     status: (T,) result of each frame.
     energy, agreement, confidence: (T,) of the poses, see `RunRow`.
     visibility: (T, 5) share of each finger that is visible.
+    spread: (T, 21) of the keypoints, metres, see `RunRow`.
     poses: (T, 27) metres, quaternion, radians, camera frame.
     keypoints: (T, 21, 3) metres, camera frame, in MediaPipe's order.
     hand: the hand of the poses.
@@ -31,6 +32,7 @@ class JointTrack:
     agreement: Array
     confidence: Array
     visibility: Array
+    spread: Array
     poses: Array
     keypoints: Array
     hand: HandShape
@@ -39,5 +41,5 @@ class JointTrack:
     def of(cls, run: Run, hand: HandShape) -> Self:
         """Return the poses of a run with the keypoints of its hand."""
         keypoints = HandModel(hand).keypoints(run.poses)
-        figures = (run.energy, run.agreement, run.confidence, run.visibility)
+        figures = (run.energy, run.agreement, run.confidence, run.visibility, run.spread)
         return cls(run.index, run.timestamps, run.status, *figures, run.poses, keypoints, hand)

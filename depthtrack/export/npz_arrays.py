@@ -35,6 +35,7 @@ def write(track: JointTrack, path: Path) -> None:
             agreement=track.agreement,
             confidence=track.confidence,
             visibility=track.visibility,
+            spread=track.spread,
             poses=track.poses,
             keypoints=track.keypoints,
             pose_names=np.array(POSE_NAMES, dtype=np.str_),

@@ -4,10 +4,13 @@ The palm has one elliptic cylinder and two ellipsoid caps. A finger has three co
 ellipsoid, two cones and three spheres. A unit sphere is |u| <= 1; a unit cylinder is ux^2 + uy^2 <= 1, 0 <= uz <= 1.
 The 4x4 matrix T_body_unit is affine for spheres, ellipsoids and cylinders, and projective for cones:
 the image of a cylinder under a homography is a cone, so two shapes suffice, as on the GPU (Sec. 2.5).
+
+The paper gives no sizes. Fingers have the radii of `HandShape`. The proportions of the palm and of the thumb's
+ellipsoid are fitted to the skin, so that fits of both surfaces place the joints alike.
 """
 
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -18,6 +21,35 @@ from depthtrack.types import Array, Index
 
 SPHERE, CYLINDER = 0, 1
 PRIMITIVE_COUNT = 37
+
+
+class Proportions(NamedTuple):
+    """Positions and sizes of palm and thumb as shares of the sizes of `HandShape`.
+
+    Centres are x, y, z from the middle of the knuckles, in halves of the palm's breadth and thickness and in its
+    length.
+    The thumb's centre is from its saddle joint, in radii and metacarpal lengths.
+
+    cylinder: x, z of its axis; half breadth, half thickness; first and last y.
+    knuckle_cap: centre and half axes of the ellipsoid that closes the cylinder.
+    wrist_cap: the same, its half axes across in halves of the wrist's breadth and thickness.
+    thumb: centre and half axes of the ellipsoid, lengthened by half the radius of its far joint.
+
+    Source: `tools/fit_primitives.py`.
+    """
+
+    cylinder: tuple[float, float, float, float, float, float]
+    wrist_cap: tuple[float, float, float, float, float, float]
+    knuckle_cap: tuple[float, float, float, float, float, float]
+    thumb: tuple[float, float, float, float, float, float]
+
+
+FITTED = Proportions(
+    cylinder=(0.029, 0.055, 0.956, 0.955, -0.252, 0.331),
+    wrist_cap=(0.073, -0.263, 0.098, 1.384, 0.28, 0.999),
+    knuckle_cap=(0.036, 0.324, 0.064, 1.105, 0.214, 0.962),
+    thumb=(-0.147, 0.364, 0.073, 1.147, 0.758, 1.07),
+)
 
 
 @dataclass(frozen=True)
@@ -36,11 +68,11 @@ class Primitives:
     names: tuple[str, ...]
 
     @classmethod
-    def of(cls, shape: HandShape) -> Self:
+    def of(cls, shape: HandShape, proportions: Proportions = FITTED) -> Self:
         """Return the 37 primitives of a hand."""
-        parts = _palm(shape)
+        parts = _palm(shape, proportions)
         for finger in range(5):
-            parts += _thumb(shape) if finger == 0 else _finger(shape, finger)
+            parts += _thumb(shape, proportions) if finger == 0 else _finger(shape, finger)
         names, kinds, bodies, matrices = zip(*parts, strict=True)
         flip = np.diag([shape.mirror, 1, 1, 1])
         scale = np.diag([shape.scale, shape.scale, shape.scale, 1])
@@ -57,27 +89,31 @@ class Primitives:
 _Part = tuple[str, int, int, Array]
 
 
-def _palm(shape: HandShape) -> list[_Part]:
-    half_breadth, half_thickness = shape.palm_breadth / 2, shape.palm_thickness / 2
-    # The caps end at the wrist and beyond the knuckles; the cylinder lies between their centres.
-    bottom, top = -0.36 * shape.palm_length, 0.42 * shape.palm_length
-    centre = (shape.bases[1:, 0].max() + shape.bases[1:, 0].min()) / 2
-    cylinder = cone((centre, bottom, 0), top - bottom, 1.0, 1.0) @ np.diag([half_breadth, half_thickness, 1, 1])
+def _palm(shape: HandShape, proportions: Proportions) -> list[_Part]:
+    middle = np.array([(shape.bases[1:, 0].max() + shape.bases[1:, 0].min()) / 2, 0, 0])
+    palm = np.array([shape.palm_breadth / 2, shape.palm_length, shape.palm_thickness / 2])
+    wrist = np.array([shape.wrist_breadth / 2, shape.palm_length, shape.wrist_thickness / 2])
+    x, z, breadth, thickness, first, last = proportions.cylinder
+    unit = cone((0, 0, 0), (last - first) * palm[1], 1.0, 1.0)
+    cylinder = np.diag([breadth * palm[0], 1, thickness * palm[2], 1]) @ unit
+    cylinder[:3, 3] = middle + palm * (x, first, z)
     return [
         ("palm_cylinder", CYLINDER, 0, cylinder),
-        (
-            "palm_wrist_cap",
-            SPHERE,
-            0,
-            ellipsoid((centre, bottom, 0), (half_breadth, 0.14 * shape.palm_length, half_thickness)),
-        ),
-        (
-            "palm_knuckle_cap",
-            SPHERE,
-            0,
-            ellipsoid((centre, top, 0), (half_breadth, 0.13 * shape.palm_length, half_thickness)),
-        ),
+        ("palm_wrist_cap", SPHERE, 0, _ellipsoid(middle, palm, wrist, proportions.wrist_cap)),
+        ("palm_knuckle_cap", SPHERE, 0, _ellipsoid(middle, palm, palm, proportions.knuckle_cap)),
     ]
+
+
+def _ellipsoid(origin: Array, unit: Array, across: Array, shares: tuple[float, ...]) -> Array:
+    """Return the transform (4, 4), metres, of an ellipsoid.
+
+    origin: (3,) metres.
+    unit, across: (3,) metres, units of the centre and of the half axes.
+    shares: (6,) centre from the origin, and half axes.
+    """
+    T = np.diag([*(across * shares[3:]), 1.0])
+    T[:3, 3] = origin + unit * shares[:3]
+    return T
 
 
 def _finger(shape: HandShape, finger: int) -> list[_Part]:
@@ -91,17 +127,12 @@ def _finger(shape: HandShape, finger: int) -> list[_Part]:
     return parts
 
 
-def _thumb(shape: HandShape) -> list[_Part]:
+def _thumb(shape: HandShape, proportions: Proportions) -> list[_Part]:
     lengths, radii = _bone_lengths(shape, 0), shape.radii[0]
-    metacarpal = lengths[0]
-    parts: list[_Part] = [
-        (
-            "thumb_ellipsoid",
-            SPHERE,
-            body_of(0, 0),
-            ellipsoid((0, metacarpal / 2, 0), (radii[0], metacarpal / 2 + 0.5 * radii[1], 0.9 * radii[0])),
-        )
-    ]
+    unit = np.array([radii[0], lengths[0], radii[0]])
+    metacarpal = _ellipsoid(np.zeros(3), unit, unit, proportions.thumb)
+    metacarpal[1, 1] += 0.5 * radii[1]
+    parts: list[_Part] = [("thumb_ellipsoid", SPHERE, body_of(0, 0), metacarpal)]
     for k in (1, 2):
         body = body_of(0, k)
         parts.append((f"thumb_sphere_{k}", SPHERE, body, sphere(0.0, radii[k])))

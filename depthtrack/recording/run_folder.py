@@ -1,16 +1,15 @@
 """The run folder: a tracker's result of every frame, readable after a kill at any time.
 
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
-agreement, confidence, visibility of each finger and the pose, which is empty if there is none. `timings.csv` has the
-milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed beside it.
+agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. It is empty without a
+pose. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
 import json
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,47 +18,13 @@ import numpy as np
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
 from depthtrack.files import read_text, write_atomic
-from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_NAMES, POSE_SIZE
-from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, read_branches
-from depthtrack.recording.run_tables import header_of, read_table, rewrite_table
-from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
+from depthtrack.hand.kinematics import KEYPOINT_NAMES
+from depthtrack.hand.pose import FINGERS, POSE_SIZE
+from depthtrack.recording.branches import BRANCH_COLUMNS, branch_rows
+from depthtrack.recording.run_rows import ROW_COLUMNS, RunRow, read_rows, row_cells
+from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.recording.status import Status
 from depthtrack.types import Array, Index
-
-_EARLIER_COLUMNS = ("index", "timestamp", "status", "energy", "confidence", *POSE_NAMES)
-"""Columns of runs before format 3, whose confidence was the agreement of silhouettes."""
-VISIBILITY_COLUMNS = tuple(f"{finger}_visible" for finger in FINGERS)
-_COLUMNS = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
-UNKNOWN_VISIBILITY = (math.nan,) * len(FINGERS)
-_LARGEST = 100.0
-"""Bound on the numbers of a pose, metres and radians."""
-_LATEST = 1e12
-"""Bound on timestamps, seconds."""
-_UNIT_TOLERANCE = 1e-3
-
-
-@dataclass(frozen=True)
-class RunRow:
-    """One frame of a run.
-
-    timestamp: seconds.
-    energy: of the pose; NaN without a pose.
-    agreement: of the rendered and the observed silhouette, 0 to 1.
-    pose: (27,) metres, quaternion, radians, camera frame; None if no hand was observed.
-    confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
-    visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
-    branches: alternatives to the pose.
-    """
-
-    index: int
-    timestamp: float
-    status: Status
-    energy: float
-    agreement: float
-    pose: Array | None
-    confidence: float = math.nan
-    visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
-    branches: tuple[Branch, ...] = ()
 
 
 class RunWriter(Closing):
@@ -87,13 +52,13 @@ class RunWriter(Closing):
             if before.get("on_damage") != configuration.get("on_damage"):
                 write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
-            rewrite_table(folder / "poses.csv", _COLUMNS, map(_cells, self.rows))
+            rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
             kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
             rewrite_table(folder / "timings.csv", ("index", *self._stages), kept)
             branches = [cells for row in self.rows for cells in branch_rows(row.index, row.branches)]
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, branches)
         else:
-            rewrite_table(folder / "poses.csv", _COLUMNS, ())
+            rewrite_table(folder / "poses.csv", ROW_COLUMNS, ())
             rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
             write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
@@ -109,7 +74,7 @@ class RunWriter(Closing):
             self._branches.flush()
         csv.writer(self._timings).writerow([row.index, *(f"{stage_ms.get(stage, 0):.3f}" for stage in self._stages)])
         self._timings.flush()
-        csv.writer(self._poses).writerow(_cells(row))
+        csv.writer(self._poses).writerow(row_cells(row))
         self._poses.flush()
         self.rows.append(row)
 
@@ -128,6 +93,7 @@ class Run:
     timestamps: (T,) seconds.
     energy, agreement, confidence: (T,) of the poses, see `RunRow`.
     visibility: (T, 5) of the fingers, see `RunRow`.
+    spread: (T, 21) of the keypoints, metres, see `RunRow`.
     poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
     stage_ms: (T,) milliseconds of each stage.
     """
@@ -141,6 +107,7 @@ class Run:
     agreement: Array
     confidence: Array
     visibility: Array
+    spread: Array
     poses: Array
     stage_ms: dict[str, Array]
 
@@ -163,6 +130,7 @@ class Run:
             np.array([row.agreement for row in rows], dtype=np.float64),
             np.array([row.confidence for row in rows], dtype=np.float64),
             np.array([row.visibility for row in rows], dtype=np.float64).reshape(-1, len(FINGERS)),
+            np.array([row.spread for row in rows], dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES)),
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
         )
@@ -185,57 +153,6 @@ def read_configuration(folder: Path) -> dict[str, Any]:
     return configuration
 
 
-def read_rows(folder: Path) -> list[RunRow]:
-    """Return the complete rows of `poses.csv`; a truncated last row is left out.
-
-    Raises:
-        InputError: if a row is malformed, or holds values that no tracker writes.
-    """
-    path = folder / "poses.csv"
-    columns = _EARLIER_COLUMNS if header_of(path) == _EARLIER_COLUMNS else _COLUMNS
-    branches, rows = read_branches(folder / "branches.csv"), list[RunRow]()
-    for number, cells in enumerate(read_table(path, columns), start=2):
-        try:
-            row = _row(cells)
-            rows.append(replace(row, branches=branches.get(row.index, ())))
-        except (ValueError, IndexError) as error:
-            raise InputError(
-                f"{path}, line {number}: expected {len(columns)} values of a frame: {error!s:.120}"
-            ) from error
-        if (reason := _row_fault(rows[-1])) is not None:
-            raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
-    return rows
-
-
-def _row(cells: list[str]) -> RunRow:
-    """Return the row of a line's cells, of this format or the earlier one. Raises ValueError."""
-    index, timestamp, status, energy, agreement, *rest = cells
-    pose = rest[-POSE_SIZE:]
-    numbers = np.array([float(x) for x in pose]) if any(pose) else None
-    if not 0 <= int(index) < MAX_FRAMES:
-        raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
-    row = RunRow(int(index), float(timestamp), Status(status), float(energy), float(agreement), numbers)
-    if len(rest) == POSE_SIZE:
-        return row
-    confidence, *visibility = map(float, rest[:-POSE_SIZE])
-    return replace(row, confidence=confidence, visibility=tuple(visibility))
-
-
-def _row_fault(row: RunRow) -> str | None:
-    """Return the reason why no tracker writes such a row; None if the row is valid."""
-    if not abs(row.timestamp) < _LATEST:  # false for NaN
-        return f"the timestamp must be seconds below {_LATEST:g}, found {row.timestamp:.6g}"
-    shares = np.array([row.confidence, *row.visibility])
-    if len(outside := shares[(shares < 0) | (shares > 1)]):
-        return f"confidence and visibility must be shares from 0 to 1, found {outside[0]:.6g}"
-    if row.pose is None:
-        return None
-    if not np.all(np.abs(row.pose) <= _LARGEST):
-        return f"a pose must be numbers up to {_LARGEST:g} (metres, radians), or absent"
-    length = np.linalg.norm(row.pose[ORIENTATION])
-    return None if abs(length - 1) <= _UNIT_TOLERANCE else f"the quaternion must have length 1, found {length:.6g}"
-
-
 def _read_timings(path: Path, count: int) -> dict[str, Array]:
     """Return the milliseconds (T,) of each stage, of at most `count` frames."""
     header, *lines = read_table(path, None)
@@ -251,12 +168,6 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
             raise InputError(f"{path}, line {number}: expected {len(header)} columns, found {len(cells)}")
     columns = np.array(rows, dtype=np.float64).reshape(-1, len(header) - 1)
     return {stage: columns[:, k] for k, stage in enumerate(header[1:])}
-
-
-def _cells(row: RunRow) -> list[str]:
-    pose = [""] * POSE_SIZE if row.pose is None else [repr(float(x)) for x in row.pose]
-    shares = map(repr, (row.energy, row.agreement, row.confidence, *row.visibility))
-    return [str(row.index), repr(row.timestamp), row.status, *shares, *pose]
 
 
 def check_unused(folder: Path, resume: bool) -> None:

@@ -63,22 +63,24 @@ def finger_crossing(poses: ArrayLike) -> Array:
 
 
 def evaluate(
-    objective: Objective, silhouette: Mask, observed: ArrayLike, rendered: ArrayLike
+    objective: Objective, silhouette: Mask, observed: ArrayLike, rendered: ArrayLike, before: Mask | None = None
 ) -> tuple[float, float, float]:
     """Return the three sums of Eq. (2) for one rendered depth map, as in `Terms.of_sums`.
 
     silhouette: (h, w) o_s.
     observed: (h, w) metres, 0 = no reading.
     rendered: (h, w) metres, 0 = nothing drawn.
+    before: (h, w) true where a pixel is drawn before or inside an occluder; None for no occluder.
 
     A drawn pixel is matched (r_m) if its depth lies within d_m of the observation, or if the observation is missing.
     Absent depth counts as 0 in the difference, so a pixel that only one map holds costs the full clamp.
+    A pixel drawn before or inside an occluder counts `Objective.before_cost` times more, as outside the silhouette.
     """
     o, r = np.asarray(observed, dtype=np.float64), np.asarray(rendered, dtype=np.float64)
     difference = np.abs(o - r)
     matched = (r > 0) & ((difference < objective.match_depth) | (o == 0))
-    return (
-        float(np.minimum(difference, objective.clamp_depth).sum()),
-        float(np.sum(silhouette & matched)),
-        float(np.sum(silhouette | matched)),
-    )
+    clamped, union = np.minimum(difference, objective.clamp_depth), (silhouette | matched).astype(np.float64)
+    if before is not None:
+        clamped = clamped + objective.before_cost * objective.clamp_depth * before
+        union = union + objective.before_cost * (before & ~silhouette)
+    return float(clamped.sum()), float(np.sum(silhouette & matched)), float(union.sum())

@@ -16,7 +16,7 @@ class Objective:
     """Constants of Oikonomidis et al. 2011, Eq. (1) and (2).
 
     Raises:
-        InputError: if a depth, the unit or epsilon is not above 0 and at most 10.
+        InputError: if a depth, the unit or epsilon is not above 0 and at most 10, or the cost not within 0 to 100.
     """
 
     match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
@@ -27,11 +27,22 @@ class Objective:
         0.001, "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20", unit="m"
     )
     epsilon: float = option(1e-6, "Keeps the quotients of Eq. (2) finite")
+    hidden_depth: float = option(
+        0.005,
+        "Depth behind an occluder from which it hides the hand: above a sensor's noise, below a finger's radius",
+        unit="m",
+    )
+    before_cost: float = option(
+        1.0,
+        "Further cost of a pixel drawn before or inside an occluder, in costs of a pixel outside the silhouette",
+    )
 
     def __post_init__(self) -> None:
-        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon"):
+        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon", "hidden_depth"):
             if not 0 < getattr(self, name) <= 10:
                 raise InputError(f"objective {name} must be above 0 and at most 10, found {getattr(self, name)!r}")
+        if not 0 <= self.before_cost <= 100:
+            raise InputError(f"objective before_cost must lie between 0 and 100, found {self.before_cost!r}")
 
     @property
     def clamp(self) -> float:

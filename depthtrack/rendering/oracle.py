@@ -30,10 +30,15 @@ class OracleScorer(ScorerBase):
         return self.terms(poses).energy
 
     def terms(self, poses: ArrayLike) -> Terms:
-        target, batch = self.target, as_batch(poses)
-        sums = [evaluate(self._objective, target.silhouette, target.depth, self._depth(pose)) for pose in batch]
+        batch = as_batch(poses)
+        sums = [self._sums(pose) for pose in batch]
         clamped, matched_silhouette, union = np.array(sums, dtype=np.float64).reshape(-1, 3).T
         return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
+
+    def _sums(self, pose: Array) -> tuple[float, float, float]:
+        target, drawn = self.target, self._depth(pose)
+        before = target.before_occluder(drawn, self._objective.hidden_depth)
+        return evaluate(self._objective, target.silhouette, target.depth, drawn, before)
 
     def render(self, pose: ArrayLike) -> Depth:
         return self._depth(as_batch(np.asarray(pose)[None])[0]).astype(np.float32)

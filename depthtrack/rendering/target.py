@@ -1,14 +1,14 @@
 """The observed silhouette and depth maps that hypotheses are scored against."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.types import Depth, Index, Mask
+from depthtrack.types import Array, Depth, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -18,6 +18,9 @@ class Target:
     camera: of the region of interest.
     silhouette: (h, w) true for pixels of the hand.
     depth: (h, w) metres, 0 = no reading of the hand.
+    occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
+
+    A hypothesis may lie behind the occluder. What lies before it or inside it costs more in Eq. (2).
 
     Raises:
         ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
@@ -26,15 +29,23 @@ class Target:
     camera: Camera
     silhouette: Mask
     depth: Depth
+    occluder: Depth | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "silhouette", np.ascontiguousarray(self.silhouette, dtype=np.bool_))
         object.__setattr__(self, "depth", np.ascontiguousarray(self.depth, dtype=np.float32))
-        for name, found in (("silhouette", self.silhouette.shape), ("depth", self.depth.shape)):
-            if found != self.camera.shape:
-                raise ValueError(f"the {name} map must have the camera's shape {self.camera.shape}, found {found}")
-        if not np.all(np.isfinite(self.depth)) or self.depth.min() < 0:
-            raise ValueError("the depth map must hold finite metres, 0 where there is no reading")
+        if self.occluder is not None:
+            object.__setattr__(self, "occluder", np.ascontiguousarray(self.occluder, dtype=np.float32))
+        for name in ("silhouette", "depth", "occluder"):
+            found = getattr(self, name)
+            if found is None:
+                continue
+            if found.shape != self.camera.shape:
+                raise ValueError(
+                    f"the {name} map must have the camera's shape {self.camera.shape}, found {found.shape}"
+                )
+            if not np.all(np.isfinite(found)) or found.min() < 0:
+                raise ValueError(f"the {name} map must hold finite metres, 0 where there is no reading")
 
     @classmethod
     def blank(cls, camera: Camera) -> "Target":
@@ -43,7 +54,10 @@ class Target:
 
     def crop(self, region: Rect) -> "Target":
         """Return the part in a region, which may extend outside, where nothing is observed."""
-        return Target(self.camera.crop(region), region.crop(self.silhouette), region.crop(self.depth))
+        occluder = None if self.occluder is None else region.crop(self.occluder)
+        return Target(
+            self.camera.crop(region), region.crop(self.silhouette), region.crop(self.depth), occluder=occluder
+        )
 
     def reduced(self, side: int) -> "Target":
         """Return the target sampled so that its longer side has at most `side` pixels.
@@ -64,7 +78,39 @@ class Target:
         columns = _nearest((np.arange(camera.width) + 0.5) / factor - 0.5, self.camera.width)
         rows = _nearest((np.arange(camera.height) + 0.5) / factor - 0.5, self.camera.height)
         pick = np.ix_(rows, columns)
-        return Target(camera, self.silhouette[pick], self.depth[pick])
+        occluder = None if self.occluder is None else self.occluder[pick]
+        return Target(camera, self.silhouette[pick], self.depth[pick], occluder=occluder)
+
+    def hidden_from(self, behind: float) -> Depth:
+        """Return the inverse depth (h, w), 1/m, from which on a surface is hidden.
+
+        It is 0 without an occluder: a visible surface has a larger inverse depth.
+
+        behind: depth behind the occluder's readings, metres.
+        """
+        if self.occluder is None:
+            return np.zeros(self.camera.shape, np.float32)
+        return np.where(self.occluder > 0, np.float32(1) / (self.occluder + np.float32(behind)), np.float32(0))
+
+    def unhidden(self, rendered: ArrayLike, behind: float) -> Array:
+        """Return a rendered depth map (h, w), metres, with 0 where the occluder hides it.
+
+        behind: depth behind the occluder's readings, metres.
+        """
+        depth = np.asarray(rendered, dtype=np.float64)
+        if self.occluder is None:
+            return depth
+        return np.where((self.occluder > 0) & (depth >= self.occluder.astype(np.float64) + behind), 0.0, depth)
+
+    def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
+        """Return where (h, w) a surface lies before or inside the occluder; None without one.
+
+        rendered: (h, w) its depth, metres, 0 for none.
+        behind: depth behind the occluder's readings, metres.
+        """
+        if self.occluder is None:
+            return None
+        return np.asarray((self.occluder > 0) & (self.unhidden(rendered, behind) > 0), dtype=np.bool_)
 
 
 def _nearest(position: NDArray[np.floating], size: int) -> Index:

@@ -9,11 +9,12 @@ FLESH = 0.02
 """Metres: largest depth of a joint or bone below the skin that shows it, with a margin."""
 
 
-def points_in_view(points: Array, depth: Depth, camera: Camera) -> Mask:
+def points_in_view(points: Array, depth: Depth, camera: Camera, behind: float = FLESH) -> Mask:
     """Return which points (..., 3) of a hand are in the image with nothing before them.
 
     points: metres, camera frame; a NaN counts as hidden.
-    depth: (h, w) of the scene or of the posed hand, metres; 0 for none.
+    depth: (h, w) of the scene, of the posed hand or of an object, metres; 0 for none.
+    behind: largest depth behind it of a visible point, metres.
     """
     pixels = camera.project(points)
     inside = np.asarray(np.isfinite(pixels).all(axis=-1), dtype=np.bool_)
@@ -21,4 +22,4 @@ def points_in_view(points: Array, depth: Depth, camera: Camera) -> Mask:
     inside &= (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
     front = np.zeros(inside.shape)
     front[inside] = depth[v[inside], u[inside]]
-    return np.asarray(inside & ((front == 0) | (points[..., 2] - front < FLESH)), dtype=np.bool_)
+    return np.asarray(inside & ((front == 0) | (points[..., 2] - front < behind)), dtype=np.bool_)

@@ -56,10 +56,11 @@ class HandLocator:
         self._last: Array | None = None
         self._last_time = 0.0
         self._arm_direction: Array | None = None
+        self._lost_since: float | None = None
 
     def reset(self) -> None:
         """Discard the last position and the colours of the last frames."""
-        self._last = None
+        self._last, self._lost_since = None, None
         self._reset_arm()
         self._set_hand(AVERAGE_HAND)
         if self._skin is not None:
@@ -75,6 +76,20 @@ class HandLocator:
         self._arm_direction = None
         self._wrist.set_wrist(wrist)
         self._set_hand(hand)
+
+    def set_lost(self, lost: bool, timestamp: float) -> None:
+        """State whether the tracker lost the hand in the frame of `timestamp` (s).
+
+        The last position is discarded each time that the hand was lost for `search.lost_lifetime`: it may be that of
+        something else.
+        """
+        lifetime = self._options.search.lost_lifetime
+        if not lost or lifetime == 0:
+            self._lost_since = None
+        elif self._lost_since is None:
+            self._lost_since = timestamp
+        elif timestamp - self._lost_since >= lifetime:
+            self._last, self._lost_since = None, timestamp
 
     def locate(self, frame: Frame) -> LocatedHand | None:
         """Return the hand in a frame, or None without any."""

@@ -43,6 +43,10 @@ class Observation(Target):
         """Return the silhouette in the whole frame of `shape` (height, width)."""
         return self.region.paste(self.silhouette, Rect.of_image(shape))
 
+    def whole_occluder(self, shape: tuple[int, ...]) -> Mask | None:
+        """Return the object that may hide the hand in the whole frame of `shape` (height, width)."""
+        return None if self.occluder is None else self.region.paste(self.occluder > 0, Rect.of_image(shape))
+
     @property
     def points(self) -> Array:
         """Points (N, 3) of the visible hand in metres, camera frame, row by row of the region."""

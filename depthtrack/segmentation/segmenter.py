@@ -10,6 +10,7 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.flying_pixels import flying_pixels
 from depthtrack.segmentation.hand_locator import HandLocator, LocatedHand
 from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.occluder import find_occluder
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.roi_tracking import RoiPrior, segment_roi
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
@@ -64,6 +65,13 @@ class Segmenter:
             located = self._locator.locate(frame)
         return None if located is None else self._observation(frame, located)
 
+    def set_lost(self, lost: bool, timestamp: float) -> None:
+        """State whether the tracker lost the hand in the frame of `timestamp` (s).
+
+        After `search.lost_lifetime` the hand is located anew.
+        """
+        self._locator.set_lost(lost, timestamp)
+
     def reset(self) -> None:
         """Discard the last position, the sizes of the hand and the adaptation to its colours."""
         self._locator.reset()
@@ -80,12 +88,16 @@ class Segmenter:
 
     def _observation(self, frame: Frame, located: LocatedHand) -> Observation | None:
         """Return the observation of a located hand, or None if it has no reading."""
-        masks = located.masks
-        if self._skin is None or frame.colour is None:
+        masks, occluder = located.masks, None
+        has_colour = self._skin is not None and frame.colour is not None
+        if not has_colour:
             valid = ~flying_pixels(frame.depth[masks.region.slices], frame.camera.fx, self._options.flying_pixels)
             masks = replace(masks, readings=masks.readings & valid, silhouette=masks.silhouette & valid)
         if not masks.readings.any():
             return None
+        if has_colour and self._options.occluder.find_occluder:
+            place = located.surface_centre, located.wrist, self._locator.hand
+            occluder = find_occluder(frame, masks, *place, self._options.occluder)
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)
         return Observation(
             camera=frame.camera.crop(masks.region),
@@ -99,5 +111,6 @@ class Segmenter:
             arm_direction=located.arm_direction,
             wrist=located.wrist,
             cloud_options=self._options.point_cloud,
+            occluder=occluder,
             keypoints=None if frame.keypoints is None else frame.keypoints.shifted(*masks.region[:2]),
         )

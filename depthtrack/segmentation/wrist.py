@@ -70,7 +70,7 @@ def most_likely_wrist(
     for j in range(1, visible - least_behind):
         behind = profile[j : min(j + neighbours, visible)]
         wrist = narrow * behind.min()
-        if not profile[j - 1] > wrist >= profile[j] or behind.max() > flare * behind.min():
+        if wrist == 0 or not profile[j - 1] > wrist >= profile[j] or behind.max() > flare * behind.min():
             continue
         hand = profile[max(j - neighbours, 0) : j].max() / wrist
         if hand < broad:

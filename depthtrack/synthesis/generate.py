@@ -18,6 +18,7 @@ from depthtrack.options import check_seed
 from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.recording.writer import SequenceWriter
 from depthtrack.synthesis.backdrop import Backdrop
+from depthtrack.synthesis.held_object import HeldKind, HeldObject
 from depthtrack.synthesis.keypoints import KeypointErrors, detected_keypoints
 from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
 from depthtrack.synthesis.painting import Painter, SkinTone, flip_skin
@@ -43,6 +44,8 @@ class Synthesis:
 
     distance: metres from the camera to the nominal palm position; None for the sensor's default.
     forearm: whether a forearm is rendered; None means if there is a background.
+    held_object: object in the palm, which moves with it and stops the fingers.
+    held_size: its size, metres: the diameter of a sphere, the longest side of a box, 1.4 diameters of a cylinder.
     depth_noise: standard deviation of additional depth noise, metres.
     skin_flips: share of pixels with a flipped skin label, 0 to 1.
     frames: number of frames; None for the whole motion.
@@ -58,6 +61,8 @@ class Synthesis:
     forearm: bool | None = None
     background: BackgroundKind = "none"
     sensor: SensorName = "ideal"
+    held_object: HeldKind = "none"
+    held_size: float = 0.06
     depth_noise: float = 0.0
     skin_flips: float = 0.0
     frames: int | None = None
@@ -66,9 +71,12 @@ class Synthesis:
     keypoints: KeypointErrors | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("background", BackgroundKind), ("model", HandKind), ("sensor", SensorName)):
+        kinds = {"background": BackgroundKind, "model": HandKind, "sensor": SensorName, "held_object": HeldKind}
+        for name, kind in kinds.items():
             if getattr(self, name) not in get_args(kind):
                 raise InputError(f"{name} must be one of {', '.join(get_args(kind))}, found {getattr(self, name)!r}")
+        if not 0.01 <= self.held_size <= 0.2:
+            raise InputError(f"the held object must measure 10 to 200 mm, found {self.held_size * 1000:g} mm")
         if not 0 <= self.depth_noise <= 0.5:
             raise InputError(f"depth noise must lie between 0 and 500 mm, found {self.depth_noise * 1000:g} mm")
         if not 0 <= self.skin_flips <= 1:
@@ -113,11 +121,12 @@ class Synthesiser:
         self.sensor: Sensor = make_sensor(options.sensor)
         self.viewpoint = Viewpoint(options.viewpoint, self.distance)
         self.timestamps: Array = np.arange(self._frame_count()) / options.rate
+        self.held = self._held_object()
         self.poses: Array = self._poses()
         self.joints: Array = HandModel(options.hand).keypoints(self.poses)
         self._tone = SkinTone.sample(self._random(0, Stream.SKIN))
         backdrop = self._backdrop(self._random(0, Stream.ROOM))
-        self._scene = Scene(options.hand, options.model, self.has_forearm, self.sensor.camera, backdrop)
+        self._scene = Scene(options.hand, options.model, self.has_forearm, self.sensor.camera, backdrop, self.held)
         self._painter = Painter(
             options.hand,
             self.sensor.camera,
@@ -125,6 +134,7 @@ class Synthesiser:
             self._tone,
             self.sensor.colour_noise,
             self._random(0, Stream.LIGHT),
+            None if self.held is None else self.held.colour,
         )
 
     def __len__(self) -> int:
@@ -211,8 +221,16 @@ class Synthesiser:
         return count
 
     def _poses(self) -> Array:
-        poses = self.motion.poses(self.timestamps, self.options.seed)
-        return self.viewpoint.transform_poses(poses if self.options.hand.side == "right" else mirrored(poses))
+        poses, hand = self.motion.poses(self.timestamps, self.options.seed), self.options.hand
+        sided = poses if hand.side == "right" else mirrored(poses)
+        return self.viewpoint.transform_poses(sided if self.held is None else self.held.opened(sided, hand))
+
+    def _held_object(self) -> HeldObject | None:
+        options = self.options
+        if options.held_object == "none":
+            return None
+        rng = self._random(0, Stream.HELD)
+        return HeldObject.sample(options.held_object, options.held_size, options.hand, rng)
 
     @cached_property
     def _elbow(self) -> Array:

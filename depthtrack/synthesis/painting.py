@@ -13,6 +13,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
+from depthtrack.synthesis.held_object import HELD
 from depthtrack.synthesis.randomness import coarse_normal_noise
 from depthtrack.synthesis.scene import RenderedView
 from depthtrack.types import Array, Image, Mask
@@ -83,7 +84,10 @@ class Light:
 
 
 class Painter:
-    """Colour images of one recording; the backdrop is painted once."""
+    """Colour images of one recording; the backdrop is painted once.
+
+    held (3,): linear RGB of the object in the hand.
+    """
 
     def __init__(
         self,
@@ -93,10 +97,12 @@ class Painter:
         tone: SkinTone,
         noise: float,
         rng: np.random.Generator,
+        held: Array | None = None,
     ) -> None:
         self._camera = camera
         self._tone = tone
         self._noise = noise
+        self._held = np.zeros(3) if held is None else held
         self._light = Light.sample(rng)
         self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32)
         self._phases = rng.uniform(0, 2 * np.pi, 6).astype(np.float32)
@@ -114,6 +120,8 @@ class Painter:
         points = self._camera.unproject(np.stack([u, v], axis=-1), surface.depth[v, u])
         albedo = self._skin(points, normal, label, rendered.transforms)
         picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(albedo, normal, shine=True)))
+        v, u = np.nonzero(surface.label == HELD)
+        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(self._held, surface.normal[v, u])))
         if self._noise == 0:
             return picture
         noise = self._noise * coarse_normal_noise(rng, picture.shape)

@@ -27,6 +27,7 @@ class Stream(IntEnum):
     LIGHT = 9
     DEPTH_NOISE = 10
     KEYPOINTS = 11
+    HELD = 12
 
 
 def generator(seed: int, frame: int, stream: Stream) -> np.random.Generator:

@@ -1,4 +1,4 @@
-"""Scene rendering: the hand and its forearm in front of a static backdrop."""
+"""Scene rendering: hand, forearm and held object in front of a static backdrop."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +17,7 @@ from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.synthesis.backdrop import FOREARM, Backdrop
 from depthtrack.synthesis.forearm import Forearm
+from depthtrack.synthesis.held_object import HeldObject
 from depthtrack.types import Array, Mask
 
 HandKind = Literal["primitives", "skin"]
@@ -36,13 +37,14 @@ class RenderedView:
 
 @dataclass(frozen=True)
 class Scene:
-    """A hand of given sizes, with or without a forearm, in front of a static backdrop."""
+    """A hand of given sizes, with or without forearm and object, before a static backdrop."""
 
     shape: HandShape
     kind: HandKind
     has_forearm: bool
     camera: Camera
     backdrop: Backdrop
+    held: HeldObject | None = None
 
     def render(self, pose: Array, elbow: Array) -> RenderedView:
         """Render the scene.
@@ -61,6 +63,8 @@ class Scene:
             vertices, normals = self._forearm.mesh(transforms[0], bend)
             faces = self._forearm.faces
             rasterise(self.camera, vertices, faces, normals, np.full(len(faces), FOREARM), surface)
+        if self.held is not None:
+            self.held.draw(self.camera, transforms[0], surface)
         return RenderedView(surface, transforms)
 
     def hand_mask(self, rendered: RenderedView) -> Mask:

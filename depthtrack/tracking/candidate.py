@@ -5,8 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from depthtrack.rendering.objective import Terms
+from depthtrack.rendering.objective import evaluate as evaluate_image
+from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import Scorer
-from depthtrack.types import Array
+from depthtrack.rendering.target import Target
+from depthtrack.types import Array, Depth
 
 
 class Candidate(NamedTuple):
@@ -27,6 +31,20 @@ def evaluate(scorer: Scorer, poses: Array) -> list[Candidate]:
     scores = scorer.evaluate(poses)
     rows = zip(poses, scores.energy.tolist(), scores.agreement.tolist(), strict=True)
     return by_energy(Candidate(pose, energy, agreement) for pose, energy, agreement in rows)
+
+
+def seen_part(candidate: Candidate, rendered: Depth, target: Target, objective: Objective) -> Candidate:
+    """Return the candidate with the energy and the agreement of what no object hides of it.
+
+    rendered: (h, w) depth of its pose, metres.
+    """
+    if target.occluder is None:
+        return candidate
+    seen = target.unhidden(rendered, objective.hidden_depth)
+    before = target.before_occluder(rendered, objective.hidden_depth)
+    sums = np.array(evaluate_image(objective, target.silhouette, target.depth, seen, before))
+    terms = Terms.of_sums(objective, candidate.pose[None], *sums[:, None])
+    return Candidate(candidate.pose, float(terms.energy[0]), float(terms.agreement[0]))
 
 
 def by_energy(candidates: Iterable[Candidate]) -> list[Candidate]:

@@ -1,7 +1,7 @@
 """Run folders of earlier layouts of `run.json`.
 
 Those without a format version hold flat options of the trackers pso and ik. Those of format 2 count the memory of a
-track in frames. Before format 4, trackers followed no branches.
+track in frames. Before format 4, trackers followed no branches; before format 5, a lost hand was not located anew.
 """
 
 import dataclasses
@@ -44,7 +44,19 @@ def upgraded(fields: Mapping[str, Any], where: str) -> Mapping[str, Any]:
         fields = _nested(fields, where)
     if fields["format"] == 2:
         fields = _with_seconds(fields)
-    return _without_branches(fields) if fields["format"] == 3 else fields
+    if fields["format"] == 3:
+        fields = _without_branches(fields)
+    return _without_relocation(fields) if fields["format"] == 4 else fields
+
+
+def _without_relocation(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the contents of format 4 whose segmentation follows a lost hand."""
+    segmentation = fields.get("segmentation") or {}
+    if not isinstance(segmentation, dict):
+        return {**fields, "format": 5}
+    search = segmentation.get("search") or {}
+    search = {**search, "lost_lifetime": 0.0} if isinstance(search, dict) else search
+    return {**fields, "format": 5, "segmentation": {**segmentation, "search": search}}
 
 
 def _without_branches(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ class TrackingThresholds:
     """
 
     confidence: float = option(
-        0.02,
+        0.025,
         "A start with a lower confidence is lost, and a track after two such frames",
         source="half of the lowest confidence of a good pose among the tuning recordings of the cross-model benchmark",
     )

@@ -15,8 +15,10 @@ from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.run_folder import RunRow, RunWriter
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
@@ -79,6 +81,7 @@ class Pipeline:
             estimate = self._tracker.start(observation, self._start_pose)
         else:
             estimate = self._tracker.track(observation)
+        self._segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         if estimate.pose is not None:
             self._start_pose = None
         return TrackedFrame(frame, observation, estimate, milliseconds)
@@ -128,6 +131,7 @@ def replay_frames(
     for frame, estimate in frames:
         observation, milliseconds = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
+        segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         yield TrackedFrame(frame, observation, estimate, milliseconds)
 
 
@@ -177,6 +181,7 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
             estimate.pose,
             estimate.confidence,
             estimate.visibility,
+            estimate.spread,
             estimate.branches,
         )
         run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
@@ -195,6 +200,7 @@ def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:
             row.timestamp,
             row.confidence,
             row.visibility,
+            row.spread,
             row.branches,
         )
         for row in rows

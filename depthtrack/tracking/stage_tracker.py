@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.candidate import Candidate
-from depthtrack.tracking.confidence import Evidence, evidence_of, finger_visibility, fitted_model
+from depthtrack.tracking.candidate import Candidate, seen_part
+from depthtrack.tracking.confidence import Evidence, evidence_of, fitted_model
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
+from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.state import TrackState
 from depthtrack.tracking.timing import StageClock
@@ -33,10 +34,6 @@ class Stages:
     follow: Sequence[Stage]
     start: Sequence[Stage]
     refine: Sequence[Stage]
-
-
-_LEAST_ENERGY = 1e-3
-"""Energy that a ratio of energies is limited to."""
 
 
 class StageTracker:
@@ -107,20 +104,12 @@ class StageTracker:
             self._state.update(estimate)
             return estimate
         best, status, branches = min(found, key=lambda pair: pair[0].energy)
-        self.evidence, visibility = self._evidence(best, status, observation.timestamp)
+        tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
+        seen = seen_part(best, rendered, target, tools.scoring.objective)
+        bones = bones_in_view(tools.model, best.pose, rendered, target)
+        unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
+        self.evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")
-        shares = tuple(map(float, visibility))
-        time = observation.timestamp
-        return self._state.commit(*best, status, clock.milliseconds, time, confidence, shares, branches)
-
-    def _evidence(self, best: Candidate, status: Status, timestamp: float) -> tuple[Evidence, Array]:
-        """Return the evidence of the chosen pose, and the visibility (5,) of its fingers."""
-        tools, state = self._tools, self._state
-        target, rendered = tools.scorer.target, tools.scorer.render(best.pose)
-        visibility = finger_visibility(tools.model, best.pose, rendered, target.camera)
-        usual = state.median_energy if state.median_energy < np.inf else best.energy
-        ratio = float(np.log(max(best.energy, _LEAST_ENERGY) / max(usual, _LEAST_ENERGY)))
-        energy = best.energy / tools.scoring.objective.clamp
-        age = state.age(status, timestamp)
-        return evidence_of(best.pose, rendered, target, tools.hand, visibility, energy, ratio, age), visibility
+        figures = confidence, tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
+        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, *figures, branches, seen)

@@ -12,8 +12,9 @@ import numpy as np
 
 from depthtrack.hand.pose import retract, tangent_between
 from depthtrack.recording.branches import Branch
-from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
+from depthtrack.recording.run_rows import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
+from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
@@ -85,19 +86,21 @@ class TrackState:
         timestamp: float = math.nan,
         confidence: float = math.nan,
         visibility: tuple[float, ...] = UNKNOWN_VISIBILITY,
+        spread: tuple[float, ...] = UNKNOWN_SPREAD,
         branches: tuple[Branch, ...] = (),
+        seen: Candidate | None = None,
     ) -> Estimate:
-        """Update the state with the next pose; return its estimate, lost if it is not trusted."""
+        """Update the state with the next pose; return its estimate, lost if it is not trusted.
+
+        seen: energy and agreement that decide this; those of the pose if None.
+        """
         previous = self._confidence if status is Status.TRACKED else 0.0
-        status = Status.LOST if self.is_lost(energy, agreement, confidence, previous) else status
-        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, confidence, visibility, branches)
+        judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
+        status = Status.LOST if self.is_lost(*judged, confidence, previous) else status
+        figures = confidence, visibility, spread, branches
+        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures)
         self.update(estimate)
         return estimate
-
-    def age(self, status: Status, timestamp: float) -> float:
-        """Return the time since the start of the track, s; 0 if a pose of this status starts one."""
-        known = status is Status.TRACKED and timestamp >= self._started
-        return timestamp - self._started if known else 0.0
 
     @property
     def is_new(self) -> bool:

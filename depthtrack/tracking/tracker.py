@@ -7,8 +7,9 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import Branch
-from depthtrack.recording.run_folder import UNKNOWN_VISIBILITY
+from depthtrack.recording.run_rows import UNKNOWN_SPREAD, UNKNOWN_VISIBILITY
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array
@@ -25,8 +26,10 @@ class Estimate:
     stage_ms: milliseconds spent in each stage of the tracker.
     confidence: probability that the largest joint error is below 20 mm; NaN if unknown.
     visibility: share of each finger that is visible, 0 to 1; NaN if unknown.
+    spread: distance (21,) of the keypoints from the truth that about 68 % stay below, metres; NaN if unknown.
     branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
+    hand: hand that was tracked, if its sizes change while it is tracked.
     """
 
     pose: Array | None
@@ -37,7 +40,9 @@ class Estimate:
     timestamp: float = math.nan
     confidence: float = math.nan
     visibility: tuple[float, ...] = UNKNOWN_VISIBILITY
+    spread: tuple[float, ...] = UNKNOWN_SPREAD
     branches: tuple[Branch, ...] = ()
+    hand: HandShape | None = None
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)

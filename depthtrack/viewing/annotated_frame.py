@@ -23,12 +23,14 @@ class AnnotatedFrame:
     mask (h, w): silhouette.
     mask_is_true: whether the silhouette is ground truth instead of an estimate.
     keypoints (21, 3): metres, camera frame.
+    occluder (h, w): object that may hide the hand.
     """
 
     frame: Frame
     mask: Mask | None = None
     mask_is_true: bool = False
     keypoints: Array | None = None
+    occluder: Mask | None = None
 
     @classmethod
     def of(cls, sequence: Sequence, frame: Frame, estimate: MaskEstimator | None = None) -> Self:
@@ -70,6 +72,7 @@ class AnnotatedFrame:
             None if self.mask is None else region.crop(self.mask),
             self.mask_is_true,
             self.keypoints,
+            None if self.occluder is None else region.crop(self.occluder),
         )
 
 

@@ -14,7 +14,7 @@ from depthtrack.viewing.annotated_frame import AnnotatedFrame
 from depthtrack.viewing.depth_colours import colour_scale
 from depthtrack.viewing.panels import Layer, beside, blank, captioned, draw_layer, smaller, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, TEXT, TRUE_MASK, Rgb
+from depthtrack.viewing.theme import ESTIMATED_MASK, FAINT_TEXT, FINGER_COLOURS, OCCLUDER, TEXT, TRUE_MASK, Rgb
 
 MARGIN = 20
 """Background around a page, pixels."""
@@ -111,6 +111,8 @@ def _legend(frames: list[AnnotatedFrame], near: float, far: float, width: int) -
         entries.append(("true mask", TRUE_MASK))
     if False in masks:
         entries.append(("estimated mask", ESTIMATED_MASK))
+    if any(annotated.occluder is not None for annotated in frames):
+        entries.append(("object", OCCLUDER))
     if any(annotated.keypoints is not None for annotated in frames):
         entries += FINGER_COLOURS.items()
     for name, colour in entries:

@@ -12,7 +12,7 @@ from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator, an
 from depthtrack.viewing.depth_colours import depth_to_rgb
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, overlay_mask, spotlight
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, SURFACE, TEXT, TRUE_MASK, Rgb
+from depthtrack.viewing.theme import BACKGROUND, ESTIMATED_MASK, FAINT_TEXT, OCCLUDER, SURFACE, TEXT, TRUE_MASK, Rgb
 
 Layer = Literal["colour", "depth", "mask", "hand", "skeleton", "overview"]
 """Kinds of pictures of a frame; see `draw_layer`."""
@@ -25,7 +25,7 @@ def draw_layer(annotated: AnnotatedFrame, layer: Layer, height: int, near: float
     """Draw one layer of a frame, `height` pixels high.
 
     - "colour": the colour image, else depth.
-    - "mask": a tinted silhouette; "hand": the image dimmed outside the silhouette.
+    - "mask": a tinted silhouette; "hand": the image dimmed outside the silhouette. An object before it is tinted too.
     - "skeleton": keypoints on a dimmed image; "overview": silhouette and keypoints.
 
     Lines are drawn after scaling, so they are sharp at any size.
@@ -44,11 +44,19 @@ def draw_layer(annotated: AnnotatedFrame, layer: Layer, height: int, near: float
         image = spotlight(image, mask)
     if layer in ("mask", "hand", "overview") and mask is not None:
         image = overlay_mask(image, mask, mask_colour(annotated), _tint(annotated, layer))
+        image = draw_occluder(image, annotated)
     if layer == "skeleton":
         image = dimmed(image)
     if layer in ("skeleton", "overview") and annotated.keypoints is not None:
         image = draw_skeleton(image, camera, annotated.keypoints)
     return image
+
+
+def draw_occluder(image: Image, annotated: AnnotatedFrame) -> Image:
+    """Tint the object that may hide the hand, if any, in an image (h, w, 3) of the frame."""
+    if annotated.occluder is None:
+        return image
+    return overlay_mask(image, _scaled_mask(annotated.occluder, image.shape[1], image.shape[0]), OCCLUDER, 0.5)
 
 
 def panel(annotated: AnnotatedFrame, layers: Iterable[Layer], height: int, near: float, far: float) -> Image:
@@ -122,7 +130,8 @@ def _layer_caption(layer: Layer, annotated: AnnotatedFrame) -> tuple[str, str, R
     if layer == "mask":
         if annotated.mask is None:
             return "hand", "none found", FAINT_TEXT
-        return ("hand, true mask" if annotated.mask_is_true else "hand, estimated mask"), "", mask_colour(annotated)
+        remark = "" if annotated.occluder is None else "object in green"
+        return ("hand, true mask" if annotated.mask_is_true else "hand, estimated mask"), remark, mask_colour(annotated)
     if layer == "skeleton":
         return "true skeleton", "" if annotated.keypoints is not None else "not annotated", TEXT
     return layer, "", TEXT

@@ -16,7 +16,7 @@ from depthtrack.viewing.annotated_frame import AnnotatedFrame, true_keypoints
 from depthtrack.viewing.close_ups import close_up_regions
 from depthtrack.viewing.depth_colours import keypoint_depth_range
 from depthtrack.viewing.overlay import dimmed, draw_skeleton, faded_fingers
-from depthtrack.viewing.panels import blank, captioned, draw_layer, stacked, tile_grid
+from depthtrack.viewing.panels import blank, captioned, draw_layer, draw_occluder, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, enlarged, residual_scale, residual_to_rgb
 from depthtrack.viewing.shading import draw_surface
 from depthtrack.viewing.text import put_text, text_width
@@ -76,7 +76,7 @@ class RunPainter:
             draw_layer(annotated, "colour", self._height, near, far),
             self._rendered(replayed, annotated.camera),
         )
-        return image if surface is None else draw_surface(image, surface, 0.6)
+        return draw_occluder(image if surface is None else draw_surface(image, surface, 0.6), annotated)
 
     def _hypothesis(self, replayed: ReplayedFrame, close: AnnotatedFrame) -> Image:
         image, surface = (
@@ -93,11 +93,12 @@ class RunPainter:
         size = camera.width, camera.height
         rendered = np.zeros(camera.shape) if surface is None else surface.depth
         observed = None if close.mask is None else enlarged(close.mask.astype(np.float32), *size) > 0
-        return residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed)
+        return draw_occluder(residual_to_rgb(enlarged(close.frame.depth, *size), rendered, observed), close)
 
     def _skeleton(self, replayed: ReplayedFrame, close: AnnotatedFrame) -> Image:
         camera = close.camera.resized(self._height / close.camera.height)
         image = dimmed(draw_layer(close, "colour", self._height, self._near, self._far), 0.6)
+        image = draw_occluder(image, close)
         truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
         if truth is not None:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
@@ -117,7 +118,10 @@ class RunPainter:
         if layer == "hypothesis":
             return "hypothesis over depth", "" if replayed.estimate.pose is not None else "no pose"
         if layer == "residual":
-            return "residual", "red nearer, blue farther, magenta not covered"
+            observation = replayed.observation
+            with_object = observation is not None and observation.occluder is not None
+            rest = "green object" if with_object else "magenta not covered"
+            return "residual", f"red nearer, blue farther, {rest}"
         truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
         return "skeleton", "grey: hidden" if truth is None else "grey: hidden, thin: ground truth"
 
@@ -140,7 +144,8 @@ def annotated_run_frame(replayed: ReplayedFrame, model: HandModel) -> AnnotatedF
     """Return the frame with its observed silhouette and tracked keypoints."""
     annotated = AnnotatedFrame(replayed.frame)
     if replayed.observation is not None:
-        annotated = replace(annotated, mask=replayed.observation.whole_mask(replayed.frame.camera.shape))
+        observation, shape = replayed.observation, replayed.frame.camera.shape
+        annotated = replace(annotated, mask=observation.whole_mask(shape), occluder=observation.whole_occluder(shape))
     if replayed.estimate.pose is not None:
         annotated = replace(annotated, keypoints=model.keypoints(replayed.estimate.pose))
     return annotated

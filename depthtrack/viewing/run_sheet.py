@@ -12,7 +12,7 @@ from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked
 from depthtrack.viewing.residual_colours import LARGEST, UNCOVERED, UNREAD, residual_scale
 from depthtrack.viewing.run_pictures import RunPainter
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import FAINT_TEXT, STATUS_COLOURS
+from depthtrack.viewing.theme import FAINT_TEXT, OCCLUDER, STATUS_COLOURS
 from depthtrack.viewing.timeline import Timeline
 
 
@@ -24,13 +24,14 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
     Result (h, w, 3): RGB.
     Raises: InputError if none of the frames can be read.
     """
-    painter, tiles = RunPainter(replay, 2 * height), []
+    painter, tiles, has_object = RunPainter(replay, 2 * height), [], False
     last = max(rows, default=-1)
     for replayed in replay:
         if replayed.row in rows:
             views = [painter.view(replayed, layer) for layer in ("overlay", "residual")]
             small = [smaller(view, view.shape[1] // 2, height) for view in views]
-            status = replayed.estimate.status
+            status, observation = replayed.estimate.status, replayed.observation
+            has_object |= observation is not None and observation.occluder is not None
             remark = f"{replayed.frame.timestamp:.2f} s  ·  {status}"
             tiles.append(
                 captioned(beside(small, gap=0), f"frame {replayed.frame.index}", remark, STATUS_COLOURS[status])
@@ -41,11 +42,12 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
         raise InputError(f"the run {replay.run.folder} has no frame to show: choose another run")
     grid = tile_grid(tiles, min(columns, len(tiles)))
     timeline = Timeline(replay.run.energy, replay.run.status, grid.shape[1])
-    return framed(stacked([_title(replay, grid.shape[1]), grid, _legend(grid.shape[1]), timeline.image], gap=12))
+    legend = _legend(grid.shape[1], has_object)
+    return framed(stacked([_title(replay, grid.shape[1]), grid, legend, timeline.image], gap=12))
 
 
-def _legend(width: int) -> Image:
-    """Return the legend of the residual's colours, cut at the page's width."""
+def _legend(width: int, has_object: bool) -> Image:
+    """Return the legend of the residual's colours and of an object, cut at the page's width."""
     bar, limit, x = blank(width, 22), f"{1000 * LARGEST:.0f} mm", 0
     scale = residual_scale(120, 10)
     for mark, text in (
@@ -53,6 +55,7 @@ def _legend(width: int) -> Image:
         (scale, f"{limit} farther"),
         (np.full((10, 10, 3), UNCOVERED, dtype=np.uint8), "hand not covered"),
         (np.full((10, 10, 3), UNREAD, dtype=np.uint8), "no reading"),
+        *([(np.full((10, 10, 3), OCCLUDER, dtype=np.uint8), "object")] if has_object else []),
     ):
         start = x if mark is None else x + mark.shape[1] + 8
         if start + text_width(text, 14) > width:

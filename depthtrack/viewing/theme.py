@@ -14,7 +14,8 @@ NO_READING: Rgb = (7, 9, 13)
 
 TRUE_MASK: Rgb = (34, 211, 238)
 ESTIMATED_MASK: Rgb = (240, 80, 230)
-"""Both differ from each other, from skin and from the depth scale's near end."""
+OCCLUDER: Rgb = (190, 242, 100)
+"""All differ from each other, from skin and from the depth scale's near end."""
 
 PALM: Rgb = (226, 232, 240)
 FINGER_COLOURS: dict[str, Rgb] = {

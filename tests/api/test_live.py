@@ -1,6 +1,7 @@
 """Pushed frames: the same bits as the command, and checks of what is pushed."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,12 @@ import numpy as np
 import pytest
 
 import depthtrack as dt
+from depthtrack.calibration.parameters import COUNT, measures
 from depthtrack.cli import main
 from depthtrack.recording.keypoints import HEADER, keypoint_cells
 from depthtrack.tracking.configuration import CONFIGURATIONS
 from depthtrack.tracking.pipeline import NoTracker
+from depthtrack.tracking.tracker import Estimate
 
 CAMERA = dt.Camera(32, 24, 30.0, 30.0, 15.5, 11.5, 0.0002)
 DEPTH = np.full(CAMERA.shape, 0.5, np.float32)
@@ -29,7 +32,7 @@ def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, 
     assert main(command) == 0
     run = dt.read_run(tmp_path / "run")
     recording = dt.open_recording(path)
-    with dt.HandTracker(recording.camera, tracker=name) as tracker:
+    with dt.HandTracker(recording.camera, "average", name) as tracker:
         for frame, pose, energy, status in zip(recording, run.poses, run.energy, run.status, strict=True):
             estimate = tracker.update(frame.depth, frame.colour, timestamp=frame.timestamp)
             assert estimate.status is status
@@ -48,7 +51,7 @@ def test_pushed_keypoints_give_the_bits_of_their_file(path: Path, tmp_path: Path
     cells = [[str(time), *keypoint_cells(each)] for time, each in zip(recording.timestamps, found, strict=True)]
     file.write_text("\n".join(",".join(row) for row in [list(HEADER), *cells]) + "\n")
     run = dt.track(recording, dt.HandShape(), config, out=tmp_path / "run", keypoints=file)
-    with dt.HandTracker(recording.camera, tracker=config) as tracker:
+    with dt.HandTracker(recording.camera, "average", config) as tracker:
         for frame, keypoints, pose in zip(recording, found, run.poses, strict=True):
             rows = np.column_stack([keypoints.pixels, keypoints.confidence])
             estimate = tracker.update(frame.depth, frame.colour, timestamp=frame.timestamp, keypoints=rows)
@@ -74,9 +77,59 @@ def test_without_colour_the_bits_are_those_of_a_recording_without_colour(path: P
     (tmp_path / "grey" / "rgb.txt").unlink()
     config, recording = dt.tracker_config("ik", resolution=64), dt.open_recording(path)
     expected = [each.estimate.pose for each in dt.track(tmp_path / "grey", dt.HandShape(), config)]
-    with dt.HandTracker(recording.camera, tracker=config) as tracker:
+    with dt.HandTracker(recording.camera, "average", config) as tracker:
         found = [tracker.update(frame.depth, timestamp=frame.timestamp).pose for frame in recording]
     np.testing.assert_array_equal(found, expected)
+
+
+def test_without_a_hand_the_average_right_one_is_tracked_first(path: Path) -> None:
+    recording, config = dt.open_recording(path), dt.tracker_config("ik", resolution=64)
+    found = dict[str | None, list[Any]]()
+    for hand in (None, "average"):
+        with dt.HandTracker(recording.camera, hand, config) as tracker:
+            found[hand] = [tracker.update(each.depth, each.colour, timestamp=each.timestamp).pose for each in recording]
+            assert tracker.side_sure == (hand is not None)
+            assert (tracker.hand, tracker.measured) == (dt.HandShape(), {})
+    np.testing.assert_array_equal(found[None], found["average"])
+
+
+@pytest.mark.slow
+def test_a_left_hand_of_other_sizes_is_measured_while_it_is_tracked(tmp_path: Path) -> None:
+    """Ten frames a second, without colour or room, take a tenth of the time."""
+    hand, config = dt.HandShape(side="left", scale=0.85), dt.tracker_config("ik", resolution=64)
+    recording = dt.synthesise("everyday", tmp_path / "left", model="skin", hand=hand, rate=10.0, frames=75)
+    truth, errors, hands = recording.ground_truth, list[float](), list[dt.HandShape]()
+    assert truth is not None
+    with dt.HandTracker(recording.camera, tracker=config) as tracker:
+        for frame in recording:
+            estimate = tracker.update(frame.depth, timestamp=frame.timestamp)
+            keypoints = truth.keypoints_at(frame.timestamp)
+            assert keypoints is not None
+            assert estimate.hand is not None
+            errors.append(1000 * float(np.linalg.norm(tracker.keypoints(estimate) - keypoints, axis=1).mean()))
+            hands.append(estimate.hand)
+        assert tracker.side_sure
+        assert tracker.hand.side == "left"
+        length = tracker.measured["hand_length"]
+    average_mm = 1000 * measures(np.zeros(COUNT))["hand_length"][0]
+    assert abs(length.mm - 0.85 * average_mm) < 3 * length.sigma_mm < 0.1 * length.mm
+    assert len(set(hands)) >= 3
+    assert np.median(errors[-14:]) < 5 < np.median(errors[:30])
+
+
+def test_keypoints_are_those_of_the_hand_that_an_estimate_was_made_with() -> None:
+    pose, hand = np.array([0, 0, 0.5, 1, *np.zeros(23)]), dt.HandShape(side="left", scale=0.9)
+    with blind() as tracker:
+        estimate = Estimate(pose, 1.0, 0.9, dt.Status.TRACKED, hand=hand)
+        np.testing.assert_array_equal(tracker.keypoints(estimate), dt.HandModel(hand).keypoints(pose))
+        of_given = dt.HandModel(dt.HandShape()).keypoints(pose)
+        np.testing.assert_array_equal(tracker.keypoints(replace(estimate, hand=None)), of_given)
+
+
+def test_a_tracker_of_your_own_keeps_its_hand() -> None:
+    with blind() as tracker:
+        tracker.update(DEPTH, timestamp=0)
+        assert (tracker.hand, tracker.side_sure, tracker.measured) == (dt.HandShape(), True, {})
 
 
 def test_stored_units_and_doubles_mean_the_same_as_metres(path: Path) -> None:
@@ -86,7 +139,7 @@ def test_stored_units_and_doubles_mean_the_same_as_metres(path: Path) -> None:
     assert camera.metres(units).tobytes() == frame.depth.tobytes()
     poses = []
     for depth in (frame.depth, units, frame.depth.astype(np.float64)):
-        with dt.HandTracker(camera, tracker=dt.tracker_config("ik", resolution=64)) as tracker:
+        with dt.HandTracker(camera, "average", dt.tracker_config("ik", resolution=64)) as tracker:
             poses.append(tracker.update(depth, timestamp=0.0).pose)
     assert poses[0] is not None
     assert all(pose is not None and pose.tobytes() == poses[0].tobytes() for pose in poses)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from depthtrack.benchmarks.crossmodel import evidence
 from depthtrack.benchmarks.crossmodel import measure as measuring
 from depthtrack.benchmarks.crossmodel.experiment import EXPERIMENT, compare, tabulate
 from depthtrack.benchmarks.crossmodel.measure import _longest, measure
@@ -12,6 +13,7 @@ from depthtrack.benchmarks.crossmodel.recordings import MOTIONS, made_recording,
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.benchmarks.papers.plot import draw_png
 from depthtrack.calibration.calibrate import Calibration
+from depthtrack.tracking.confidence import Evidence
 
 TINY: dict[str, Any] = {
     "motion": "everyday",
@@ -73,6 +75,26 @@ def test_a_known_hand_is_measured_without_error(monkeypatch: pytest.MonkeyPatch)
     assert [line["tracker"] for line in tabulate([row])] == list(measuring.TRACKERS)
     picture = draw_png(EXPERIMENT, [row], compare([row]), "one recording")
     assert picture.startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_the_evidence_of_a_mirrored_hand_is_worse(monkeypatch: pytest.MonkeyPatch) -> None:
+    def calibrated(sequence: Any, *_: Any) -> Calibration:
+        nothing = np.zeros((0, 27))
+        return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
+
+    monkeypatch.setattr(evidence, "calibrate", calibrated)
+    frames = evidence.measure_evidence(TINY | {"frames": 4})["tracked"]
+    assert {frame[0] for frame in frames} == {"calibrated", "mirrored", "average"}
+    assert {frame[1] for frame in frames} == set(measuring.TRACKERS)
+    kinds = ("calibrated", "mirrored", "average")
+    energy, largest = (dict[str, list[float]]({kind: [] for kind in kinds}) for _ in range(2))
+    for kind, _, figures, error, shown, shown_within, hidden, hidden_within in frames:
+        energy[kind].append(Evidence(*figures).energy)
+        largest[kind].append(error)
+        assert (shown + hidden, 0 <= shown_within <= shown, 0 <= hidden_within <= hidden) == (21, True, True)
+    assert np.mean(energy["mirrored"]) > np.mean(energy["calibrated"])
+    assert np.mean(largest["mirrored"]) > np.mean(largest["calibrated"])
 
 
 def test_the_longest_wrong_branch_is_timed() -> None:

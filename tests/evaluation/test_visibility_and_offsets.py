@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, without_offsets
+from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, within_spread, without_offsets
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -39,6 +39,17 @@ def test_errors_are_split_by_visibility() -> None:
     np.testing.assert_allclose(shown.values, [10 / 21, 0], atol=1e-9)
     np.testing.assert_allclose(hidden.values, [np.nan, 10], atol=1e-9)
     assert (shown.name, hidden.name) == ("visible_joint_error_mm", "hidden_joint_error_mm")
+
+
+def test_errors_are_compared_with_their_spread() -> None:
+    model, poses = HandModel(HandShape()), Synthesiser(Synthesis(frames=3)).poses
+    joints = model.keypoints(poses)
+    joints[:, 8] += [0.01, 0, 0]
+    spread, visible = np.full((3, 21), 0.005), np.ones((3, 21), dtype=np.bool_)
+    spread[1, 8], spread[2], visible[1, 7:9] = 0.02, np.nan, False
+    shown, hidden = within_spread(joint_errors(model, poses, joints), spread, visible)
+    np.testing.assert_allclose(shown.values, [20 / 21, 1, np.nan])
+    np.testing.assert_allclose(hidden.values, [np.nan, 1, np.nan])
 
 
 def test_joints_of_another_hand_differ_by_constant_offsets_alone() -> None:

@@ -53,6 +53,7 @@ def test_a_table_holds_poses_and_keypoints_bitwise(run: Path, tmp_path: Path) ->
     assert tuple(header) == HEADER
     assert header[11:38] == list(POSE_NAMES)
     assert header[38:41] == ["wrist_x", "wrist_y", "wrist_z"]
+    assert header[101:103] == ["wrist_spread", "thumb_cmc_spread"]
     loaded, keypoints = Run.load(run), expected_keypoints(run)
     assert [row[2] for row in rows] == list(loaded.status)
     for k, row in enumerate(rows):
@@ -61,7 +62,8 @@ def test_a_table_holds_poses_and_keypoints_bitwise(run: Path, tmp_path: Path) ->
             assert set(row[5:]) == {""}
         else:
             np.testing.assert_array_equal(np.array(row[11:38], dtype=float), loaded.poses[k])
-            np.testing.assert_array_equal(np.array(row[38:], dtype=float).reshape(21, 3), keypoints[k])
+            np.testing.assert_array_equal(np.array(row[38:101], dtype=float).reshape(21, 3), keypoints[k])
+            np.testing.assert_array_equal([float(cell or "nan") for cell in row[101:]], loaded.spread[k])
 
 
 def test_exported_keypoints_are_the_recording_s_own(recording: Path, run: Path, tmp_path: Path) -> None:

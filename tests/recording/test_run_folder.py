@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.run_folder import Run, RunRow, RunWriter, read_rows
+from depthtrack.recording.run_folder import Run, RunWriter
+from depthtrack.recording.run_rows import RunRow, read_rows
 from depthtrack.recording.status import Status
 
 CONFIGURATION = {"tracker": "pso", "seed": 3, "hand": json.loads(HandShape().to_json()), "threads": 2}
@@ -132,9 +133,9 @@ def test_damaged_runs_are_rejected_in_one_sentence(tmp_path: Path, name: str, te
 @pytest.mark.parametrize(
     ("found", "damaged", "message"),
     [
-        ("tracked,0", "tracked,x", "line 2: expected 38 values"),
-        ("tracked,0", 'tracked,"0', "line 2: expected 38 values"),
-        ("tracked,0", "tracked", "line 2: expected 38 columns, found 37"),
+        ("tracked,0", "tracked,x", "line 2: expected 59 values"),
+        ("tracked,0", 'tracked,"0', "line 2: expected 59 values"),
+        ("tracked,0", "tracked", "line 2: expected 59 columns, found 58"),
         ("\n0,", f"\n{10**30},", "line 2: .* frames are numbered from 0 to"),
     ],
 )
@@ -158,8 +159,8 @@ def test_a_malformed_row_is_named(tmp_path: Path, found: str, damaged: str, mess
         ("ring_visible", "-1", "frame 1: confidence and visibility must be shares"),
         ("x", "1e300", "frame 1: a pose must be numbers up to 100"),
         ("x", "nan", "frame 1: a pose must be numbers"),
-        ("x", "", "line 3: expected 38 values"),
-        ("x", "y" * 100_000, "line 3: expected 38 values .{1,140}$"),
+        ("x", "", "line 3: expected 59 values"),
+        ("x", "y" * 100_000, "line 3: expected 59 values .{1,140}$"),
         ("qw", "3", "frame 1: the quaternion must have length 1, found [0-9.]{1,7}$"),
     ],
 )

@@ -46,7 +46,7 @@ def test_a_renderer_that_computes_wrongly_is_reported(monkeypatch: pytest.Monkey
             depth = super().render(pose)  # type: ignore[arg-type]
             return np.roll(np.where(depth > 0, depth + np.float32(2e-4), 0), 1, axis=1)
 
-    monkeypatch.setattr(selfcheck, "create_scorer", lambda name, shape: Shifted(shape))
+    monkeypatch.setattr(selfcheck, "create_scorer", lambda name, shape, objective: Shifted(shape, objective))
     check = self_check("oracle", seconds=0.01)
     assert not check.agrees
     assert check.depth_difference > 1e-4

@@ -69,6 +69,12 @@ def test_agrees_with_the_oracle_in_a_region_of_the_hand(run: Run, seed: int, red
     run(views.assert_window_agrees, seed, reduced)
 
 
+@given(seed=st.integers(0, 2**32 - 1), cost=st.sampled_from([0.0, 0.3, 4.0]))
+@settings(max_examples=8)
+def test_agrees_with_the_oracle_behind_an_occluder(run: Run, seed: int, cost: float) -> None:
+    run(views.assert_occluded_window_agrees, seed, cost)
+
+
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_agrees_with_the_oracle_through_any_camera(run: Run, seed: int) -> None:
@@ -163,7 +169,7 @@ def test_rectangles_bound_their_primitives_tightly(seed: int) -> None:
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_the_kernel_sums_tiles_like_the_plain_evaluation(seed: int) -> None:
-    rng, objective = np.random.default_rng(seed), Objective()
+    rng, objective = np.random.default_rng(seed), Objective(before_cost=0.3)
     h, w, columns, count = *(int(n) for n in rng.integers(1, 40, 2)), 3, 5
     depth = np.where(rng.random((h, w)) < 0.2, 0, rng.uniform(0.4, 0.5, (h, w))).astype(np.float32)
     silhouette = rng.random((h, w)) < 0.5
@@ -175,9 +181,13 @@ def test_the_kernel_sums_tiles_like_the_plain_evaluation(seed: int) -> None:
         tiles[n // columns * h :, n % columns * w :][:h, :w] = inverse
     regions, sums = np.tile([0, 0, w, h], (count, 1)), np.empty((count, 3))
     empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(silhouette.sum())
-    limits = objective.match_depth, objective.clamp_depth
-    sum_tiles(tiles, columns, regions, depth, silhouette.astype(np.float32), empty, *limits, sums)
-    expected = [evaluate(objective, silhouette, depth, image) for image in rendered]
+    limits = objective.match_depth, objective.clamp_depth, objective.before_cost
+    occluder = np.where(rng.random((h, w)) < 0.3, rng.uniform(0.4, 0.5, (h, w)), 0)
+    target = Target(Camera(w, h, 60, 60, 0, 0), silhouette, depth, occluder=occluder)
+    maps = depth, silhouette.astype(np.float32), target.hidden_from(objective.hidden_depth)
+    sum_tiles(tiles, columns, regions, *maps, empty, *limits, sums)
+    before = [target.before_occluder(image, objective.hidden_depth) for image in rendered]
+    expected = [evaluate(objective, silhouette, depth, *maps) for maps in zip(rendered, before, strict=True)]
     np.testing.assert_allclose(sums, expected, rtol=1e-5, atol=1e-5)
 
 

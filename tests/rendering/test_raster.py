@@ -1,5 +1,7 @@
 """The rasteriser agrees with the float64 oracle: silhouettes, depth and energies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -13,7 +15,15 @@ from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.raster import RasterScorer
 from depthtrack.rendering.target import Target
-from tests.support.rendering import KINECT, assert_agrees, random_poses, random_shape, target_of, window_on
+from tests.support.rendering import (
+    KINECT,
+    assert_agrees,
+    random_poses,
+    random_shape,
+    target_of,
+    window_on,
+    with_occluder,
+)
 
 
 @given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 64, 33]))
@@ -34,6 +44,29 @@ def test_agrees_with_the_oracle_through_any_camera(seed: int) -> None:
     camera = Camera(width, height, focal, focal * rng.uniform(0.8, 1.2), *rng.uniform(-0.5, 1.5, 2) * [width, height])
     shape, poses = random_shape(rng), random_poses(rng, 4, (0, 0, rng.uniform(0.3, 2.5)), 0.2)
     assert_agrees(shape, target_of(shape, poses[0], camera, rng), poses, Objective(0.015, 0.06, 5.0, 2.0))
+
+
+@given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 33]), cost=st.sampled_from([0.0, 0.3, 4.0]))
+@settings(max_examples=20)
+def test_agrees_with_the_oracle_behind_an_occluder(seed: int, reduced: int | None, cost: float) -> None:
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    target = with_occluder(target_of(shape, poses[0], window_on(shape, poses[0], 224), rng), 0.5, rng)
+    objective = Objective(hidden_depth=0.003, before_cost=cost)
+    assert_agrees(shape, target if reduced is None else target.reduced(reduced), poses, objective)
+
+
+def test_an_occluder_before_the_hand_changes_no_bit() -> None:
+    rng = np.random.default_rng(8)
+    shape, poses = HandShape(), random_poses(rng, 40, (0, 0, 0.5), 0.05)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
+    scores = []
+    for occluder in (None, *(np.full(target.camera.shape, depth, np.float32) for depth in (0, 0.2))):
+        with RasterScorer(shape) as scorer:
+            scorer.set_target(replace(target, occluder=occluder))
+            scores.append(scorer.score(poses))
+    np.testing.assert_array_equal(scores[0], scores[1])
+    np.testing.assert_array_equal(scores[0], scores[2])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from depthtrack.hand.primitives import SPHERE, sphere
 from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.raycast import raycast
 from depthtrack.segmentation.observation import Observation
-from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.options import SearchWindowOptions, SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
@@ -222,3 +222,27 @@ def test_the_same_frames_give_the_same_masks() -> None:
 
     for one, two in zip(masks(), masks(), strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+def test_a_hand_that_stays_lost_is_located_anew() -> None:
+    """The farther of two hands is followed until the tracker has lost it for half a second."""
+    made = Synthesiser(Synthesis(frames=1, model="skin"))
+    near = made[0].depth.astype(np.float32)
+    far = np.roll(np.where(near > 0, near + 0.3, 0), -200, axis=1).astype(np.float32)
+
+    def distances(options: SegmentationOptions, lost: bool) -> list[float]:
+        segmenter, found = Segmenter(None, options), list[float]()
+        for number in range(12):
+            depth = far if number == 0 else np.where(near > 0, near, far)
+            observation = segmenter.segment(Frame(number, number / 10, depth, None, made.sensor.camera))
+            assert observation is not None
+            found.append(float(observation.centre[2]))
+            segmenter.set_lost(lost, number / 10)
+        return found
+
+    never = SegmentationOptions(search=SearchWindowOptions(lost_lifetime=0))
+    assert min(distances(SegmentationOptions(), lost=False)) > 0.7
+    assert min(distances(never, lost=True)) > 0.7
+    after = distances(SegmentationOptions(), lost=True)
+    assert min(after[:6]) > 0.7
+    assert max(after[6:]) < 0.6

@@ -99,6 +99,11 @@ def test_a_limb_that_broadens_again_is_no_forearm() -> None:
     assert np.isnan(kernel_wrist(np.full(50, 0.06), 50, 0.05))
 
 
+def test_a_hand_that_ends_within_the_visible_range_has_no_wrist() -> None:
+    profile = np.where(MIDDLES < 0.06, 0.08, 0.0)
+    assert np.isnan(kernel_wrist(profile, len(profile), 0.06))
+
+
 @pytest.mark.parametrize("degrees", [-25, 0, 25])
 def test_a_bent_wrist_is_cut_across_the_hand(degrees: float) -> None:
     bend = np.radians(degrees)

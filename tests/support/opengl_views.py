@@ -13,7 +13,7 @@ from depthtrack.rendering.opengl.scorer import OpenGLScorer, Sums
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.target import Target
-from tests.support.rendering import KINECT, random_poses, random_shape, target_of, window_on
+from tests.support.rendering import KINECT, random_poses, random_shape, target_of, window_on, with_occluder
 
 OBJECTIVE = Objective()
 SMALL = Camera(64, 48, 60.0, 62.0, 31.0, 24.5)
@@ -40,7 +40,11 @@ def assert_agrees(
     true = np.stack([oracle.render(pose) for pose in poses])
     margin = np.abs(np.abs(true - target.depth) - objective.match_depth)
     undecided = ((margin < 1e-5) & (true > 0)).any(axis=0)
-    target = Target(target.camera, target.silhouette, np.where(undecided, 0, target.depth))
+    occluder = target.occluder
+    if occluder is not None:
+        near = np.abs(true - occluder - objective.hidden_depth) < 1e-5
+        occluder = np.where((near & (true > 0)).any(axis=0), 0, occluder)
+    target = Target(target.camera, target.silhouette, np.where(undecided, 0, target.depth), occluder=occluder)
     oracle.set_target(target)
     expected = oracle.terms(poses)
     for sums in BOTH_SUMS:
@@ -63,6 +67,14 @@ def assert_window_agrees(platform: Platform, seed: int, reduced: int | None) -> 
     shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
     target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
     assert_agrees(platform, shape, target if reduced is None else target.reduced(reduced), poses, OBJECTIVE)
+
+
+def assert_occluded_window_agrees(platform: Platform, seed: int, before_cost: float) -> None:
+    """A window on a hand that an object hides in part."""
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    target = with_occluder(target_of(shape, poses[0], window_on(shape, poses[0], 224), rng), 0.5, rng)
+    assert_agrees(platform, shape, target, poses, Objective(before_cost=before_cost))
 
 
 def assert_any_camera_agrees(platform: Platform, seed: int) -> None:

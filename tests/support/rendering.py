@@ -47,6 +47,16 @@ def target_of(shape: HandShape, pose: np.ndarray, camera: Camera, rng: np.random
     return Target(camera, silhouette, np.where(rng.random(camera.shape) < 0.05, 0, depth).astype(np.float32))
 
 
+def with_occluder(target: Target, distance: float, rng: np.random.Generator) -> Target:
+    """Return the target with a slanted plane, about `distance` (m) away, over a part of it."""
+    height, width = target.camera.shape
+    v, u = np.mgrid[:height, :width]
+    inside = (u - rng.uniform(0, width)) ** 2 + (v - rng.uniform(0, height)) ** 2 < (0.4 * max(height, width)) ** 2
+    plane = distance + (u / width - 0.5) * rng.uniform(-0.1, 0.1) + (v / height - 0.5) * rng.uniform(-0.1, 0.1)
+    free = ~inside
+    return Target(target.camera, target.silhouette & free, target.depth * free, occluder=np.where(inside, plane, 0))
+
+
 def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
     """A square region of the Kinect's image, `side` pixels wide, centred on the hand."""
     uv = KINECT.project(HandModel(shape).keypoints(pose)).mean(axis=0)
@@ -73,6 +83,9 @@ def assert_agrees(shape: HandShape, target: Target, poses: np.ndarray, objective
         difference = np.abs(theirs - target.depth)
         undecided = np.count_nonzero(truth & (np.abs(difference - objective.match_depth) < 5e-6))
         undecided += np.count_nonzero(drawn != truth)
+        if target.occluder is not None:
+            behind = theirs - target.occluder - objective.hidden_depth
+            undecided += np.count_nonzero(truth & (np.abs(behind) < 5e-6))
         pixel = (2 * objective.silhouette_weight + objective.clamp_depth / objective.depth_unit) / (
             1 + np.count_nonzero(target.silhouette | truth)
         )

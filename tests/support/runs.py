@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from depthtrack.cli import main
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
-from depthtrack.recording.run_folder import RunRow, RunWriter
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.status import Status
 
 STAGES = ("segment", "swarm")

@@ -8,7 +8,7 @@ from depthtrack.segmentation.options import SegmentationOptions
 
 def changed_options(**values: Any) -> SegmentationOptions:
     """Return options with each number changed by a few percent or by one, and `values` replaced."""
-    changed: dict[str, Any] = {"use_colour": False, "wrist_margin": 0.01}
+    changed: dict[str, Any] = {"use_colour": False, "wrist_margin": 0.01, "occluder.find_occluder": True}
     for each in parameters(SegmentationOptions()):
         if each.path in changed or each.path in values:
             continue

@@ -11,7 +11,8 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, read_branches
-from depthtrack.recording.run_folder import RunRow, RunWriter, read_rows
+from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_rows import RunRow, read_rows
 from depthtrack.recording.run_tables import rewrite_table
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesiser
@@ -80,8 +81,8 @@ def test_a_tracker_goes_on_with_the_branches_of_a_run_folder(
         estimates = [whole.start(observations[0], made.poses[FIRST]), *map(whole.track, observations[1:])]
         with RunWriter(tmp_path / "run", {}, ()) as run:
             for index, each in enumerate(estimates[:5]):
-                figures = each.energy, each.agreement, each.pose, each.confidence, each.visibility, each.branches
-                run.append(RunRow(index, each.timestamp, each.status, *figures), {})
+                figures = each.energy, each.agreement, each.pose, each.confidence, each.visibility, each.spread
+                run.append(RunRow(index, each.timestamp, each.status, *figures, each.branches), {})
         assert estimates[4].branches
         cut.restore(estimates_of(read_rows(tmp_path / "run")))
         again = [cut.track(each) for each in observations[5:]]

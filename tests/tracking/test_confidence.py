@@ -1,4 +1,4 @@
-"""Confidence of an estimate, and the visibility of fingers."""
+"""Confidence of an estimate."""
 
 import math
 from contextlib import closing
@@ -6,27 +6,17 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import make_pose
-from depthtrack.hand.postures import POSTURES
-from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.confidence import (
-    CLIPPED,
-    LONGEST_TRACK,
     ConfidenceModel,
     Evidence,
-    compare_images,
     evidence_of,
-    finger_visibility,
     fitted_model,
 )
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.spread import BonesInView
 from tests.support.observations import observe
-
-HAND = HandShape()
-MODEL = HandModel(HAND)
 
 
 def test_the_confidence_is_a_logistic_function() -> None:
@@ -37,46 +27,28 @@ def test_the_confidence_is_a_logistic_function() -> None:
 
 
 def test_better_evidence_gives_more_confidence() -> None:
-    """All fingers in view, a low energy and thin residual outlines, against the opposite."""
-    good = Evidence(-2.0, 0.0, 1.0, 0.05, 0.05, 0.0, 0.0, 1.0, 1.0, 1.6, 8.0, 2.0)
-    bad = Evidence(0.0, 1.0, 2.5, 0.4, 0.4, 0.2, 0.2, 0.3, 0.0, 0.8, 8.0, 0.0)
-    assert fitted_model()(good) > 0.7
-    assert fitted_model()(bad) < 0.3
+    """A low energy, a covered silhouette and measured fingers, against the opposite."""
+    assert fitted_model()(Evidence(-2.0, 0.0, 2.0, 3.0)) > 0.7
+    assert fitted_model()(Evidence(0.0, 0.2, 3.9, 9.0)) < 0.3
 
 
-def test_evidence_counts_both_silhouettes(everyday_skin: Synthesiser) -> None:
+def test_evidence_counts_what_the_hand_leaves_unexplained(everyday_skin: Synthesiser) -> None:
     observation = observe(everyday_skin, 20)
     target = Target(observation.camera, observation.silhouette, observation.depth)
-    visibility = np.array([1.0, 1.0, 0.5, 1.0, 0.0])
+    spread = np.full(21, 0.002)
+    spread[7] = 0.05
+    bones = BonesInView(np.ones((5, 3, 2), dtype=np.bool_), np.zeros((5, 3, 2)), spread, 4.0)
 
-    def evidence(rendered: np.ndarray, age: float) -> Evidence:
-        pose = everyday_skin.poses[20]
-        return evidence_of(pose, rendered, target, HAND, visibility, 0.2, 0.1, age)
+    def evidence(rendered: np.ndarray) -> Evidence:
+        return evidence_of(everyday_skin.poses[20], rendered, target, bones, 0.2)
 
-    whole = evidence(observation.depth, 9.0)
-    assert whole.unexplained <= np.mean(observation.depth[observation.silhouette] == 0)
-    assert (whole.in_vain, whole.thick_unexplained, whole.age) == (0, 0, LONGEST_TRACK)
-    assert (whole.visible, whole.least_visible) == (0.7, 0.0)
-    assert whole.energy == pytest.approx(math.log(0.2))
+    whole = evidence(observation.depth)
+    assert whole == pytest.approx((math.log(0.2), 0.0, math.log(50), 4.0))
     half = observation.depth.copy()
     half[: half.shape[0] // 2] = 0
-    assert evidence(half, 0.0).thick_unexplained > 0.2
-    shifted = np.roll(observation.depth, 30, axis=1)
-    assert evidence(shifted, 0.0).thick_in_vain > 0.1
-    assert evidence(observation.depth + 0.03 * (observation.depth > 0), 0.0).depth_difference > math.log(20)
-
-
-def test_folded_fingers_are_hidden_behind_the_back_of_the_hand(everyday_skin: Synthesiser) -> None:
-    observation = observe(everyday_skin, 20)
-    shares = []
-    for name in ("open", "fist"):
-        # The camera sees the back of the hand.
-        pose = make_pose(np.array([0, 0, 0.5]), np.array([0.0, 1.0, 0.0, 0.0]), POSTURES[name])
-        with closing(create_tracker(tracker_config("ik"), HAND)) as tracker:
-            tracker._tools.set_target(observation)
-            rendered = tracker._tools.scorer.render(pose)
-        shares.append(finger_visibility(MODEL, pose, rendered, observation.camera)[1:].mean())
-    assert shares[0] > shares[1]
+    assert evidence(half).unexplained > 0.2
+    shifted = np.roll(observation.depth, 1, axis=1)
+    assert evidence(shifted).unexplained < 0.01
 
 
 @pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])
@@ -92,21 +64,5 @@ def test_estimates_have_a_confidence_that_resumes(everyday_skin: Synthesiser, na
         again = [cut.track(frame) for frame in frames[2:]]
     for one, other in zip(estimates[2:], again, strict=True):
         assert 0 < one.confidence < 1
-        assert (one.confidence, one.visibility) == (other.confidence, other.visibility)
-
-
-def test_the_comparison_of_images_equals_its_definition() -> None:
-    draw = np.random.default_rng(3)
-    rendered, depth = (
-        np.where(draw.random((9, 13)) < 0.5, 0, draw.uniform(0.4, 0.6, (9, 13))).astype(np.float32) for _ in range(2)
-    )
-    silhouette = draw.random((9, 13)) < 0.6
-    unexplained, in_vain = np.zeros((9, 13), np.bool_), np.zeros((9, 13), np.bool_)
-    *counts, difference = compare_images(rendered, depth, silhouette, unexplained, in_vain)
-    covered = rendered > 0
-    both = covered & (depth > 0)
-    np.testing.assert_array_equal(unexplained, silhouette & ~covered)
-    np.testing.assert_array_equal(in_vain, covered & ~silhouette)
-    assert counts == [silhouette.sum(), covered.sum(), unexplained.sum(), in_vain.sum(), both.sum()]
-    gaps = np.abs(rendered[both].astype(float) - depth[both].astype(float))
-    assert difference == pytest.approx(np.minimum(gaps, CLIPPED).sum())
+        assert np.all(np.array(one.spread) > 0)
+        assert (one.confidence, one.visibility, one.spread) == (other.confidence, other.visibility, other.spread)

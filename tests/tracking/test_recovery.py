@@ -58,7 +58,7 @@ def _shifted(made: Synthesiser, pose: np.ndarray) -> np.ndarray:
 
 def test_recovery_leaves_a_local_minimum_of_the_swarm(made: Synthesiser) -> None:
     """In one frame, a swarm of the same spread stays at the pose shifted by one finger."""
-    frame, wrong = 11, _shifted(made, made.poses[11])
+    frame, wrong = 23, _shifted(made, made.poses[23])
     o = observe(made, frame)
     with RasterScorer(made.options.hand) as scorer:
         scorer.set_target(o.reduced(96))
@@ -291,3 +291,11 @@ def test_the_papers_trackers_do_not_recover(made: Synthesiser, name: str, recove
         estimate = tracker.track(observe(made, 130))
     assert ("recover" in tracker.stages) == recovers
     assert (estimate.stage_ms.get("recover", 0) > 1) == recovers
+
+
+def test_a_loss_is_judged_by_what_no_object_hides(made: Synthesiser) -> None:
+    state, pose = TrackState(TrackingThresholds(), 40.0), made.poses[0]
+    state.commit(pose, 10.0, 0.9, Status.TRACKED, {})
+    seen = Candidate(pose, 15.0, 0.8)
+    assert state.commit(pose, 30.0, 0.4, Status.TRACKED, {}, seen=seen).status is Status.TRACKED
+    assert state.commit(pose, 30.0, 0.4, Status.TRACKED, {}).status is Status.LOST

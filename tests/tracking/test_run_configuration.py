@@ -106,7 +106,7 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
     ("change", "expected"),
     [
         ({"tracker": "magic"}, "no tracker 'magic'"),
-        ({"format": 99}, "expected format 4"),
+        ({"format": 99}, "expected format 5"),
         ({"options": {"colour": "red"}}, "colour"),
         ({"options": {"seed": "many"}}, "seed"),
         ({"frames": -1}, "whole number"),
@@ -219,3 +219,13 @@ def test_a_run_of_format_3_follows_no_branches(name: str) -> None:
     tracker = RunConfiguration.from_fields(fields, "run.json").tracker
     assert isinstance(tracker, IkConfig | PsoConfig | HybridConfig)
     assert (tracker.branches.interval, tracker.seed) == (0.0, 4)
+
+
+@pytest.mark.parametrize("segmentation", [{}, None, {"wrist_margin": 0.01}, {"search": {"nearest": 0.2}}])
+def test_a_run_of_format_4_does_not_locate_a_lost_hand_anew(segmentation: Any) -> None:
+    fields = {"format": 4, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": {}}
+    found = RunConfiguration.from_fields(fields | {"segmentation": segmentation}, "run.json").segmentation
+    assert found.search.lost_lifetime == 0
+    given = segmentation or {}
+    assert found.wrist_margin == given.get("wrist_margin", 0)
+    assert found.search.nearest == given.get("search", {}).get("nearest", 0.1)

@@ -1,5 +1,6 @@
 """Annotated frames and the pages composed of them: content, positions and sizes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -19,7 +20,7 @@ from depthtrack.viewing.contact_sheet import contact_sheet, save_picture
 from depthtrack.viewing.depth_colours import depth_range
 from depthtrack.viewing.panels import draw_layer, panel, tile_grid, useful_layers
 from depthtrack.viewing.strip import strip
-from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, TRUE_MASK
+from depthtrack.viewing.theme import ESTIMATED_MASK, FINGER_COLOURS, OCCLUDER, TRUE_MASK
 from tests.support.recordings import TIMES, joints_at, mask_at, write_sample
 from tests.support.viewing import CAMERA, GREY, open_hand
 
@@ -157,6 +158,23 @@ def test_skeleton_and_mask_align_at_any_resolution(height: int) -> None:
     )
     nearest = np.linalg.norm(drawn - tinted, axis=1).min()
     assert nearest <= 1.0
+
+
+def test_an_object_before_the_hand_has_its_own_colour_and_legend_entry() -> None:
+    mask, occluder = np.zeros((2, *CAMERA.shape), dtype=np.bool_)
+    mask[100:150, 200:250], occluder[100:150, 250:280] = True, True
+    bare = AnnotatedFrame(plane_frame(colour=0).frame, mask)
+    holding = replace(bare, occluder=occluder)
+    for layer in ("mask", "overview"):
+        without, shown = (draw_layer(each, layer, CAMERA.height, 0.4, 0.6) for each in (bare, holding))
+        assert np.all(np.any(shown != without, axis=-1) == occluder)
+        assert np.all(shown[100, 250:280] == OCCLUDER)
+    region = Rect(240, 90, 300, 160)
+    cropped = holding.cropped(region).occluder
+    assert cropped is not None
+    np.testing.assert_array_equal(cropped, region.crop(occluder))
+    legends = [contact_sheet([each], "sheet", "", 0.4, 0.6)[-40:] for each in (bare, holding)]
+    assert [bool(np.all(legend == OCCLUDER, axis=-1).any()) for legend in legends] == [False, True]
 
 
 def test_a_strip_crops_to_the_hand() -> None:

@@ -1,4 +1,4 @@
-"""Evidence and errors of every frame of a recording, to which the confidence is fitted.
+"""Evidence, errors and spread in each frame of a recording, for the fit of the confidence.
 
 Each recording is tracked with three hands: the calibrated one, the same of the other side, and the average hand.
 """
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.benchmarks.crossmodel.measure import TRACKERS, true_joints
+from depthtrack.benchmarks.crossmodel.measure import TRACKERS, true_joints, visible_joints
 from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import calibrate
 from depthtrack.evaluation.metrics import without_offsets
@@ -19,11 +19,14 @@ from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
-from depthtrack.types import Array
+from depthtrack.types import Array, Mask
 
 
 def measure_evidence(cell: Cell) -> Row:
-    """Return one entry per tracked frame: hand, tracker, evidence, and largest joint error, mm.
+    """Return one entry per tracked frame.
+
+    It holds hand, tracker, evidence, largest joint error (mm), and numbers of keypoints: visible, those of them with an
+    error below their spread, hidden, and those of them.
 
     cell: arguments of `made_recording`.
 
@@ -35,31 +38,38 @@ def measure_evidence(cell: Cell) -> Row:
         calibrated = calibrate(sequence, side).hand
         hands = {"calibrated": calibrated, "mirrored": calibrated.with_(side=other), "average": HandShape(side=side)}
         joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
+        visible = np.array([visible_joints(sequence, index, joints[index]) for index in range(len(sequence))])
         frames: list[Any] = []
         for kind, hand in hands.items():
             for name in TRACKERS:
-                frames += [[kind, name, *row] for row in _tracked(sequence, hand, name, joints, kind != "mirrored")]
+                frames += [
+                    [kind, name, *row] for row in _tracked(sequence, hand, name, joints, visible, kind != "mirrored")
+                ]
     return {"tracked": frames}
 
 
 def _tracked(
-    sequence: Sequence, hand: HandShape, name: str, joints: Array, aligned: bool
-) -> list[tuple[list[float], float]]:
-    """Return the evidence and the largest joint error (mm) of each frame with a pose.
+    sequence: Sequence, hand: HandShape, name: str, joints: Array, visible: Mask, aligned: bool
+) -> list[tuple[list[float], float, int, int, int, int]]:
+    """Return the entry of each frame with a pose, without hand and tracker.
 
     aligned: remove the constant offsets of the joints.
     """
     evidence: dict[int, list[float]] = {}
+    spread = np.full((len(sequence), 21), np.nan)
     poses, model = np.full((len(sequence), 27), np.nan), HandModel(hand)
     with closing(create_tracker(tracker_config(name), hand)) as tracker:
         pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence), hand)
         for each in track_frames(sequence, pipeline):
             if each.estimate.pose is not None and tracker.evidence is not None:
-                poses[each.frame.index] = each.estimate.pose
+                poses[each.frame.index], spread[each.frame.index] = each.estimate.pose, each.estimate.spread
                 evidence[each.frame.index] = [round(float(value), 5) for value in tracker.evidence]
     if not evidence:
         return []
     known = sorted(evidence)
     points = without_offsets(model, poses, joints)[known] if aligned else model.keypoints(poses[known])
-    errors = 1e3 * np.linalg.norm(points - joints[known], axis=2).max(axis=1)
-    return [(evidence[index], round(float(error), 2)) for index, error in zip(known, errors, strict=True)]
+    errors = np.linalg.norm(points - joints[known], axis=2)
+    within, shown = errors < spread[known], visible[known]
+    counts = np.column_stack([part.sum(axis=1) for part in (shown, shown & within, ~shown, ~shown & within)]).tolist()
+    largest = (1e3 * errors.max(axis=1)).round(2).tolist()
+    return [(evidence[index], *row) for index, *row in zip(known, largest, *zip(*counts, strict=True), strict=True)]

@@ -45,7 +45,7 @@ def measure(**recording: Any) -> Row:
             "calibration_s": perf_counter() - begun,
         }
         joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
-        visible = np.array([_visible(sequence, index, joints[index]) for index in range(len(sequence))])
+        visible = np.array([visible_joints(sequence, index, joints[index]) for index in range(len(sequence))])
         row |= _starts(sequence, found, joints)
         row |= _corrections(sequence, found, joints)
         for name in TRACKERS:
@@ -62,7 +62,8 @@ def true_joints(sequence: Sequence, index: int) -> Array:
     return joints
 
 
-def _visible(sequence: Sequence, index: int, joints: Array) -> Mask:
+def visible_joints(sequence: Sequence, index: int, joints: Array) -> Mask:
+    """Return which of the true keypoints (21, 3) of a frame no surface hides."""
     depth = sequence.exact_depth(index)
     assert depth is not None
     return points_in_view(joints, depth, sequence.camera)

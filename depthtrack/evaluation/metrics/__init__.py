@@ -18,7 +18,7 @@ from depthtrack.evaluation.metrics.reliability import Reliability
 from depthtrack.evaluation.metrics.residuals import Residuals, e2d, e3d, silhouette_iou
 from depthtrack.evaluation.metrics.success import SuccessCurve
 from depthtrack.evaluation.metrics.timing import frame_time, stage_times
-from depthtrack.evaluation.metrics.visibility import visible_and_hidden
+from depthtrack.evaluation.metrics.visibility import visible_and_hidden, within_spread
 
 __all__ = [
     "Loss",
@@ -41,5 +41,6 @@ __all__ = [
     "silhouette_iou",
     "stage_times",
     "visible_and_hidden",
+    "within_spread",
     "without_offsets",
 ]

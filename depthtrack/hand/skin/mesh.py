@@ -59,7 +59,7 @@ class Skin:
             InputError: if the sizes give no solid without holes, such as fingers grown together; or if the rig's file
                 is missing or changed, or is of other sizes.
         """
-        return _skin_of(shape)
+        return _skin_of(shape.with_(source=""))
 
     def vertices(self, transforms: ArrayLike) -> Array:
         """Return posed vertices by linear blend skinning (Schroeder et al. 2014, Eq. 2).

@@ -131,12 +131,18 @@ class Renderer:
         gl.glReadPixels(0, 0, width, height, gl.GL_RED, gl.GL_FLOAT, pixels)
 
     def sum(
-        self, gl: Any, which: int, grid: TileGrid, count: int, observation: int, match_depth: float, clamp_depth: float
+        self,
+        gl: Any,
+        which: int,
+        grid: TileGrid,
+        count: int,
+        observation: int,
+        limits: tuple[float, float, float],
     ) -> Array:
         """Return the sums (count, 3) of Eq. (2) over the tiles of an atlas; see `sums.sum_tiles`.
 
         observation: a texture written by `upload`.
-        match_depth, clamp_depth: d_m and d_M, metres.
+        limits: d_m, d_M, metres; `Objective.before_cost`.
 
         The first level of the pyramid compares and the next ones add, until one texel a tile is left (Sec. 2.5).
         """
@@ -150,7 +156,10 @@ class Renderer:
         gl.glBindTexture(gl.GL_TEXTURE_2D, observation)
         gl.glActiveTexture(gl.GL_TEXTURE0)
         tiles, (level, spare) = (min(count, grid.columns), grid.rows(count)), self._pyramid
-        self._compare.use(inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth)
+        match_depth, clamp_depth, before_cost = limits
+        self._compare.use(
+            inverse_depth=0, observation=1, match_depth=match_depth, clamp_depth=clamp_depth, before_cost=before_cost
+        )
         size = self._add_blocks(gl, self._compare, self._atlases[which], level, tiles, (grid.width, grid.height))
         while size != (1, 1):
             self._reduce.use(level=0)
@@ -184,10 +193,14 @@ class Renderer:
         return _texture(gl)
 
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
-        """Write an observation (h, w, 2) to a texture: depth (metres) and silhouette (0 or 1)."""
+        """Write an observation (h, w, 3) to a texture.
+
+        It holds depth (metres), silhouette (0 or 1), and the inverse depth (1/m) that a surface before or inside
+        an occluder exceeds.
+        """
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
-        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RG32F, width, height, 0, gl.GL_RG, gl.GL_FLOAT, observation)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RGB32F, width, height, 0, gl.GL_RGB, gl.GL_FLOAT, observation)
 
     def _describe_instances(self, gl: Any) -> None:
         gl.glBindVertexArray(self._vertices)

@@ -72,13 +72,15 @@ class OpenGLScorer(ScorerBase):
         # A camera file may hold integers; floats need only one compiled kernel.
         self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._silhouette = target.silhouette.astype(np.float32)
+        self._hidden_from = target.hidden_from(self._objective.hidden_depth)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty = float(clamped), 0.0, float(np.count_nonzero(target.silhouette))
         if self.sums == "gpu":
             with self._open.context as gl:
                 if not self._textures:
                     self._textures.append(self._open.new_texture(gl))
-                self._open.upload(gl, self._textures[0], np.stack([target.depth, self._silhouette], axis=-1))
+                maps = np.stack([target.depth, self._silhouette, self._hidden_from], axis=-1)
+                self._open.upload(gl, self._textures[0], maps)
         self._target = target
 
     def score(self, poses: ArrayLike) -> Array:
@@ -140,12 +142,13 @@ class OpenGLScorer(ScorerBase):
 
     def _sum(self, gl: Any, which: int, grid: TileGrid, regions: Index, sums: Array) -> None:
         o, target = self._objective, self.target
-        limits = o.match_depth, o.clamp_depth
+        limits = o.match_depth, o.clamp_depth, float(o.before_cost)
         if self.sums == "gpu":
-            sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], *limits)
+            sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], limits)
         else:
             pixels = self._read(gl, which, grid, len(sums))
-            sum_tiles(pixels, grid.columns, regions, target.depth, self._silhouette, self._empty, *limits, sums)
+            maps = target.depth, self._silhouette, self._hidden_from
+            sum_tiles(pixels, grid.columns, regions, *maps, self._empty, *limits, sums)
 
 
 def _discard(context: Context, textures: list[int]) -> None:

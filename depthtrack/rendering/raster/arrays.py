@@ -41,12 +41,12 @@ class KernelArrays:
     """Arguments of `kernel.score_poses`; workers refer to them, and not to the scorer.
 
     hand: see `hand_constants`.
-    objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
+    objective: (7,) see `kernel.score_poses`.
     """
 
     def __init__(self, hand: Array, objective: Array, tickets: Tickets) -> None:
         self.hand, self.objective, self.tickets = hand, objective, tickets
-        self.camera, self.empty = np.empty(8), np.empty(3)
+        self.camera, self.empty, self.has_occluder = np.empty(8), np.empty(3), np.zeros(1, np.bool_)
         self.workspaces: list[Workspace] = []
         self.allocate_poses(256)
 
@@ -57,7 +57,7 @@ class KernelArrays:
     def allocate_images(self, shape: tuple[int, int], threads: int) -> None:
         """Allocate the images (h, w) of the target, tiled, and the workspace of each thread."""
         self.workspaces = [Workspace.of(shape) for _ in range(threads)]
-        self.observed, self.silhouette = tiles.new_tiled_image(shape), tiles.new_tiled_image(shape)
+        self.observed, self.silhouette, self.hidden_from = (tiles.new_tiled_image(shape) for _ in range(3))
 
     def score_tickets(self, thread: int, spin_limit: int) -> None:
         """Score poses of the batch in this thread until `queue.pop` returns -1."""
@@ -70,6 +70,8 @@ class KernelArrays:
             self.camera,
             self.observed,
             self.silhouette,
+            self.has_occluder,
+            self.hidden_from,
             self.empty,
             self.objective,
             *self.workspaces[thread].arrays,

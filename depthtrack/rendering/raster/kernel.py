@@ -32,7 +32,7 @@ from depthtrack.simd.vectors import (
     store,
     vmin,
 )
-from depthtrack.types import Array, Array32, Index
+from depthtrack.types import Array, Array32, Index, Mask
 
 _load = loader(F32X16)
 _fill = filler(F32X16)
@@ -108,11 +108,15 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth):
+def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
-    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels.
+    Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. A pixel
+    before or inside an occluder counts `Objective.before_cost` times more, as outside the silhouette.
+
+    limits: d_m, d_M, metres; `Objective.before_cost`.
     """
+    match_depth, clamp_depth, before_cost = limits
     clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
     nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
     for tile_column in range(low.shape[0]):
@@ -135,6 +139,11 @@ def _compare(observed, silhouette, buffer, tile_rows, low, high, match_depth, cl
             hit = select(both(drawn, difference < allowed), one, 0.0)
             matched = matched + hit
             on_silhouette = on_silhouette + hit * _load(silhouette, index)
+            if has_occluder:
+                behind = _load(hidden_from, index)
+                before = select(both(behind > 0.0, w > behind), _fill(before_cost), 0.0)
+                in_column = in_column + before * clamp_depth
+                matched = matched + before * (one - _load(silhouette, index))
             store(buffer, index, nothing)
         clamped = clamped + in_column
     return vsum(clamped), vsum(on_silhouette), vsum(matched)
@@ -150,6 +159,8 @@ def score_poses(
     camera: Array,
     observed: Array32,
     silhouette: Array32,
+    has_occluder: Mask,
+    hidden_from: Array32,
     empty: Array,
     objective: Array,
     scratch: Array,
@@ -169,23 +180,31 @@ def score_poses(
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     silhouette: 0 or 1, tiled.
+    has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
+    hidden_from: inverse depth, 1/m, that a surface before or inside an occluder exceeds, tiled; 0 without one.
     empty: (3,) sums of Eq. (2) for an empty image.
-    objective: (6,) d_m, d_M, depth unit, epsilon, lambda, lambda_k.
+    objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.before_cost`.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
 
     Other threads call this with the same batch, each with its own workspace. It holds `scratch` and `table` (see
     `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
     `low` and `high` have one element a tile column: the number of tile rows, and -1.
     """
-    match_depth, clamp_depth = np.float32(objective[0]), np.float32(objective[1])
+    limits = np.float32(objective[0]), np.float32(objective[1]), np.float32(objective[6])
     while True:
         n = pop(tickets, thread, spin_limit)
         if n < 0:
             break
         tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
-        clamped, on_silhouette, matched = _compare(
-            observed, silhouette, buffer, tile_rows, low, high, match_depth, clamp_depth
-        )
+        # Constant arguments compile to two loops: the one without an occluder does not read `hidden_from`.
+        if has_occluder[0]:
+            clamped, on_silhouette, matched = _compare(
+                True, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
+            )
+        else:
+            clamped, on_silhouette, matched = _compare(
+                False, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
+            )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
         sums[n, 2] = empty[2] + matched - on_silhouette

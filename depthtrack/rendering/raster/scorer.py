@@ -42,7 +42,15 @@ class RasterScorer(ScorerBase):
         self._objective = o = objective or Objective()
         self._threads, tickets = threads, new_tickets(threads)
         objective_constants = np.array(
-            [o.match_depth, o.clamp_depth, o.depth_unit, o.epsilon, o.silhouette_weight, o.kinematic_weight]
+            [
+                o.match_depth,
+                o.clamp_depth,
+                o.depth_unit,
+                o.epsilon,
+                o.silhouette_weight,
+                o.kinematic_weight,
+                o.before_cost,
+            ]
         )
         self._arrays = KernelArrays(hand_constants(shape), objective_constants, tickets)
         self._workers = Workers(tickets, threads, self._arrays.score_tickets)
@@ -57,6 +65,9 @@ class RasterScorer(ScorerBase):
             arrays.allocate_images(shape, self._threads)
         tiles.write_tiled(target.depth, np.nan, arrays.observed)
         tiles.write_tiled(target.silhouette, 0, arrays.silhouette)
+        arrays.has_occluder[0] = target.occluder is not None
+        if target.occluder is not None:
+            tiles.write_tiled(target.hidden_from(self._objective.hidden_depth), 0, arrays.hidden_from)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         arrays.empty[:] = clamped, 0.0, np.count_nonzero(target.silhouette)
         c = target.camera

@@ -1,6 +1,7 @@
 """Options of the segmentation, one frozen dataclass per step; importing them needs no numpy."""
 
 from depthtrack.segmentation.options.arm import BreadthOptions, ForearmOptions, WristFilterOptions, WristOptions
+from depthtrack.segmentation.options.occluder import OccluderOptions
 from depthtrack.segmentation.options.palm import DetectionOptions, PalmOptions
 from depthtrack.segmentation.options.pixels import (
     FlyingPixelOptions,
@@ -18,6 +19,7 @@ __all__ = [
     "FlyingPixelOptions",
     "ForearmOptions",
     "GridOptions",
+    "OccluderOptions",
     "OutlineOptions",
     "PalmOptions",
     "PointCloudOptions",

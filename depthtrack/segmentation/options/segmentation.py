@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from depthtrack.errors import InputError
 from depthtrack.options import option
 from depthtrack.segmentation.options.arm import ForearmOptions, WristFilterOptions, WristOptions
+from depthtrack.segmentation.options.occluder import OccluderOptions
 from depthtrack.segmentation.options.palm import DetectionOptions, PalmOptions
 from depthtrack.segmentation.options.pixels import (
     FlyingPixelOptions,
@@ -34,6 +35,7 @@ class SegmentationOptions:
     wrist: WristOptions = option(WristOptions(), "Wrist", advanced=True)
     wrist_filter: WristFilterOptions = option(WristFilterOptions(), "Wrist over time", advanced=True)
     outline: OutlineOptions = option(OutlineOptions(), "Outline of the silhouette", advanced=True)
+    occluder: OccluderOptions = option(OccluderOptions(), "Objects that may hide the hand", advanced=True)
     skin_colour: SkinColourOptions = option(SkinColourOptions(), "Skin colour", advanced=True)
     flying_pixels: FlyingPixelOptions = option(FlyingPixelOptions(), "Flying pixels", advanced=True)
     point_cloud: PointCloudOptions = option(PointCloudOptions(), "Point cloud", advanced=True)

@@ -47,6 +47,9 @@ class SearchWindowOptions:
     position_lifetime: float = option(
         0.5, "Age up to which the last position is used: a hand crosses the window in less", unit="s", advanced=True
     )
+    lost_lifetime: float = option(
+        0.5, "Time that the tracker is lost after which the hand is located anew; 0 never", unit="s", advanced=True
+    )
 
     def __post_init__(self) -> None:
         check_numbers(self, ("nearest", "depth_window"))

@@ -131,6 +131,8 @@ class _Segmenter:
     def segment(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
         return None if frame.index % 8 == 5 else observe(self.made, frame.index)
 
+    def set_lost(self, lost: bool, timestamp: float) -> None: ...
+
 
 def run(made: Synthesiser, folder: Path, count: int, resume: bool = False) -> None:
     tracker = create_tracker(tracker_config("pso", resolution=48, generations=8), HandShape())

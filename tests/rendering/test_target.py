@@ -1,0 +1,78 @@
+"""A hand may lie behind an occluder, and pays for lying before it or inside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from depthtrack.errors import InputError
+from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
+from depthtrack.hand.shape import HandShape
+from depthtrack.rendering.objective import evaluate
+from depthtrack.rendering.options import Objective
+from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.target import Target
+from tests.support.rendering import random_poses, target_of, window_on
+
+LINE = Camera(6, 1, 10.0, 10.0, 0.0, 0.0)
+
+
+def test_pixels_before_an_object_or_inside_it_are_told_from_those_behind() -> None:
+    # behind it | within the tolerance | before it | no object there | nothing drawn
+    occluder = np.array([[0.400, 0.498, 0.520, 0.000, 0.400]], np.float32)
+    rendered = np.array([[0.500, 0.500, 0.500, 0.500, 0.000]])
+    camera = Camera(5, 1, 10.0, 10.0, 0.0, 0.0)
+    target = Target(camera, np.zeros((1, 5), bool), np.zeros((1, 5), np.float32), occluder=occluder)
+    np.testing.assert_array_equal(target.unhidden(rendered, 0.005) > 0, [[False, True, True, True, False]])
+    before = target.before_occluder(rendered, 0.005)
+    np.testing.assert_array_equal(before, [[False, True, True, False, False]])
+    from_depth = target.hidden_from(0.005)
+    np.testing.assert_array_equal((from_depth > 0) & (rendered > 0) & (from_depth < 1 / 0.5), before)
+
+
+@pytest.mark.parametrize("cost", [0.0, 0.25, 1.0, 4.0])
+def test_pixels_before_an_object_cost_more_than_those_outside_the_silhouette(cost: float) -> None:
+    # before it | before it, in the silhouette without a reading | behind it or beside it | seen hand | nothing
+    silhouette = np.array([[False, True, False, True, False]])
+    observed = np.array([[0.0, 0.0, 0.0, 0.5, 0.0]])
+    rendered = np.array([[0.5, 0.5, 0.5, 0.5, 0.0]])
+    before = np.array([[True, True, False, False, False]])
+    clamped, matched_silhouette, union = evaluate(Objective(before_cost=cost), silhouette, observed, rendered, before)
+    assert clamped == pytest.approx(3 * 0.04 + 2 * cost * 0.04)
+    assert (matched_silhouette, union) == (2, 4 + cost)
+
+
+def test_a_pose_behind_an_object_scores_as_without_it_and_one_before_it_costs_more() -> None:
+    rng = np.random.default_rng(5)
+    shape, poses = HandShape(), random_poses(rng, 6, (0, 0, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 96), rng)
+    energies = []
+    for depth in (None, 0.3, 0.8):
+        occluder = None if depth is None else np.full(target.camera.shape, depth, np.float32)
+        with RasterScorer(shape) as scorer:
+            scorer.set_target(replace(target, occluder=occluder))
+            energies.append(scorer.score(poses))
+    np.testing.assert_array_equal(energies[0], energies[1])
+    assert (energies[2] > energies[0] + 1).all()
+
+
+@pytest.mark.parametrize("cost", [-0.1, 101, np.nan])
+def test_costs_beyond_their_range_are_rejected(cost: float) -> None:
+    with pytest.raises(InputError, match="objective before_cost must lie between 0 and 100"):
+        Objective(before_cost=cost)
+
+
+def test_an_occluder_is_cropped_and_reduced_with_the_target() -> None:
+    camera = Camera(40, 30, 50.0, 50.0, 20.0, 15.0)
+    occluder = (np.arange(1200).reshape(30, 40) / 1200).astype(np.float32)
+    target = Target(camera, np.zeros(camera.shape, bool), occluder, occluder=occluder)
+    for changed in (target.crop(Rect.of_size(10, 5, 20, 10)), target.reduced(13)):
+        assert changed.occluder is not None
+        np.testing.assert_array_equal(changed.occluder, changed.depth)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 6)), np.full((1, 6), -1.0), np.full((1, 6), np.nan)])
+def test_occluders_without_valid_depth_are_rejected(wrong: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="the occluder map must"):
+        Target(LINE, np.zeros((1, 6), bool), np.zeros((1, 6), np.float32), occluder=wrong)
