@@ -129,10 +129,9 @@ class HandModel:
         lever = points - p[..., None, POSITION]
         J[..., :, 3:6] = np.swapaxes(_cross_matrix(lever), -1, -2)
         axes, origins = self._axes(T)
-        for angle in range(20):
-            moved = MOVES[bodies, angle]
-            arm = points[..., moved, :] - origins[..., None, angle, :]
-            J[..., 6 + angle][..., moved, :] = np.cross(axes[..., None, angle, :], arm)
+        arms = points[..., :, None, :] - origins[..., None, :, :]
+        turned = np.where(MOVES[bodies][..., None], np.cross(axes[..., None, :, :], arms), 0.0)
+        J[..., 6:] = np.swapaxes(turned, -1, -2)
         return J
 
     def _axes(self, T: Array) -> tuple[Array, Array]:
