@@ -27,6 +27,12 @@ TINY: dict[str, Any] = {
 }
 
 
+def true_sizes(sequence: Any, *_: Any) -> Calibration:
+    """Return the hand of the recording as its calibration."""
+    nothing = np.zeros((0, 27))
+    return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
+
+
 def test_cells_are_drawn_once_for_each_motion_and_seed() -> None:
     cells = recording_cells(ExperimentOptions(repetitions=3))
     assert len(cells) == 3 * len(MOTIONS)
@@ -55,13 +61,7 @@ def test_the_recording_of_a_cell_has_exact_truth() -> None:
 
 @pytest.mark.slow
 def test_a_known_hand_is_measured_without_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The calibration is replaced by the true sizes."""
-
-    def calibrated(sequence: Any, *_: Any) -> Calibration:
-        nothing = np.zeros((0, 27))
-        return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
-
-    monkeypatch.setattr(measuring, "calibrate_either_side", calibrated)
+    monkeypatch.setattr(measuring, "calibrate_either_side", true_sizes)
     monkeypatch.setattr(measuring, "CORRECTED_WITHIN", 8)
     row = measure(**TINY)
     assert (row["side_right"], row["side_sure"], row["starts"], row["starts_right"]) == (True, True, 2, 2)
@@ -79,11 +79,7 @@ def test_a_known_hand_is_measured_without_error(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.slow
 def test_the_evidence_of_a_mirrored_hand_is_worse(monkeypatch: pytest.MonkeyPatch) -> None:
-    def calibrated(sequence: Any, *_: Any) -> Calibration:
-        nothing = np.zeros((0, 27))
-        return Calibration(sequence.hand, {}, 0.5, 1.0, 1.0, (), nothing, nothing)
-
-    monkeypatch.setattr(evidence, "calibrate", calibrated)
+    monkeypatch.setattr(evidence, "calibrate", true_sizes)
     frames = evidence.measure_evidence(TINY | {"frames": 4})["tracked"]
     assert {frame[0] for frame in frames} == {"calibrated", "mirrored", "average"}
     assert {frame[1] for frame in frames} == set(measuring.TRACKERS)
