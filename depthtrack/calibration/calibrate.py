@@ -112,7 +112,7 @@ def calibrate(
             views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show).views
         _check_views(views, sequence, options)
         report("fingers and palm", (number + 0.6) / rounds)
-        chosen = best_views(views, options.good_views)
+        chosen = best_views(views, options.accepted.good_views)
         observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
         fitted = fit_jointly(observed, poses, values, side, options.iterations, options=options.joint)
         found = nearest_solid(fitted.values, side)
@@ -161,7 +161,7 @@ def _check_views(views: Views[TrackedView], sequence: Sequence, options: Calibra
             f"{sequence.name}: calibrating needs at least {options.fewest} frames that show a bare hand, "
             "best with open fingers towards the camera"
         )
-    check_resembles_hand([each.agreement for each in views], options.hand_like)
+    check_resembles_hand([each.agreement for each in views], options.accepted.hand_like)
 
 
 def _refined(

@@ -81,8 +81,8 @@ def measure(views: Sequence[TrackedView], sizes: OngoingSizes, options: OngoingO
     """
     if len(views) < options.fewest:
         raise InputError(f"measuring needs at least {options.fewest} views of a hand, found {len(views)}")
-    check_resembles_hand([each.agreement for each in views], options.hand_like)
-    side, chosen = sizes.hand.side, best_views(views, options.good_views)
+    check_resembles_hand([each.agreement for each in views], options.accepted.hand_like)
+    side, chosen = sizes.hand.side, best_views(views, options.accepted.good_views)
     observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
     fitted = fit_jointly(observed, poses, sizes.values, side, options.iterations, options=options.joint)
     values = nearest_solid(with_usual_proportions(fitted.values), side)

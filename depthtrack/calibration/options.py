@@ -38,6 +38,18 @@ class JointFitOptions:
 
 
 @dataclass(frozen=True)
+class AcceptanceOptions:
+    """Views that take part in a measurement, and the hand that they must show."""
+
+    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
+    hand_like: float = option(
+        0.55,
+        "Agreement of silhouettes below which no hand was found",
+        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
+    )
+
+
+@dataclass(frozen=True)
 class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
@@ -47,12 +59,7 @@ class CalibrationOptions:
     exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
-    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
-    hand_like: float = option(
-        0.55,
-        "Agreement of silhouettes below which no hand was found",
-        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
-    )
+    accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
     sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
@@ -70,7 +77,6 @@ class OngoingOptions:
     )
     longest_step: float = option(0.1, "Time that one frame adds to the visible time, at most", unit="s")
     views: int = option(16, "Views kept of each side, at most", unit="frames")
-    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
     fewest: int = option(3, "Views below which no size is measured", unit="frames")
     iterations: int = option(8, "Iterations of the joint optimisation in each measurement")
     least_change: float = option(0.01, "Change of the logarithm of scale or of a length below which the hand stays")
@@ -78,11 +84,7 @@ class OngoingOptions:
     sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
     sure_after: float = option(4.0, "Visible time before which both sides are tracked", unit="s")
     kept_evidence: float = option(0.5, "Share of the energies so far that still count after a measurement")
-    hand_like: float = option(
-        0.55,
-        "Agreement of silhouettes below which no hand was found",
-        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
-    )
+    accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
 
@@ -93,10 +95,5 @@ class RigCalibrationOptions:
     first: int = option(4, "Views with the most open hands, on which scales are tried")
     tried_scales: tuple[float, ...] = option((0.76, 0.9, 1.06, 1.24), "Multiples of the rig's scale that are tried")
     resolution: int = option(96, "Longest side of the image in which poses are searched", unit="px")
-    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
-    hand_like: float = option(
-        0.55,
-        "Agreement of silhouettes below which no hand was found",
-        source="1 minus the silhouette term of Oikonomidis et al. 2011, Eq. (2)",
-    )
+    accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
     side_margin: float = option(0.02, "Share by which the other side may fit better than that of the rig")

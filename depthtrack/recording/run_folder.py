@@ -1,8 +1,8 @@
 """The run folder: a tracker's result of every frame, readable after a kill at any time.
 
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
-agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. It is empty without a
-pose. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose that are followed.
+agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. The cells of a pose are
+empty if there is none. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
