@@ -9,12 +9,12 @@ FLESH = 0.02
 """Metres: largest depth of a joint or bone below the skin that shows it, with a margin."""
 
 
-def points_in_view(points: Array, depth: Depth, camera: Camera, behind: float = FLESH) -> Mask:
+def points_in_view(points: Array, depth: Depth, camera: Camera, behind: float | Array = FLESH) -> Mask:
     """Return which points (..., 3) of a hand are in the image with nothing before them.
 
     points: metres, camera frame; a NaN counts as hidden.
     depth: (h, w) of the scene, of the posed hand or of an object, metres; 0 for none.
-    behind: largest depth behind it of a visible point, metres.
+    behind: largest depth behind it of a visible point, metres; one for all, or one of each (...).
     """
     pixels = camera.project(points)
     inside = np.asarray(np.isfinite(pixels).all(axis=-1), dtype=np.bool_)

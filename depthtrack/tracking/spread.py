@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
@@ -22,7 +21,7 @@ from depthtrack.solver.prior import Prior, prior_energy
 from depthtrack.types import Array, Depth, Mask
 
 MEASURED = 0.004
-"""Metres: standard deviation of a measured point."""
+"""Metres: standard deviation of a measured point. Source: see `tools/fit_confidence.py`."""
 AGREES = 0.01
 """Metres: largest difference of rendered and observed depth at a measured point."""
 OWN_FLESH = 0.003
@@ -77,7 +76,7 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
         # Bones lie inside the fingers: none is behind an object that does not hide its finger.
         visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
     differences = depth_differences(points, rendered, target)
-    own = visible & (depth_below(points, rendered, target.camera) < bone_radii(model.shape) + OWN_FLESH)
+    own = visible & points_in_view(points, rendered, target.camera, bone_radii(model.shape) + OWN_FLESH)
     spread = keypoint_spread(model, pose, points, own & (differences < AGREES))
     return BonesInView(visible, differences, spread, float(np.sqrt(2 * prior_energy(pose, common_postures()))))
 
@@ -86,16 +85,6 @@ def bone_radii(shape: HandShape) -> Array:
     """Return the radii (5, 3, 2) of bones at their far end and middle, metres."""
     radii = shape.scale * shape.radii
     return np.stack([radii[:, 1:], (radii[:, 1:] + radii[:, :-1]) / 2], axis=2)
-
-
-def depth_below(points: Array, rendered: Depth, camera: Camera) -> Array:
-    """Return the depth (...) of points (..., 3) below the rendered surface, metres.
-
-    It is 0 where there is no surface.
-    """
-    u, v = np.moveaxis(np.rint(np.nan_to_num(camera.project(points))).astype(np.int64), -1, 0)
-    front = rendered[np.clip(v, 0, camera.height - 1), np.clip(u, 0, camera.width - 1)]
-    return np.where(front > 0, points[..., 2] - front, 0.0)
 
 
 def depth_differences(points: Array, rendered: Depth, target: Target) -> Array:
