@@ -17,7 +17,7 @@ from depthtrack.calibration.ongoing import KeptViews, OngoingSizes, measure
 from depthtrack.calibration.options import OngoingOptions
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
-from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.shape import HandShape, Side, other_side
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.options import SurfaceName
@@ -169,11 +169,11 @@ class OngoingPipeline(Closing):
             return
         self._energies = {side: self._energies[side] + each.energy for side, each in estimates.items()}
         if self._excess(self.side) >= self._options.lead_margin:
-            self.side = _other(self.side)
+            self.side = other_side(self.side)
 
     def _excess(self, side: Side) -> float:
         """Return the share by which the energy of a side is higher than that of the other one."""
-        return self._energies[side] / max(self._energies[_other(side)], _LEAST_ENERGY) - 1
+        return self._energies[side] / max(self._energies[other_side(side)], _LEAST_ENERGY) - 1
 
     def _use_measurement(self) -> None:
         """Wait for the sizes that are being measured, and go on with them."""
@@ -192,7 +192,7 @@ class OngoingPipeline(Closing):
 
     def _give_up_side(self) -> None:
         """Give up the side of the higher energy if that is clearly higher."""
-        other = _other(self.side)
+        other = other_side(self.side)
         late = self._visible >= self._options.sure_after
         if not self.side_sure and late and self._excess(other) >= self._options.sure_margin:
             self._hands.pop(other).close()
@@ -202,7 +202,3 @@ class OngoingPipeline(Closing):
         self._pool.shutdown(cancel_futures=True)
         for hand in self._hands.values():
             hand.close()
-
-
-def _other(side: Side) -> Side:
-    return "left" if side == "right" else "right"

@@ -12,11 +12,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from depthtrack.calibration.options import RigCalibrationOptions
-from depthtrack.calibration.pose_search import Found, PoseSearcher, Progress, ScorerFactory
+from depthtrack.calibration.pose_search import PoseSearcher, Progress, ScorerFactory
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.shape import HandShape, other_side
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
@@ -88,21 +88,11 @@ def calibrate_rig(
     show = progress or (lambda stage, share: None)
     options = options or RigCalibrationOptions()
     searcher = PoseSearcher(list(observations), scorer, seed, options)
-    tries: dict[tuple[Side, float], Found] = {}
-    sides: tuple[Side, ...] = ("right", "left")
-    for n, factor in enumerate(options.tried_scales):
-        show("trying scales", 0.4 * n / len(options.tried_scales))
-        for side in sides:
-            tries[side, factor] = searcher.find(rig.with_(scale=rig.scale * factor, side=side), options.first)
-    disagreements: dict[Side, float] = {}
-    best_factors: dict[Side, float] = {}
-    for side in sides:
-        best_factors[side] = min(options.tried_scales, key=lambda f: float(tries[side, f].energies.mean()))
-        poses = tries[side, best_factors[side]].poses
-        first = _ScaleFit(rig.with_(side=side), searcher.observations[: options.first], poses)
-        disagreements[side] = first.at(rig.scale * best_factors[side])[1]
-    factor, other = best_factors[rig.side], sides[rig.side == "right"]
-    margin = disagreements[other] / disagreements[rig.side] - 1
+    show("trying scales", 0.0)
+    factor, own = _try_scales(searcher, rig, options)
+    show("trying scales", 0.2)
+    _, other = _try_scales(searcher, rig.with_(side=other_side(rig.side)), options)
+    margin = other / own - 1
     if margin < -options.side_margin:
         raise InputError(
             f"the recording must show a {rig.side} hand like the rig, but the other side fits {-margin:.0%} better: "
@@ -124,6 +114,17 @@ def calibrate_rig(
     show("done", 1.0)
     hand = rig.with_(scale=scale, source=f"{rig.source}, {source}")
     return RigCalibration(hand, margin, before, after, tuple(fit.observations), poses_before, poses)
+
+
+def _try_scales(searcher: PoseSearcher, rig: HandShape, options: RigCalibrationOptions) -> tuple[float, float]:
+    """Return the tried factor of the lowest energy, and the disagreement there.
+
+    The poses found are fitted to the point clouds before.
+    """
+    tries = {f: searcher.find(rig.with_(scale=rig.scale * f), options.first) for f in options.tried_scales}
+    factor = min(tries, key=lambda f: float(tries[f].energies.mean()))
+    fit = _ScaleFit(rig, searcher.observations[: options.first], tries[factor].poses)
+    return factor, fit.at(rig.scale * factor)[1]
 
 
 class _ScaleFit:

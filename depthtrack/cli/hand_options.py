@@ -96,9 +96,11 @@ class HandOptions:
 
 def side_text(choice: "SideChoice") -> str:
     """Return a line on the side of an average hand."""
+    from depthtrack.hand.shape import other_side
+
     if choice.frames == 0:
         return "a right hand is assumed: no hand was found in the frames that were tried"
-    other = "left" if choice.side == "right" else "right"
+    other = other_side(choice.side)
     uncertain = "" if choice.sure else "; the side is uncertain: give --side"
     margin = f"a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames"
     return f"a {choice.side} hand: {margin}{uncertain}"
@@ -106,7 +108,9 @@ def side_text(choice: "SideChoice") -> str:
 
 def measured_text(found: "Calibration") -> str:
     """Return one or two lines on a measured hand."""
-    hand, other = found.hand, "left" if found.hand.side == "right" else "right"
+    from depthtrack.hand.shape import other_side
+
+    hand, other = found.hand, other_side(found.hand.side)
     margin = "" if found.side_margin is None else f", a {other} one fits {100 * found.side_margin:.0f} % worse"
     length = found.measured["hand_length"]
     sizes = (

@@ -201,3 +201,8 @@ def _table(rows_mm: Mapping[str, tuple[float, ...]]) -> Array:
 def _mm(metres: Any) -> Any:
     """Return millimetres rounded to a nanometre, which a second round trip keeps."""
     return np.round(np.asarray(metres) * 1000, 6).tolist()
+
+
+def other_side(side: Side) -> Side:
+    """Return the side of the other hand."""
+    return "left" if side == "right" else "right"

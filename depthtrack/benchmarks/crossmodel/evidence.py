@@ -14,7 +14,7 @@ from depthtrack.calibration.calibrate import calibrate
 from depthtrack.evaluation.metrics import without_offsets
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.shape import HandShape, Side, other_side
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.pipeline import Pipeline, track_frames
@@ -34,9 +34,12 @@ def measure_evidence(cell: Cell) -> Row:
     """
     with made_recording(**cell) as sequence:
         side: Side = cell["side"]
-        other: Side = "left" if side == "right" else "right"
         calibrated = calibrate(sequence, side).hand
-        hands = {"calibrated": calibrated, "mirrored": calibrated.with_(side=other), "average": HandShape(side=side)}
+        hands = {
+            "calibrated": calibrated,
+            "mirrored": calibrated.with_(side=other_side(side)),
+            "average": HandShape(side=side),
+        }
         joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
         visible = np.array([visible_joints(sequence, index, joints[index]) for index in range(len(sequence))])
         frames: list[Any] = []
