@@ -54,7 +54,8 @@ def segment_roi(
     depth = np.ascontiguousarray(frame.depth[region.slices])
     lens = (camera.fx, camera.fy, camera.cx - region.left, camera.cy - region.top)
     kinds = np.empty(depth.shape, dtype=np.uint8)
-    mark_reachable(depth, lens, prior.centre, reach, prior.wrist.point, prior.wrist.normal, kinds)
+    wrist, normal = prior.wrist.point + options.wrist_margin * prior.wrist.normal, prior.wrist.normal
+    mark_reachable(depth, lens, prior.centre, reach, wrist, normal, kinds)
     limits = (options.grid.max_jump, options.roi.border_share)
     readings = without_continuing_surfaces(depth, kinds, kinds == READING, camera.fx, *limits)
     if not readings.any():

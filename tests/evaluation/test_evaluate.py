@@ -47,11 +47,13 @@ def test_true_poses_have_no_error_and_small_residuals(recording: Path, tmp_path:
 
 
 def test_poses_moved_by_5_mm_have_that_error_and_larger_residuals(recording: Path, tmp_path: Path) -> None:
-    right = evaluate_run(write_run(tmp_path / "right", recording, true_poses(recording)))
-    wrong = evaluate_run(write_run(tmp_path / "wrong", recording, moved(true_poses(recording), x=0.005)))
+    # The thumb's ball of the primitives reaches 4 mm beyond the wrist, where the segmentation ends by default.
+    whole: dict[str, Any] = {"format": 3, "options": {}, "segmentation": {"wrist_margin": 0.01}}
+    right = evaluate_run(write_run(tmp_path / "right", recording, true_poses(recording), **whole))
+    wrong = evaluate_run(write_run(tmp_path / "wrong", recording, moved(true_poses(recording), x=0.005), **whole))
     np.testing.assert_allclose(wrong.metrics[0].values, 5, atol=1e-3)
     assert [metric.statistics()["mean"] for metric in wrong.finger_errors.values()] == pytest.approx([5] * 5, abs=1e-3)
-    for name, least in (("e3d_mm", 0.3), ("e2d_px", 0.25)):
+    for name, least in (("e3d_mm", 0.3), ("e2d_px", 1.0)):
         before, after = right.metric(name), wrong.metric(name)
         assert before is not None
         assert after is not None

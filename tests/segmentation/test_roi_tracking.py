@@ -1,5 +1,7 @@
 """Segmentation near a prior: reach, wrist, skin, and the change to the search."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -56,6 +58,20 @@ def test_the_hand_is_segmented_near_its_prior(made: Synthesiser, index: int) -> 
     assert np.sum(mask & truth) / np.sum(mask | truth) > 0.85
     assert not np.any(found.readings & ~found.silhouette)
     assert found.silhouette.shape == found.region.shape
+
+
+def test_the_margin_keeps_forearm_beyond_the_wrist(made: Synthesiser) -> None:
+    skin, prior = AdaptiveSkin(SkinColourModel.default()), prior_of(made, 0)
+    farthest = []
+    for margin in (0.0, 0.03):
+        found = segment_roi(frame_of(made, 0), prior, skin, replace(OPTIONS, wrist_margin=margin))
+        assert found is not None
+        v, u = np.nonzero(found.readings)
+        depth = made[0].depth[found.region.slices][v, u]
+        points = made.sensor.camera.crop(found.region).unproject(np.column_stack([u, v]), depth)
+        farthest.append(((points - prior.wrist.point) @ prior.wrist.normal).max())
+    assert farthest[0] < 0.002
+    assert farthest[1] == pytest.approx(0.03, abs=0.003)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
