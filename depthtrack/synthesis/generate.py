@@ -36,13 +36,16 @@ SensorName = Literal["ideal", "kinect1", "kinect2", "realsense"]
 
 RANDOM_FRAMES = 360
 """Default number of frames of a random motion."""
+_FLESH = 0.01
+"""Depth of flesh before a keypoint, metres."""
 
 
 @dataclass(frozen=True)
 class Synthesis:
     """Options of a synthetic recording; equal options give equal bytes.
 
-    distance: metres from the camera to the nominal palm position; None for the sensor's default.
+    distance: metres from the camera to the nominal palm position; None for the sensor's default, or farther if the hand
+        came nearer than the sensor's range.
     forearm: whether a forearm is rendered; None means if there is a background.
     held_object: object in the palm, which moves with it and stops the fingers.
     held_size: its size, metres: the diameter of a sphere, the longest side of a box, 1.4 diameters of a cylinder.
@@ -119,9 +122,10 @@ class Synthesiser:
         self.options = options
         self.motion: Motion = load_motion(options.motion)
         self.sensor: Sensor = make_sensor(options.sensor)
-        self.viewpoint = Viewpoint(options.viewpoint, self.distance)
         self.timestamps: Array = np.arange(self._frame_count()) / options.rate
         self.held = self._held_object()
+        self.distance: float = self._default_distance() if options.distance is None else options.distance
+        self.viewpoint = Viewpoint(options.viewpoint, self.distance)
         self.poses: Array = self._poses()
         self.joints: Array = HandModel(options.hand).keypoints(self.poses)
         self._tone = SkinTone.sample(self._random(0, Stream.SKIN))
@@ -139,11 +143,6 @@ class Synthesiser:
 
     def __len__(self) -> int:
         return len(self.timestamps)
-
-    @property
-    def distance(self) -> float:
-        """Return the distance from the camera to the nominal palm position, metres."""
-        return self.sensor.default_distance if self.options.distance is None else self.options.distance
 
     @property
     def has_forearm(self) -> bool:
@@ -221,9 +220,22 @@ class Synthesiser:
         return count
 
     def _poses(self) -> Array:
+        return self.viewpoint.transform_poses(self._scene_poses)
+
+    @cached_property
+    def _scene_poses(self) -> Array:
+        """The poses (T, 27) in the scene frame."""
         poses, hand = self.motion.poses(self.timestamps, self.options.seed), self.options.hand
         sided = poses if hand.side == "right" else mirrored(poses)
-        return self.viewpoint.transform_poses(sided if self.held is None else self.held.opened(sided, hand))
+        return sided if self.held is None else self.held.opened(sided, hand)
+
+    def _default_distance(self) -> float:
+        """Return the default distance, metres, or a larger one with the hand in the sensor's range."""
+        default = self.sensor.default_distance
+        poses = Viewpoint(self.options.viewpoint, default).transform_poses(self._scene_poses)
+        nearest = float(HandModel(self.options.hand).keypoints(poses)[..., 2].min())
+        missing = self.sensor.nearest + _FLESH - nearest
+        return default if missing <= 0 else round(default + missing, 2) + 0.01
 
     def _held_object(self) -> HeldObject | None:
         options = self.options

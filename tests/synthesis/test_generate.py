@@ -139,6 +139,17 @@ def test_every_sensor_reads_the_hand_at_its_default_distance(sensor: Any) -> Non
         assert np.median(error) < 0.002
 
 
+@pytest.mark.parametrize("seed", [205, 206])
+def test_the_hand_stays_within_the_range_of_the_sensor(seed: int) -> None:
+    made = synthesiser(motion="random", sensor="kinect1", viewpoint=seed % 5, frames=180, seed=seed)
+    assert made.distance > made.sensor.default_distance
+    assert made.joints[..., 2].min() >= made.sensor.nearest
+
+
+def test_a_stated_distance_is_kept() -> None:
+    assert synthesiser(motion="random", sensor="kinect1", frames=180, seed=205, distance=0.5).distance == 0.5
+
+
 def test_frames_and_rate_set_the_sampling_of_the_motion() -> None:
     assert len(synthesiser()) == 360
     assert len(synthesiser(rate=60)) == 720

@@ -21,6 +21,11 @@ class Sensor(Protocol):
         ...
 
     @property
+    def nearest(self) -> float:
+        """Return the smallest depth that is read, metres."""
+        ...
+
+    @property
     def default_distance(self) -> float:
         """Return the default distance of the hand, metres."""
         ...

@@ -15,6 +15,7 @@ class Ideal:
     """See `Sensor`: Kinect v1's intrinsics with a depth scale of 0.1 mm, up to 6.5 m."""
 
     camera: Camera = field(default_factory=lambda: replace(PRESETS["kinect1"], depth_scale=0.0001))
+    nearest: float = 0.0
     default_distance: float = 0.5
     colour_noise: float = 0.0
 
