@@ -19,13 +19,16 @@ from depthtrack.tracking.options import (
     Spread,
     SurfaceChoiceOptions,
     SwarmProposalOptions,
+    SwarmRound,
     SwarmSearchOptions,
     SynergyOptions,
     TrackingThresholds,
     damped_swarm,
 )
 
-_GLOBAL_FITS = GlobalSearchOptions(proposals=3000, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1)
+_GLOBAL_FITS = GlobalSearchOptions(
+    proposals=3000, resolution=64, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1
+)
 """Global search of the trackers that fit surfaces."""
 _LOCAL_FITS = FitSearchOptions(
     (FitRound(48, None, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12))
@@ -40,19 +43,38 @@ _FIT_FINGERS = FingerOptions(resolution=96, stop_early=False)
 _HYBRID_SEARCH = replace(_GLOBAL_FITS, good_ratio=1.2)
 """Global search of the hybrid tracker. A track's median energy states what a good one is."""
 _DOUBT_FITS = FitSearchOptions(
-    (FitRound(32, 8, 3, coarse=True), FitRound(12, None, 4), FitRound(4, None, 8), FitRound(1, None, 12))
+    (FitRound(24, None, 3, coarse=True), FitRound(8, None, 4, coarse=True), FitRound(2, None, 8))
 )
-"""Surface fits of its global search in a doubtful frame."""
+"""Surface fits of a global search in a doubtful frame, and soon after a loss."""
 _HYBRID_RECOVERY = replace(_FIT_RECOVERY, elevated_ratio=1.1)
 """Its conditions of a local search."""
 _HYBRID_FINGERS = replace(_FIT_FINGERS, turns=2, usual_turns=6, shift_iterations=3)
 """Its search of single fingers."""
 _HYBRID_LOCAL_FITS = FitSearchOptions(
-    (FitRound(32, None, 3, coarse=True), FitRound(12, None, 4), FitRound(4, None, 8), FitRound(1, None, 12))
+    (FitRound(16, None, 3, coarse=True), FitRound(6, None, 4, coarse=True), FitRound(2, None, 8))
 )
 """Surface fits of its local search."""
 _ROUTINE_FITS = FitSearchOptions((FitRound(8, None, 3, coarse=True), FitRound(2, None, 4), FitRound(1, None, 6)))
 """Surface fits of its routine local search."""
+
+_DOUBT_SWARMS = SwarmSearchOptions(
+    (
+        SwarmRound(24, damped_swarm(32, 10)),
+        SwarmRound(4, damped_swarm(64, 16), (0.010, 0.15, 0.2)),
+        SwarmRound(1, damped_swarm(64, 30), (0.005, 0.08, 0.1)),
+    ),
+    refined=8,
+)
+"""Swarms of the PSO tracker's searches in a doubtful frame, and soon after a loss."""
+_ROUTINE_SWARMS = SwarmSearchOptions(
+    (
+        SwarmRound(12, damped_swarm(32, 8)),
+        SwarmRound(3, damped_swarm(64, 12), (0.010, 0.15, 0.2)),
+        SwarmRound(1, damped_swarm(64, 20), (0.005, 0.08, 0.1)),
+    ),
+    refined=6,
+)
+"""Swarms of its routine local search."""
 
 
 def _check_predictions(shares: tuple[float, ...]) -> None:
@@ -75,9 +97,13 @@ class PsoConfig:
     widen: float = option(0.5, "Share of the last motion that widens the first generation", advanced=True)
     refine: bool = option(False, "Fit the swarm's best pose to the surface")
     final_fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the swarm's best pose", advanced=True)
-    search: GlobalSearchOptions = option(GlobalSearchOptions(), "Global search", advanced=True)
+    search: GlobalSearchOptions = option(GlobalSearchOptions(resolution=64), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(), "Swarms of a search", advanced=True)
-    recovery: RecoveryOptions = option(RecoveryOptions(), "Local re-initialisation", advanced=True)
+    doubt_search: SwarmSearchOptions = option(_DOUBT_SWARMS, "Swarms of the search of a doubtful frame", advanced=True)
+    routine_search: SwarmSearchOptions = option(_ROUTINE_SWARMS, "Swarms of a routine local search", advanced=True)
+    recovery: RecoveryOptions = option(
+        RecoveryOptions(routine_proposals=2000), "Local re-initialisation", advanced=True
+    )
     fingers: FingerOptions = option(FingerOptions(), "Search of single fingers", advanced=True)
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
@@ -109,7 +135,7 @@ class IkConfig:
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     recovery: RecoveryOptions = option(
-        _FIT_RECOVERY,
+        replace(_FIT_RECOVERY, routine_proposals=1000),
         "Local re-initialisation",
         advanced=True,
     )
@@ -117,6 +143,12 @@ class IkConfig:
         _LOCAL_FITS,
         "Surface fits of a local search",
         advanced=True,
+    )
+    doubt_search: FitSearchOptions = option(
+        _DOUBT_FITS, "Surface fits of the global search of a doubtful frame", advanced=True
+    )
+    routine_search: FitSearchOptions = option(
+        _HYBRID_LOCAL_FITS, "Surface fits of a routine local search", advanced=True
     )
     fingers: FingerOptions = option(_FIT_FINGERS, "Search of single fingers", advanced=True)
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
@@ -214,7 +246,7 @@ class Schroeder2014Config:
     fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=PAPER_ICP), "Surface fit of each frame")
     synergies: SynergyOptions = option(SynergyOptions(), "Hand synergies")
     search: GlobalSearchOptions = option(
-        replace(_GLOBAL_FITS, follow_arm=False),
+        replace(_GLOBAL_FITS, resolution=None, follow_arm=False),
         "Global search; not part of the paper",
         advanced=True,
     )

@@ -125,9 +125,12 @@ class FrameContext:
         """Unit of energies in options: see `Objective.clamp`."""
         return self.tools.scoring.objective.clamp
 
-    def evaluate(self, poses: Array) -> list[Candidate]:
-        """Score poses (N, 27) at the scorer's resolution; return them by increasing energy."""
-        return evaluate(self.tools.scorer, poses)
+    def evaluate(self, poses: Array, resolution: int | None = None) -> list[Candidate]:
+        """Score poses (N, 27); return them by increasing energy.
+
+        resolution: longest side in pixels; None for that of the main scorer.
+        """
+        return evaluate(self.tools.scorer_at(resolution, self.observation), poses)
 
     def fitter(self, options: SurfaceFitOptions) -> IcpFitter:
         """Return a surface fitter for this frame.

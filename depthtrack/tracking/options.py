@@ -3,7 +3,8 @@
 Energies are multiples of `Objective.clamp`, the energy of a pixel that disagrees completely.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from depthtrack.errors import InputError
 from depthtrack.options import option
@@ -42,9 +43,20 @@ class TrackingThresholds:
     guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
     median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
     memory: float = option(0.5, "Time after a loss in which the hand is searched near its last pose", unit="s")
+    search_interval: float = option(
+        0.1, "Time after a search without success until the next one; it doubles each time", unit="s"
+    )
+    longest_interval: float = option(1.0, "Longest time between two searches of a lost hand", unit="s")
     longest_gap: float = option(
         0.3, "Time without a pose after which a start competes with the last pose, and no motion is predicted", unit="s"
     )
+
+    def __post_init__(self) -> None:
+        if not min(self.search_interval, self.longest_interval) > 0:
+            raise InputError(
+                "search_interval and longest_interval must be positive, "
+                f"found {self.search_interval} and {self.longest_interval}"
+            )
 
 
 @dataclass(frozen=True)
@@ -101,6 +113,9 @@ class GlobalSearchOptions:
     """Global search without a known pose, over the orientations that the forearm allows."""
 
     proposals: int = option(4000, "Poses scored first")
+    resolution: int | None = option(
+        None, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels"
+    )
     min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
     synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies")
     position_spread: Spread = option(
@@ -118,6 +133,14 @@ class GlobalSearchOptions:
     attempts: int = option(3, "Repetitions, at most")
     min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
 
+    def accepted_energy(self, clamp: float, median_energy: float) -> float:
+        """Return the energy that ends the search.
+
+        median_energy: that of the track; infinity without a track.
+        """
+        usual = self.good_ratio * median_energy if self.good_ratio > 0 and math.isfinite(median_energy) else 0.0
+        return max(self.good_energy * clamp, usual)
+
 
 @dataclass(frozen=True)
 class RecoveryOptions:
@@ -132,6 +155,9 @@ class RecoveryOptions:
     )
     proposals: int = option(4000, "Poses near the last one that a local search scores")
     routine_proposals: int = option(300, "Poses that it scores in a frame that is not doubtful, if it is smaller there")
+    resolution: int | None = option(
+        64, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels"
+    )
     elevated_ratio: float = option(
         0.0, "Multiple of the track's median energy above which an energy is elevated; 0: any is"
     )
@@ -145,6 +171,11 @@ class RecoveryOptions:
     accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
     doubt_agreement: float = option(0.6, "A lower agreement triggers a local search")
     doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
+
+    @property
+    def routine(self) -> "RecoveryOptions":
+        """The options with the number of proposals of a smaller search."""
+        return replace(self, proposals=self.routine_proposals)
 
 
 @dataclass(frozen=True)
@@ -172,7 +203,7 @@ class BranchOptions:
 
     interval: float = option(1.0, "Time between two searches for alternatives; 0: never", unit="s")
     search: GlobalSearchOptions = option(
-        GlobalSearchOptions(proposals=400, synergy_share=0.5), "Proposals of such a search"
+        GlobalSearchOptions(proposals=400, resolution=64, synergy_share=0.5), "Proposals of such a search"
     )
     turned: int = option(32, "Postures in which the tracked hand is turned over")
     fits: FitSearchOptions = option(

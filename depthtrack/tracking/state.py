@@ -32,6 +32,7 @@ class TrackState:
     energy: energy of the last pose.
     time: of the last pose, s; NaN if there was none.
     branches: alternatives to the last pose.
+    lost: estimate of the last frame, if it was not trusted.
     last_trusted: (27,) last trusted pose; None after `memory` seconds without one, in which a hand hardly turns over.
     """
 
@@ -45,6 +46,8 @@ class TrackState:
         self.branches: tuple[Branch, ...] = ()
         self.time, self._started = math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
+        self.lost: Estimate | None = None
+        self._lost_since, self._previous = math.nan, math.nan
 
     def is_lost(self, energy: float, agreement: float, confidence: float = math.nan, previous: float = 0.0) -> bool:
         """Return whether a pose with these figures is not trusted.
@@ -115,11 +118,19 @@ class TrackState:
     def forget_last(self) -> None:
         """Remove the last pose and the energies, so that a new track may start anywhere."""
         self.pose, self.last_trusted = None, None
+        self.lost, self._lost_since = None, math.nan
         self._energies.clear()
 
     def update(self, estimate: Estimate) -> None:
         """Update the state with the estimate of the next frame."""
         elapsed = estimate.timestamp - self.time
+        self._previous = estimate.timestamp
+        if estimate.status is not Status.LOST:
+            self._lost_since, self.lost = math.nan, None
+        else:
+            self.lost = estimate
+            if math.isnan(self._lost_since):
+                self._lost_since = estimate.timestamp
         if estimate.pose is None or estimate.status is Status.LOST:
             self.pose, self._motion, self.branches = None, np.zeros(26), ()
             if elapsed > self._thresholds.memory + _SAME_TIME:
@@ -134,6 +145,20 @@ class TrackState:
         self._confidence, self.branches = estimate.confidence, estimate.branches
         self.last_trusted, self.time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
+
+    def is_search_due(self, timestamp: float) -> bool:
+        """Return whether a hand without a pose is searched for everywhere at `timestamp` (s).
+
+        A hand that stays lost is searched for in the next frame, then after times that double up to `longest_interval`.
+        """
+        if not self._lost_since < self._previous:
+            return True
+        return self._searches_until(timestamp) > self._searches_until(self._previous)
+
+    def _searches_until(self, timestamp: float) -> int:
+        """Return how many searches are due after that of the second lost frame."""
+        limits, elapsed = self._thresholds, max(timestamp - self._lost_since, 0.0) + _SAME_TIME
+        return int(math.log2(1 + elapsed / limits.search_interval)) + int(elapsed / limits.longest_interval)
 
     def is_stale(self, timestamp: float) -> bool:
         """Return whether the last pose is too old at `timestamp` (s) to be followed without a rival."""

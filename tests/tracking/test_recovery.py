@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from depthtrack.evaluation.metrics import endpoint_error
-from depthtrack.geometry.rotations import rotation_matrix
+from depthtrack.geometry.rotations import quaternion_log, quaternion_product, rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER
-from depthtrack.hand.pose import ANGLES, POSITION
+from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.status import Status
@@ -29,11 +29,12 @@ from depthtrack.tracking.options import (
     TrackingThresholds,
 )
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
-from depthtrack.tracking.proposals.global_ import orientation_proposals, typical_angles
+from depthtrack.tracking.proposals.global_ import distinct_orientations, orientation_proposals, typical_angles
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.stages import recover
 from depthtrack.tracking.stages.searches import SwarmSearch, search_globally, swarm_search
+from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.stages.swarm import swarm_around
 from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
@@ -179,9 +180,9 @@ class _Repeated:
     def __init__(self, energy: float) -> None:
         self.energy, self.calls = energy, 0
 
-    def improve(self, frame: FrameContext, poses: np.ndarray, min_angle: float) -> list[Candidate]:
+    def improve(self, frame: FrameContext, starts: list[Candidate], min_angle: float) -> list[Candidate]:
         self.calls += 1
-        return [Candidate(poses[0], self.energy / self.calls, 0.9)]
+        return [Candidate(starts[0].pose, self.energy / self.calls, 0.9)]
 
     def random(self, frame: FrameContext) -> np.random.Generator:
         return frame.random
@@ -190,6 +191,7 @@ class _Repeated:
 def test_a_global_search_ends_at_the_usual_energy_of_the_track(made: Synthesiser) -> None:
     state, tools = TrackState(TrackingThresholds(), 40.0), Toolkit(HandShape(), HybridConfig().scoring)
     frame = FrameContext(observe(made, 20), tools, state, 0)
+    tools.set_target(frame.observation)
     for known, repetitions in ((False, 3), (True, 1)):
         if known:
             state.commit(made.poses[0], 20.0, 0.9, Status.TRACKED, {})
@@ -197,6 +199,83 @@ def test_a_global_search_ends_at_the_usual_energy_of_the_track(made: Synthesiser
         options = GlobalSearchOptions(proposals=8, good_energy=0.1, good_ratio=1.2)
         search_globally(frame, search, options)  # type: ignore[arg-type]
         assert search.calls == repetitions
+
+
+def test_a_hand_that_stays_lost_is_searched_for_at_growing_intervals(made: Synthesiser) -> None:
+    """Searches follow after 0.1, 0.3 and 0.7 s, and at least once in each later second."""
+    state, pose = TrackState(TrackingThresholds(search_interval=0.1, longest_interval=1.0), 40.0), made.poses[0]
+    state.commit(pose, 5.0, 0.9, Status.TRACKED, {}, 0.0)
+    due = []
+    for index in range(1, 122):
+        lost = state.commit(pose, 90.0, 0.1, Status.TRACKED, {}, index / 30)
+        assert lost.status is Status.LOST
+        if state.is_search_due((index + 1) / 30):
+            due.append(index)
+    assert due[:4] == [1, 3, 9, 21]
+    assert 5 <= len(due) <= 10
+    assert np.diff(due).max() <= 31
+    state.commit(pose, 5.0, 0.9, Status.STARTED, {}, 4.2)
+    assert state.is_search_due(4.23)
+
+
+@pytest.mark.parametrize(
+    ("energy", "lost_energy", "seconds", "elsewhere"),
+    [
+        (8.0, 30.0, 0.0, False),  # the pose near the last one fits
+        (20.0, 30.0, 0.0, True),  # it fits poorly
+        (8.0, 8.5, 0.0, True),  # it fits as well as the lost one, which another reason made lost
+        (20.0, 30.0, 0.05, False),  # the next search is not due
+        (20.0, 30.0, 0.08, True),
+    ],
+)
+def test_a_lost_hand_is_searched_for_near_its_last_pose_first(
+    made: Synthesiser, energy: float, lost_energy: float, seconds: float, elsewhere: bool
+) -> None:
+    config, tools, state = (
+        HybridConfig(),
+        Toolkit(HandShape(), HybridConfig().scoring),
+        TrackState(TrackingThresholds(), 40.0),
+    )
+    state.commit(made.poses[19], 10.0, 0.9, Status.TRACKED, {}, 0.0)
+    for passed in dict.fromkeys((0.0, seconds)):
+        state.commit(made.poses[50], lost_energy, 0.1, Status.TRACKED, {}, 0.03 + passed)
+    observation = replace(observe(made, 20), timestamp=0.06 + seconds)
+    tools.set_target(observation)
+    ran = list[str]()
+
+    def found(name: str) -> Stage:
+        def stage(frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+            ran.append(name)
+            return [Candidate(made.poses[0], 7.0, 0.9)]
+
+        stage.name = name  # type: ignore[attr-defined]
+        return stage  # type: ignore[return-value]
+
+    stage = recover.Reinitialise(
+        _Repeated(energy),  # type: ignore[arg-type]
+        config.recovery,
+        config.search,
+        fit=[],
+        elsewhere=[found("elsewhere")],
+        start=[found("start")],
+    )
+    best = stage(FrameContext(observation, tools, state, 0), [])[0]
+    assert ran == ["elsewhere"] * elsewhere
+    assert best.energy == (7.0 if elsewhere and energy > 10 else energy)
+
+
+def test_distinct_orientations_are_those_of_the_logarithm(made: Synthesiser) -> None:
+    poses = np.tile(made.poses[0], (200, 1))
+    poses[:, ORIENTATION] = np.random.default_rng(4).standard_normal((200, 4))
+    poses[:, ORIENTATION] /= np.linalg.norm(poses[:, ORIENTATION], axis=1, keepdims=True)
+    plain: list[int] = []
+    for i, pose in enumerate(poses):
+        between = quaternion_log(quaternion_product(pose[ORIENTATION], poses[plain][:, ORIENTATION] * [1, -1, -1, -1]))
+        if not plain or np.linalg.norm(between, axis=-1).min() >= 0.5:
+            plain.append(i)
+    assert 20 < len(plain) < 200
+    assert distinct_orientations(poses, 0.5, 200) == plain
+    assert distinct_orientations(poses, 0.5, 12) == plain[:12]
 
 
 def test_a_pose_of_unusual_energy_gives_no_prediction(made: Synthesiser) -> None:

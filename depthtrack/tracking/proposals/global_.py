@@ -6,7 +6,6 @@ They have any orientation that the forearm allows, and the palm near the observe
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from depthtrack.geometry.rotations import quaternion_log, quaternion_product
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, make_pose
 from depthtrack.hand.postures import POSTURES
@@ -73,12 +72,11 @@ def distinct_orientations(poses: Array, angle: float, count: int) -> list[int]:
     poses: (N, 27).
     angle: least difference, rad.
     """
-    chosen: list[int] = []
-    conjugate = poses[:, ORIENTATION] * [1, -1, -1, -1]
-    for i in range(len(poses)):
-        between = quaternion_log(quaternion_product(poses[i, ORIENTATION], conjugate[chosen]))
-        if not chosen or np.linalg.norm(between, axis=-1).min() >= angle:
-            chosen.append(i)
-        if len(chosen) == count:
-            break
+    quaternions, chosen = poses[:, ORIENTATION], list[int]()
+    apart = np.ones(len(poses), np.bool_)
+    while len(chosen) < count and apart.any():
+        chosen.append(int(apart.argmax()))
+        # Rotations differ by twice the arc cosine of the product of their quaternions, in either sign.
+        apart &= np.abs(quaternions @ quaternions[chosen[-1]]) <= np.cos(angle / 2)
+        apart[chosen[-1]] = False
     return chosen

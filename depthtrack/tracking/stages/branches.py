@@ -89,7 +89,7 @@ class CarryBranches:
         poses = np.concatenate([turned(best.pose, angles[: options.turned]), anywhere])
         search = FitSearch(options.fits, self.fit)
         chosen = [best]
-        for found in search.improve(frame, poses, options.search.min_angle):
+        for found in search.improve(frame, frame.evaluate(poses, options.search.resolution), options.search.min_angle):
             near = found.energy <= options.admit * best.energy
             if near and all(self._is_distinct(frame, found, other) for other in chosen):
                 chosen.append(found)

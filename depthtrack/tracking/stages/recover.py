@@ -1,7 +1,7 @@
 """Recovery: global and local re-initialisation, and other postures of single fingers."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.stages.searches import Search, search_globally
 from depthtrack.tracking.stages.stage import Stage
+from depthtrack.tracking.tracker import Estimate
 
 _SHIFTS = 5
 """Turn of the shifted fingers, after those of the five fingers."""
@@ -103,7 +104,7 @@ class RefineFingers:
 class RecoverLocally:
     """Search near the pose: at once in doubtful frames, in every n-th frame if it fits poorly.
 
-    If the pose is doubtful, the stages `elsewhere` run too; a pose from there restarts the track.
+    If the pose is still doubtful then, the stages `elsewhere` run; a pose from there restarts the track.
 
     routine: smaller search of frames that are not doubtful; None for `search`.
     """
@@ -118,46 +119,84 @@ class RecoverLocally:
         best, options = candidates[0], self.options
         if best.energy <= options.good_energy * frame.clamp:
             return candidates
-        doubtful = frame.state.is_beyond(best.energy, best.agreement, options.doubt_energy, options.doubt_agreement)
+        doubtful = self._is_doubtful(frame, best)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
         due = due and frame.state.is_elevated(best.energy, options.elevated_ratio)
         if not (due or doubtful):
             return candidates
         search, spread = self.search, options
         if self.routine is not None and not doubtful:
-            search, spread = self.routine, replace(options, proposals=options.routine_proposals)
+            search, spread = self.routine, options.routine
         proposals = local_proposals(best.pose, search.random(frame), spread)
-        near = search.improve(frame, proposals, options.min_angle)[0]
+        near = search.improve(frame, frame.evaluate(proposals, options.resolution), options.min_angle)[0]
         if near.energy < (1 if doubtful else options.accept_local) * best.energy:
             best = near
-        if self.elsewhere and doubtful:
-            found: list[Candidate] = []
-            for stage in self.elsewhere:
-                found = stage(frame, found)
+        if self.elsewhere and doubtful and self._is_doubtful(frame, best):
+            found = run_stages(self.elsewhere, frame)
             if found[0].energy < options.accept_global * best.energy:
                 frame.restarted = True
                 return found
         return [best]
 
+    def _is_doubtful(self, frame: FrameContext, best: Candidate) -> bool:
+        options = self.options
+        return frame.state.is_beyond(best.energy, best.agreement, options.doubt_energy, options.doubt_agreement)
+
 
 @dataclass(frozen=True)
-class ReinitialiseNearLast:
-    """Search near the last trusted pose after a loss.
+class Reinitialise:
+    """Search for a lost hand: near its last pose, then elsewhere if no pose there fits.
 
-    A hand hardly turns over in half a second.
+    A hand hardly turns over in half a second. A hand that stays lost is searched for elsewhere at growing intervals.
+
+    near: brief search near the last trusted pose, or near the best pose of the lost frame before.
+    fit: stages after it.
+    elsewhere: stages of a brief search from the observation alone, soon after a loss.
+    start: the same at other times.
     """
 
-    search: Search
+    near: Search
     options: RecoveryOptions
-    fingers: RefineFingers
+    good: GlobalSearchOptions
+    fit: Sequence[Stage]
+    elsewhere: Sequence[Stage]
+    start: Sequence[Stage]
     name: str = "reinitialise"
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
-        last = frame.state.last_trusted
+        state = frame.state
+        near, is_due = self._near_last(frame), state.is_search_due(frame.observation.timestamp)
+        if near and state.lost is not None and (not is_due or self._is_good(frame, near[0], state.lost)):
+            return near
+        brief = state.lost is not None and state.last_trusted is not None
+        found = run_stages(self.elsewhere if brief else self.start, frame)
+        return near if near and found[0].energy >= self.options.accept_global * near[0].energy else found
+
+    def _is_good(self, frame: FrameContext, near: Candidate, lost: Estimate) -> bool:
+        """Return whether a pose fits, and fits better than the lost one.
+
+        A pose that is lost for another reason than its energy has wrong poses near it.
+        """
+        good = self.good.accepted_energy(frame.clamp, frame.state.median_energy)
+        return near.energy <= min(good, self.options.accept_local * lost.energy)
+
+    def _near_last(self, frame: FrameContext) -> list[Candidate]:
+        """Return the best pose near the last one; none without a last pose."""
+        last, lost = frame.state.last_trusted, frame.state.lost
+        if last is None and lost is not None:
+            last = lost.pose
         if last is None:
-            return candidates
+            return []
         pose = last.copy()
         pose[POSITION] = frame.observation.centre
-        proposals = local_proposals(pose, self.search.random(frame), self.options)
-        near = self.fingers(frame, self.search.improve(frame, proposals, self.options.min_angle)[:1])
-        return candidates if candidates[0].energy < self.options.accept_global * near[0].energy else near
+        proposals = local_proposals(pose, self.near.random(frame), self.options)
+        starts = frame.evaluate(proposals, self.options.resolution)
+        return run_stages(self.fit, frame, self.near.improve(frame, starts, self.options.min_angle)[:1])
+
+
+def run_stages(stages: Sequence[Stage], frame: FrameContext, candidates: Sequence[Candidate] = ()) -> list[Candidate]:
+    """Return the candidates after all stages."""
+    found = list(candidates)
+    for stage in stages:
+        found = stage(frame, found)
+    return found

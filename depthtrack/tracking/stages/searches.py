@@ -15,14 +15,13 @@ from depthtrack.tracking.options import FitSearchOptions, GlobalSearchOptions, S
 from depthtrack.tracking.proposals.global_ import distinct_orientations, mixed_angles, orientation_proposals
 from depthtrack.tracking.stages.coarse_to_fine import run_rounds
 from depthtrack.tracking.stages.swarm import swarm_around
-from depthtrack.types import Array
 
 
 class Search(Protocol):
     """Improves start poses on one frame."""
 
-    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
-        """Return candidates, best first, reached from poses (N, 27).
+    def improve(self, frame: FrameContext, starts: list[Candidate], min_angle: float) -> list[Candidate]:
+        """Return candidates, best first, reached from `starts`, best first.
 
         min_angle: least angle (rad) between the orientations of the poses that continue; 0 for any.
         """
@@ -43,8 +42,7 @@ class SwarmSearch:
 
     options: SwarmSearchOptions
 
-    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
-        starts = evaluate(frame.tools.scorer, poses)
+    def improve(self, frame: FrameContext, starts: list[Candidate], min_angle: float) -> list[Candidate]:
         return swarm_search(frame.tools.scorer, starts, frame.random, self.options, min_angle, self.fitter(frame))
 
     def fitter(self, frame: FrameContext) -> IcpFitter | None:
@@ -90,8 +88,8 @@ class FitSearch:
     options: FitSearchOptions
     surface: SurfaceFitOptions
 
-    def improve(self, frame: FrameContext, poses: Array, min_angle: float) -> list[Candidate]:
-        starts, keep = frame.evaluate(poses), self.options.rounds[0].keep
+    def improve(self, frame: FrameContext, starts: list[Candidate], min_angle: float) -> list[Candidate]:
+        keep = self.options.rounds[0].keep
         if min_angle > 0:
             starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
         fitter = frame.fitter(self.surface)
@@ -111,14 +109,12 @@ def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOp
     """
     best: Candidate | None = None
     generator, observation = search.random(frame), frame.observation
-    good = options.good_energy * frame.clamp
-    if options.good_ratio > 0 and np.isfinite(frame.state.median_energy):
-        good = max(good, options.good_ratio * frame.state.median_energy)
+    good = options.accepted_energy(frame.clamp, frame.state.median_energy)
     for _ in range(options.attempts):
         angles = mixed_angles(frame.tools.synergies, generator, options)
         arm = observation.arm_direction if options.follow_arm else None
         poses = orientation_proposals(observation.centre, angles, generator, arm, options)
-        found = search.improve(frame, poses, options.min_angle)[0]
+        found = search.improve(frame, frame.evaluate(poses, options.resolution), options.min_angle)[0]
         before = np.inf if best is None else best.energy
         best = found if best is None or found.energy < best.energy else best
         if best.energy <= good or best.energy > (1 - options.min_gain) * before:

@@ -11,7 +11,7 @@ from depthtrack.tracking.stage_tracker import Stages
 from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
-from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
+from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, Reinitialise, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.stages.surface_choice import FitChosenSurface
@@ -48,6 +48,15 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
             in_turn,
             CarryBranches(config.branches, sparse),
         ],
-        start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
+        start=[
+            Reinitialise(
+                routine,
+                config.recovery.routine,
+                config.search,
+                fit=[keypoints, chosen, fingers],
+                elsewhere=elsewhere,
+                start=start,
+            )
+        ],
         refine=[GivenPose(), replace(chosen, fit=replace(fit, hold_last=False, effort=2))],
     )

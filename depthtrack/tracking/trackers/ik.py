@@ -10,7 +10,7 @@ from depthtrack.tracking.stage_tracker import Stages
 from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
-from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, ReinitialiseNearLast, SearchGlobally
+from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, Reinitialise, SearchGlobally
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.stages.surface_fit import RetryPredictions, SurfaceFit
@@ -36,17 +36,19 @@ def _all_angles(config: IkConfig) -> Stages:
     fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
     keypoints = KeypointProposals(config.keypoints, config.fit)
     start: list[Stage] = [SearchGlobally(search, config.search), keypoints, fingers]
+    doubt, routine = FitSearch(config.doubt_search, config.fit), FitSearch(config.routine_search, config.fit)
+    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), keypoints, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
             fit,
             RetryPredictions(fit, config.retry_ratio, config.retry_energy),
             keypoints,
-            RecoverLocally(near, config.recovery, elsewhere=start),
+            RecoverLocally(near, config.recovery, elsewhere, routine),
             fingers,
             CarryBranches(config.branches, config.fit),
         ],
-        start=[*start, ReinitialiseNearLast(near, config.recovery, fingers)],
+        start=[Reinitialise(routine, config.recovery.routine, config.search, [keypoints, fingers], elsewhere, start)],
         refine=[GivenPose(), replace(fit, hold_last=False, effort=2)],
     )
 
