@@ -2,6 +2,7 @@
 
 Those without a format version hold flat options of the trackers pso and ik. Those of format 2 count the memory of a
 track in frames. Before format 4, trackers followed no branches; before format 5, a lost hand was not located anew.
+Before format 6, an arm that points at the camera was no special case.
 """
 
 import dataclasses
@@ -46,7 +47,17 @@ def upgraded(fields: Mapping[str, Any], where: str) -> Mapping[str, Any]:
         fields = _with_seconds(fields)
     if fields["format"] == 3:
         fields = _without_branches(fields)
-    return _without_relocation(fields) if fields["format"] == 4 else fields
+    if fields["format"] == 4:
+        fields = _without_relocation(fields)
+    return _without_foreshortened_wrist(fields) if fields["format"] == 5 else fields
+
+
+def _without_foreshortened_wrist(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the contents of format 5 whose segmentation finds the wrist of every arm alike."""
+    segmentation = fields.get("segmentation") or {}
+    if isinstance(segmentation, dict):
+        segmentation = {**segmentation, "foreshortened_wrist": {"least_cosine": 1.0}}
+    return {**fields, "format": 6, "segmentation": segmentation}
 
 
 def _without_relocation(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
     ("change", "expected"),
     [
         ({"tracker": "magic"}, "no tracker 'magic'"),
-        ({"format": 99}, "expected format 5"),
+        ({"format": 99}, "expected format 6"),
         ({"options": {"colour": "red"}}, "colour"),
         ({"options": {"seed": "many"}}, "seed"),
         ({"frames": -1}, "whole number"),
@@ -229,3 +229,11 @@ def test_a_run_of_format_4_does_not_locate_a_lost_hand_anew(segmentation: Any) -
     given = segmentation or {}
     assert found.wrist_margin == given.get("wrist_margin", 0)
     assert found.search.nearest == given.get("search", {}).get("nearest", 0.1)
+
+
+@pytest.mark.parametrize("segmentation", [{}, None, {"wrist_margin": 0.01}])
+def test_a_run_of_format_5_finds_the_wrist_of_every_arm_alike(segmentation: Any) -> None:
+    fields = {"format": 5, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": {}}
+    found = RunConfiguration.from_fields(fields | {"segmentation": segmentation}, "run.json").segmentation
+    assert found.foreshortened_wrist.least_cosine == 1
+    assert found.wrist_margin == (segmentation or {}).get("wrist_margin", 0)
