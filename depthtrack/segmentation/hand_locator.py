@@ -9,6 +9,8 @@ import numpy as np
 
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.forearm import Arm, find_arm, find_vanishing_arm
+from depthtrack.segmentation.foreshortened_wrist import find_foreshortened_wrist, points_at_camera
+from depthtrack.segmentation.grid import Grid
 from depthtrack.segmentation.hand_detection import HandDetector
 from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.masks import HandMasks
@@ -17,7 +19,7 @@ from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.pixel_labels import HAND, hand_masks, label_hand
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.surface_grid import SurfaceGrid, blind_skin, build_grid
-from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre
+from depthtrack.segmentation.wrist import WristPlane, arm_nodes, find_wrist, hand_axis, palm_centre, visible_end
 from depthtrack.segmentation.wrist_filter import WristFilter
 from depthtrack.types import Array
 
@@ -144,13 +146,27 @@ class HandLocator:
             return None, palm.centre, None
         self._arm_direction = arm.direction
         axis = hand_axis(grid, palm, arm, guess, to_palm, options.wrist)
-        measured = find_wrist(grid, palm, axis, guess, options.wrist)
+        measured, centred = self._measured_wrist(grid, palm, axis, guess)
         distance = self._wrist.update(palm, axis, measured)
         centre = palm.centre
-        if measured is None:
+        if not centred:
             centre = palm_centre(grid, palm, axis, distance, to_palm, options.wrist)
         plane = WristPlane(palm.centre + (distance + options.wrist_margin) * axis.direction, axis.direction)
         return arm, centre, plane
+
+    def _measured_wrist(self, grid: Grid, palm: Palm, axis: Arm, guess: float) -> tuple[float | None, bool]:
+        """Return the wrist's distance along the arm, and whether the palm's centre is right.
+
+        The distance is that from this centre, metres, or None if no wrist is found.
+        """
+        options = self._options
+        if points_at_camera(palm, axis, options.foreshortened_wrist):
+            end = visible_end(grid, palm, axis, options.wrist)
+            found = find_foreshortened_wrist(grid, palm, axis, end, options.foreshortened_wrist)
+            if found is not None:
+                return found, False
+        found = find_wrist(grid, palm, axis, guess, options.wrist)
+        return found, found is not None
 
     def _set_hand(self, hand: HandSize) -> None:
         self.hand = self._detector.hand = self._wrist.hand = hand

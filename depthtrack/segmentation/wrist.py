@@ -35,7 +35,7 @@ def find_wrist(grid: Grid, palm: Palm, arm: Arm, guess: float, options: WristOpt
     guess: expected distance, metres.
     """
     profile = breadth_profile(grid, palm, arm, options.breadth)
-    visible = int(np.searchsorted(bin_middles(options.breadth), _visible_end(grid, palm, arm, options)))
+    visible = int(np.searchsorted(bin_middles(options.breadth), visible_end(grid, palm, arm, options)))
     scores = (options.place_scale, options.breadth_weight, options.broadest_ratio)
     ratios = (options.narrow_ratio, options.broad_ratio, options.flare_ratio)
     window = (options.neighbours, options.least_behind)
@@ -90,11 +90,11 @@ def narrowest_distance(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) 
     forearm away.
     """
     profile, middles = breadth_profile(grid, palm, arm, options.breadth), bin_middles(options.breadth)
-    forearm = (options.forearm_from < middles) & (_visible_end(grid, palm, arm, options) > middles)
+    forearm = (options.forearm_from < middles) & (visible_end(grid, palm, arm, options) > middles)
     return float(middles[forearm][np.argmin(profile[forearm])]) if forearm.any() else 0.0
 
 
-def _visible_end(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) -> float:
+def visible_end(grid: Grid, palm: Palm, arm: Arm, options: WristOptions) -> float:
     """Return the distance from the palm's centre of the end of the reliable breadth, metres."""
     return float(((grid.points[arm.exits] - palm.centre) @ arm.direction).mean()) - options.fade_out
 

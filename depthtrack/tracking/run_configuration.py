@@ -28,7 +28,7 @@ from depthtrack.tracking.configuration import (
 )
 from depthtrack.tracking.earlier_runs import upgraded
 
-FORMAT = 5
+FORMAT = 6
 """Version of the layout of `run.json`; runs without it were written before the options were nested."""
 
 LONGEST_PATH = 1024

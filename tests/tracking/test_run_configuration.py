@@ -106,7 +106,7 @@ def test_options_beside_a_configuration_replace_its_own(recording: Path, tmp_pat
     ("change", "expected"),
     [
         ({"tracker": "magic"}, "no tracker 'magic'"),
-        ({"format": 99}, "expected format 5"),
+        ({"format": 99}, "expected format 6"),
         ({"options": {"colour": "red"}}, "colour"),
         ({"options": {"seed": "many"}}, "seed"),
         ({"frames": -1}, "whole number"),
@@ -139,7 +139,9 @@ def test_runs_of_earlier_versions_are_read() -> None:
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
-    expected = with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True, "interval": 0.0})
+    given = {"particles": 16, "seed": 3, "refine": True, "interval": 0.0}
+    alone = {f"{fit}.icp.posture_weight": 0.0 for fit in ("final_fit", "swarm_search.fit")}
+    expected = with_options(CONFIGURATIONS["pso"](), given | alone)
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}
@@ -229,3 +231,20 @@ def test_a_run_of_format_4_does_not_locate_a_lost_hand_anew(segmentation: Any) -
     given = segmentation or {}
     assert found.wrist_margin == given.get("wrist_margin", 0)
     assert found.search.nearest == given.get("search", {}).get("nearest", 0.1)
+
+
+@pytest.mark.parametrize("segmentation", [{}, None, {"wrist_margin": 0.01}])
+def test_a_run_of_format_5_finds_the_wrist_of_every_arm_alike(segmentation: Any) -> None:
+    fields = {"format": 5, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": {}}
+    found = RunConfiguration.from_fields(fields | {"segmentation": segmentation}, "run.json").segmentation
+    assert found.foreshortened_wrist.least_cosine == 1
+    assert found.wrist_margin == (segmentation or {}).get("wrist_margin", 0)
+
+
+@pytest.mark.parametrize("options", [{}, {"seed": 4}, {"fit": {"icp": {"icp_iterations": 7}}}])
+def test_a_run_of_format_5_holds_each_angle_alone(options: dict[str, Any]) -> None:
+    fields = {"format": 5, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": options}
+    tracker = RunConfiguration.from_fields(fields, "run.json").tracker
+    assert isinstance(tracker, IkConfig)
+    assert tracker.fit.icp.posture_weight == 0
+    assert tracker.fit.icp.icp_iterations == options.get("fit", {}).get("icp", {}).get("icp_iterations", 5)

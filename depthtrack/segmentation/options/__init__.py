@@ -1,6 +1,12 @@
 """Options of the segmentation, one frozen dataclass per step; importing them needs no numpy."""
 
-from depthtrack.segmentation.options.arm import BreadthOptions, ForearmOptions, WristFilterOptions, WristOptions
+from depthtrack.segmentation.options.arm import (
+    BreadthOptions,
+    ForearmOptions,
+    ForeshortenedWristOptions,
+    WristFilterOptions,
+    WristOptions,
+)
 from depthtrack.segmentation.options.occluder import OccluderOptions
 from depthtrack.segmentation.options.palm import DetectionOptions, PalmOptions
 from depthtrack.segmentation.options.pixels import (
@@ -18,6 +24,7 @@ __all__ = [
     "DetectionOptions",
     "FlyingPixelOptions",
     "ForearmOptions",
+    "ForeshortenedWristOptions",
     "GridOptions",
     "OccluderOptions",
     "OutlineOptions",

@@ -79,6 +79,37 @@ class WristOptions:
 
 
 @dataclass(frozen=True)
+class ForeshortenedWristOptions:
+    """The wrist of an arm that points at the camera, by its breadth across the line of sight.
+
+    Ratios were chosen on three grasps of the cross-model benchmark's tuning split that show the hand over its forearm.
+    """
+
+    least_cosine: float = option(
+        0.85, "Cosine of the largest angle between such an arm and the line of sight", source="as the ratios"
+    )
+    before: float = option(0.16, "Distance before the palm's centre from which the breadth is measured", unit="m")
+    half_breadth: float = option(0.08, "Largest distance of a node from the axis", unit="m")
+    bin_width: float = option(0.004, "Distance between samples of the breadth", unit="m")
+    bins: int = option(90, "Number of samples")
+    margin_bins: int = option(6, "Half width of the smoothing kernel", unit="bins")
+    sigma_bins: float = option(
+        2.5, "Standard deviation of the smoothing: nodes are far apart along the arm", unit="bins"
+    )
+    narrow_ratio: float = option(1.4, "Ratio to the narrowest breadth behind it at which the hand ends")
+    broad_ratio: float = option(1.2, "Smallest ratio of the hand's breadth to that of its end")
+    broadest_ratio: float = option(2.0, "Ratio from which a broader hand is no better")
+    flare_ratio: float = option(1.7, "Largest ratio of breadths behind the wrist; beyond it, the hand follows")
+    neighbours: int = option(12, "Samples before and behind a place that are compared with it", unit="bins")
+    least_behind: int = option(4, "Samples behind a place that must be visible", unit="bins")
+
+    def __post_init__(self) -> None:
+        check_numbers(
+            self, ("bin_width", "bins", "margin_bins", "sigma_bins", "narrow_ratio", "neighbours"), {"bins": 1000}
+        )
+
+
+@dataclass(frozen=True)
 class WristFilterOptions:
     """Kalman filter of the distance from palm to wrist, and its prior from anatomy."""
 

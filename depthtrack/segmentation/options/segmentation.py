@@ -4,7 +4,12 @@ from dataclasses import dataclass
 
 from depthtrack.errors import InputError
 from depthtrack.options import option
-from depthtrack.segmentation.options.arm import ForearmOptions, WristFilterOptions, WristOptions
+from depthtrack.segmentation.options.arm import (
+    ForearmOptions,
+    ForeshortenedWristOptions,
+    WristFilterOptions,
+    WristOptions,
+)
 from depthtrack.segmentation.options.occluder import OccluderOptions
 from depthtrack.segmentation.options.palm import DetectionOptions, PalmOptions
 from depthtrack.segmentation.options.pixels import (
@@ -33,6 +38,9 @@ class SegmentationOptions:
     detection: DetectionOptions = option(DetectionOptions(), "Choice of a palm", advanced=True)
     forearm: ForearmOptions = option(ForearmOptions(), "Forearm", advanced=True)
     wrist: WristOptions = option(WristOptions(), "Wrist", advanced=True)
+    foreshortened_wrist: ForeshortenedWristOptions = option(
+        ForeshortenedWristOptions(), "Wrist of an arm that points at the camera", advanced=True
+    )
     wrist_filter: WristFilterOptions = option(WristFilterOptions(), "Wrist over time", advanced=True)
     outline: OutlineOptions = option(OutlineOptions(), "Outline of the silhouette", advanced=True)
     occluder: OccluderOptions = option(OccluderOptions(), "Objects that may hide the hand", advanced=True)
