@@ -80,11 +80,18 @@ class MarkerModel:
         return HandModel(HandShape() if self.hand is None else self.hand)
 
     def positions(self, poses: ArrayLike) -> Array:
-        """Return the markers (..., M, 3), metres, capture frame, of poses (..., 27). Source: Maycock 2015, s(theta)."""
+        """Return the markers (..., M, 3), metres, capture frame, of poses (..., 27).
+
+        Source: Maycock et al. 2015, s(theta) in Eq. (4).
+        """
         return self.kinematics.transform_points(poses, self.bodies, self.offsets)
 
     def with_(self, **changes: Any) -> Self:
-        """Return a copy with some fields replaced and all checked again. Raises InputError as the constructor does."""
+        """Return a copy with some fields replaced and all checked again.
+
+        Raises:
+            InputError: as the constructor does.
+        """
         return replace(self, **changes)
 
     def to_json(self) -> str:
