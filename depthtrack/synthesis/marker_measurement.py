@@ -1,6 +1,7 @@
 """Errors of an optical motion capture system: noise, dropouts, ghosts and lost labels.
 
-Dropouts come in bursts. Random numbers come from streams of one seed, in order of time: a longer capture begins with the shorter one.
+Dropouts come in bursts. Random numbers come from streams of one seed, in order of time:
+a longer capture begins with the shorter one.
 """
 
 from dataclasses import dataclass

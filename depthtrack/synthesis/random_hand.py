@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from depthtrack.calibration.parameters import SCALE, hand_of, prior_covariance
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import SCALE, hand_of, prior_covariance
 
 
 def random_hand(side: Side, scale: float | None, seed: int, share: float = 1.0) -> HandShape:
