@@ -25,6 +25,8 @@ _UNIT_NAMES = {
     "millimeter": "mm",
 }
 _UNIDENTIFIED = re.compile(r"(?:.*:)?(?:unlabell?ed|unidentified)[ _:-]*(\d*)", re.IGNORECASE)
+_NEAREST, _FARTHEST = 0.002, 1.0
+"""Distances between neighbouring markers, metres, outside which a file's unit is questioned."""
 _SHORTEST_MM, _LONGEST_M = 6.0, 0.5
 """Distance between neighbouring markers: above the first it is in millimetres, below the second in metres."""
 
@@ -123,9 +125,12 @@ def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[fl
         return METRES[chosen], [f"the unit is {chosen}, as chosen"]
     text = "" if stated is None else "".join(c for c in stated if c.isprintable()).strip().lower()
     name = _UNIT_NAMES.get(text.rstrip("s"), text)
-    if name in METRES:
-        return METRES[name], []
     distance = neighbour_distance(positions)
+    if name in METRES:
+        metres = METRES[name] * distance
+        likely = np.isnan(metres) or _NEAREST <= metres <= _FARTHEST
+        doubt = f"neighbouring markers are {metres:.3g} m apart by the file's unit, {name}: is it right?"
+        return METRES[name], [] if likely else [doubt]
     guess = "m" if distance < _LONGEST_M else "mm" if distance >= _SHORTEST_MM else "cm"
     why = "the file states no unit" if not text else f"the unit '{text[:20]}' is unknown"
     size = "" if np.isnan(distance) else f": neighbouring markers are {distance:.3g} {guess} apart"

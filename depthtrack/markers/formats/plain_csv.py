@@ -7,7 +7,8 @@ from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.formats.stored_capture import CaptureFormat, StoredCapture
-from depthtrack.markers.formats.text_rows import decoded, read_rows, text_lines, timing
+from depthtrack.markers.formats.text_rows import Columns, decoded, read_rows, text_lines
+from depthtrack.markers.formats.timing import timing
 
 _COORDINATE = re.compile(r"(.*?)[-_. :]?([XYZ])", re.IGNORECASE | re.DOTALL)
 _KEYS = ("frame", "time")
@@ -33,9 +34,8 @@ def read(path: Path) -> StoredCapture:
         cells.pop()
     keys = _keys(cells)
     labels = tuple(_labels(cells, len(keys), path))
-    rows = read_rows(lines, ",", len(keys), len(labels), path)
-    columns = {key: column for column, key in enumerate(keys)}
-    clock = timing(rows, path, columns.get("frame"), columns.get("time"))
+    rows = read_rows(lines, ",", Columns.plain(tuple(keys), len(labels)), path)
+    clock = timing(rows, path)
     return StoredCapture(
         labels, clock.spread(rows.points), clock.rate, first_frame=clock.first_frame, notes=clock.notes
     )
