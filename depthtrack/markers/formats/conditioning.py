@@ -1,4 +1,4 @@
-"""From what a file states to a capture: labels, gaps, units and rate put in order, and each change noted."""
+"""From what a file states to a capture: labels, gaps, units and rate, each change noted."""
 
 import re
 from collections import Counter
@@ -54,7 +54,7 @@ def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | Non
 
 
 def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[str]]:
-    """Return `count` different labels: prefixes removed, blank ones numbered, repeated ones given a number."""
+    """Return `count` different labels: without prefix, blank and repeated ones numbered."""
     labels, notes = [_clean(label) for label in stated], list[str]()
     if len(labels) > count:
         notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count]}' on")
@@ -76,7 +76,7 @@ def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[
 
 
 def _clean(label: str) -> str:
-    """Return a label without control characters or outer blanks; an unidentified one begins with `*`."""
+    """Return a label without control characters; an unidentified one begins with `*`."""
     label = "".join(c for c in label if c.isprintable()).strip()
     unidentified = _UNIDENTIFIED.fullmatch(label)
     return f"{UNLABELLED}{unidentified[1]}" if unidentified else label
@@ -98,7 +98,7 @@ def _distinct(labels: list[str]) -> tuple[str, ...]:
 
 
 def _measured(stored: StoredCapture) -> tuple[Mask, list[str]]:
-    """Return which samples (T, M) were measured: finite, residual not below 0, not 0 0 0 without a residual."""
+    """Return the measured samples (T, M): finite, residual not below 0, no bare 0 0 0."""
     finite = np.isfinite(stored.positions).all(axis=-1)
     zero = (stored.positions == 0).all(axis=-1)
     if stored.residuals is None:
@@ -118,7 +118,7 @@ def _measured(stored: StoredCapture) -> tuple[Mask, list[str]]:
 
 
 def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[float, list[str]]:
-    """Return the length of the unit in metres: the user's, the file's, else by the size of the hand."""
+    """Return the unit in metres: the user's, the file's, else by the size of the hand."""
     if chosen is not None:
         if chosen not in METRES:
             raise InputError(f"the unit must be one of {', '.join(METRES)}, found '{chosen[:40]}'")
@@ -138,9 +138,9 @@ def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[fl
 
 
 def neighbour_distance(positions: Array, frames: int = 50) -> float:
-    """Return the median distance between a marker (T, M, 3) and its nearest neighbour, over evenly spaced frames.
+    """Return the median distance of a marker (T, M, 3) to its nearest neighbour.
 
-    NaN if no frame has two markers.
+    frames: evenly spaced, to look at. The result is NaN if none has two markers.
     """
     found = []
     for frame in np.unique(np.linspace(0, len(positions) - 1, frames).astype(int)):

@@ -1,4 +1,4 @@
-"""CSV of OptiTrack Motive: a line of names and values, five or six rows that describe the columns, a row a frame.
+"""CSV of OptiTrack Motive: names and values, rows that describe the columns, a row a frame.
 
 Source: OptiTrack documentation, "Data Export: CSV".
 """

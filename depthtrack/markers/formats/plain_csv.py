@@ -1,4 +1,4 @@
-"""Plain CSV: one header row `name-X,name-Y,name-Z` for each marker, perhaps `frame` and `time` (s) before it."""
+"""Plain CSV: one header row of `name-X,name-Y,name-Z`, perhaps after `frame` and `time` (s)."""
 
 import re
 from pathlib import Path
@@ -42,7 +42,7 @@ def read(path: Path) -> StoredCapture:
 
 
 def write(path: Path, capture: MarkerCapture) -> None:
-    """Write a capture in millimetres with a column `time` in seconds; NaN where nothing was measured.
+    """Write a capture in millimetres after `frame` and `time` (s); NaN in gaps.
 
     Raises:
         InputError: if a label holds a comma or a quote, or the file cannot be written.

@@ -1,4 +1,4 @@
-"""TSV of Qualisys Track Manager: a header of names and values, then a row a frame, in millimetres.
+"""TSV of Qualisys Track Manager: names and values, then a row a frame, in millimetres.
 
 Source: QTM user manual, "TSV file formats", motion data.
 """

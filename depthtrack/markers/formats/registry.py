@@ -57,7 +57,7 @@ def write_capture(path: Path | str, capture: MarkerCapture) -> None:
 
 
 def find_format(path: Path) -> CaptureFormat:
-    """Return the format of a file. Raises InputError if the file is missing or of no known format."""
+    """Return the format of a file. Raises InputError if it is missing or of no known format."""
     if not path.is_file():
         raise InputError(f"there is no capture at {path}: no such file")
     with path.open("rb") as file:

@@ -69,7 +69,7 @@ class Columns:
 
     @classmethod
     def plain(cls, keys: tuple[str, ...], trajectories: int) -> Self:
-        """Return the columns of rows that begin with `keys`, of "frame" and "time", and have no other cells."""
+        """Return the columns of rows of `keys`, of "frame" and "time", and coordinates."""
         first = len(keys)
         columns = {name: column for column, name in enumerate(keys)}
         coordinates = tuple(range(first, first + 3 * trajectories, 3))
@@ -137,7 +137,7 @@ def read_rows(lines: Iterable[Line], separator: str, columns: Columns, path: Pat
 
 
 def positive_number(text: str, what: str) -> float:
-    """Return the number of a header, such as a rate; `what` has its place. Raises InputError unless it is above 0."""
+    """Return a number above 0 of a header; `what` has its place. Raises InputError."""
     value = _float(text)
     if not 0 < value < FARTHEST:
         raise InputError(f"{what} must be a number above 0, found {text[:40]!r}")
@@ -145,7 +145,7 @@ def positive_number(text: str, what: str) -> float:
 
 
 def whole_number(text: str, what: str) -> int:
-    """Return the whole number of a header; `what` has its place. Raises InputError unless it is above 0."""
+    """Return a whole number above 0 of a header; `what` has its place. Raises InputError."""
     value = positive_number(text, what)
     if value != int(value):
         raise InputError(f"{what} must be a whole number, found {text[:40]!r}")

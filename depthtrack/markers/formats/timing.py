@@ -70,7 +70,7 @@ def timing(rows: Rows, path: Path, stated_rate: float | None = None) -> Timing:
 
 
 def _rate(times: Array | None, numbers: Array, stated: float | None) -> tuple[float | None, tuple[str, ...]]:
-    """Return the rate of the times over the whole file, whose digits are few; the header's if both agree."""
+    """Return the rate of the times, whose digits are few, over the whole file."""
     if times is None or len(times) < 2:
         return stated, ()
     count, span = numbers[-1] - numbers[0], times[-1] - times[0]

@@ -94,7 +94,7 @@ def _cells(line: Line) -> list[str]:
 
 
 def _labels(names: Line, axes: Line, stated: str, path: Path) -> tuple[tuple[str, ...], int]:
-    """Return the labels, and the number of markers by the row X1 Y1 Z1, else by the header or the labels."""
+    """Return the labels, and the number of markers by the row of axes, else by the header."""
     cells = _cells(names)
     if not cells[0].lower().startswith("frame"):
         raise InputError(f"{path}, line 4: expected Frame#, Time and the names of the markers, found {cells[0][:40]!r}")

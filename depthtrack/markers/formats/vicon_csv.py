@@ -1,4 +1,4 @@
-"""CSV of Vicon Nexus: sections of tables, of which Trajectories is read.
+"""CSV of Vicon Nexus, which has sections; Trajectories is read.
 
 Source: Vicon Nexus documentation, "ASCII file format".
 """

@@ -122,7 +122,7 @@ def test_damage_is_reported_with_its_line(tmp_path: Path, text: str, old: str, n
 
 
 def opensim_table(path: Path) -> tuple[dict[str, str], list[str], np.ndarray]:
-    """Return header, names and numbers of a TRC file as OpenSim's reader takes them: split at tabs, blank is NaN."""
+    """Return header, names and numbers of a TRC file, split at tabs as by OpenSim."""
     with path.open(newline="") as file:
         table = list(csv.reader(file, delimiter="\t"))
     assert table[0][:3] == ["PathFileType", "4", "(X/Y/Z)"]
