@@ -2,4 +2,6 @@
 
 from depthtrack.cli import CommandEntry
 
-COMMANDS: dict[str, CommandEntry] = {}
+COMMANDS = {
+    "info": CommandEntry("depthtrack.cli.markers.info", "list frames, markers, gaps and size of a capture"),
+}
