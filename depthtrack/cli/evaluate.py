@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Evaluate runs: pose errors, E3D, E2D, silhouette IoU and timing; or labels and positions of markers.
+    """Evaluate runs: pose errors, E3D, E2D, silhouette IoU and timing; or markers.
 
     Pose errors need ground truth. Errors of phalanx endpoints or annotated joints are in mm, those of joint angles in
     degrees. Marker folders are compared with true labels, positions and poses. With --predictions, evaluate a
