@@ -49,7 +49,7 @@ class MarkerSynthesis:
     start: time in the motion of the first frame, seconds.
     frames: number of frames; None for the rest of the motion.
     rate: frames a second, Hz.
-    size_spread: spread of the subject's hand sizes, as a share of that among people; 0 for the sizes of `hand`.
+    size_spread: spread of the subject's hand sizes about `hand`, as a share of that among people.
     placement: standard deviation of the markers' positions on the subject about the layout's, metres, each axis.
 
     Raises:
@@ -159,8 +159,7 @@ def _worn(options: MarkerSynthesis, layout: Layout, nominal: MarkerModel) -> Mar
     hand = nominal.hand
     assert hand is not None
     if options.size_spread > 0:
-        drawn = random_hand(hand.side, None, options.seed, options.size_spread)
-        hand = drawn.with_(scale=drawn.scale * hand.scale)
+        hand = random_hand(hand.side, None, options.seed, options.size_spread, hand)
     rng = generator(options.seed, 0 if hand.side == "right" else 1, Stream.SUBJECT)
     worn = layout.on(hand)
     return worn.with_(offsets=worn.offsets + rng.normal(0, options.placement, worn.offsets.shape))

@@ -4,14 +4,17 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.size_parameters import SCALE, hand_of, prior_covariance
+from depthtrack.hand.size_parameters import SCALE, prior_covariance, resized
 
 
-def random_hand(side: Side, scale: float | None, seed: int, share: float = 1.0) -> HandShape:
+def random_hand(
+    side: Side, scale: float | None, seed: int, share: float = 1.0, average: HandShape | None = None
+) -> HandShape:
     """Return a hand with sizes drawn from their prior.
 
     scale: None to draw it too.
-    share: factor on the differences from the average adult's hand.
+    share: factor on the differences from the average hand.
+    average: None for the average adult's hand.
 
     Raises:
         InputError: if no draw gives sizes of a hand.
@@ -22,7 +25,8 @@ def random_hand(side: Side, scale: float | None, seed: int, share: float = 1.0) 
         if scale is not None:
             values[SCALE] = np.log(scale)
         try:
-            return hand_of(values, side, f"drawn from the prior, seed {seed}")
+            drawn = resized(HandShape() if average is None else average, values)
+            return drawn.with_(side=side, source=f"drawn from the prior, seed {seed}", rig=None)
         except InputError:
             continue
     raise InputError(f"no hand of scale {scale} was drawn with seed {seed}: choose another seed")
