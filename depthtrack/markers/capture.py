@@ -51,6 +51,12 @@ class MarkerCapture:
         columns = np.flatnonzero(np.isfinite(self.positions[frame]).all(axis=-1))
         return self.positions[frame, columns], columns
 
+    def between(self, start: int, stop: int) -> "MarkerCapture":
+        """Return the frames from index `start` up to, but not including, `stop`."""
+        residuals = None if self.residuals is None else self.residuals[start:stop]
+        first = self.first_frame + start
+        return replace(self, positions=self.positions[start:stop], residuals=residuals, first_frame=first)
+
     def selected(self, labels: tuple[str, ...]) -> "MarkerCapture":
         """Return the capture of some trajectories, in this order. Raises KeyError if one is missing."""
         column = {label: k for k, label in enumerate(self.labels)}
