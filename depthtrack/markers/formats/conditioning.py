@@ -45,13 +45,14 @@ def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | Non
     positions = np.where(measured[..., None], stored.positions, np.nan)
     name, unit_notes = _unit(positions, stored.unit, unit)
     scale = METRES[name]
+    positions *= scale
     hertz, rate_notes = _rate(stored.rate, rate)
     residuals = stored.residuals
     if residuals is not None:
         residuals = np.where(measured & (residuals >= 0), residuals, np.nan) * scale
     first = () if stored.first_frame == 1 else (f"the first frame in the file is {stored.first_frame}",)
     notes = (*stored.notes, *label_notes, *gap_notes, *unit_notes, *rate_notes, *first)
-    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes, name)
+    return MarkerCapture(hertz, labels, positions, residuals, stored.first_frame, notes, name)
 
 
 def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[str]]:
