@@ -10,6 +10,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics.markers import MEASURED, AngleErrors, LabelScore, PositionErrors, label_score
+from depthtrack.evaluation.metrics.trajectories import TrajectoryScore, trajectory_score
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.folder.contents import is_marker_folder
 from depthtrack.markers.folder.reading import MarkerFolder
@@ -127,6 +128,20 @@ def evaluate_marker_folder(path: Path, labels: Path | None = None, truth: Path |
             raise InputError(f"the truth about {path} is unknown: give --labels FILE or --truth FOLDER")
         known = MarkerTruth.of_folder(beside)
     return evaluate_labelled(folder.labelled, known, str(path))
+
+
+def evaluate_trajectories(path: Path, labels: Path) -> TrajectoryScore:
+    """Return the score of a capture file whose trajectories were linked without models.
+
+    labels: labelled capture file of the same points.
+
+    Raises:
+        InputError: if a file is missing or malformed, or they have different numbers of frames.
+    """
+    given, truth = read_capture(path), MarkerTruth.of_capture(labels)
+    if len(given) != len(truth.samples):
+        raise InputError(f"{labels} must have the {len(given)} frames of {path}, found {len(truth.samples)}")
+    return trajectory_score(given.positions, truth.samples.positions)
 
 
 def evaluate_labelled(labelled: LabelledCapture, truth: MarkerTruth, name: str = "") -> MarkerEvaluation:
