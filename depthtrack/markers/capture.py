@@ -21,6 +21,7 @@ class MarkerCapture:
     residuals: (T, M) metres, of the measuring system; None if the file states none.
     first_frame: number of the first frame in the file.
     notes: what reading the file changed or assumed, a sentence each.
+    unit: length unit of the file, "m", "cm" or "mm"; that of `positions` is the metre.
     """
 
     rate: float
@@ -29,6 +30,7 @@ class MarkerCapture:
     residuals: Array | None = None
     first_frame: int = 1
     notes: tuple[str, ...] = ()
+    unit: str = "m"
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -43,14 +43,15 @@ def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | Non
     labels, label_notes = _labels(stored.labels, stored.positions.shape[1])
     measured, gap_notes = _measured(stored)
     positions = np.where(measured[..., None], stored.positions, np.nan)
-    scale, unit_notes = _scale(positions, stored.unit, unit)
+    name, unit_notes = _unit(positions, stored.unit, unit)
+    scale = METRES[name]
     hertz, rate_notes = _rate(stored.rate, rate)
     residuals = stored.residuals
     if residuals is not None:
         residuals = np.where(measured & (residuals >= 0), residuals, np.nan) * scale
     first = () if stored.first_frame == 1 else (f"the first frame in the file is {stored.first_frame}",)
     notes = (*stored.notes, *label_notes, *gap_notes, *unit_notes, *rate_notes, *first)
-    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes)
+    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes, name)
 
 
 def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[str]]:
@@ -117,12 +118,12 @@ def _measured(stored: StoredCapture) -> tuple[Mask, list[str]]:
     return np.asarray(measured), notes
 
 
-def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[float, list[str]]:
-    """Return the unit in metres: the user's, the file's, else by the size of the hand."""
+def _unit(positions: Array, stated: str | None, chosen: str | None) -> tuple[str, list[str]]:
+    """Return the unit: the user's, the file's, else by the size of the hand."""
     if chosen is not None:
         if chosen not in METRES:
             raise InputError(f"the unit must be one of {', '.join(METRES)}, found '{chosen[:40]}'")
-        return METRES[chosen], [f"the unit is {chosen}, as chosen"]
+        return chosen, [f"the unit is {chosen}, as chosen"]
     text = "" if stated is None else "".join(c for c in stated if c.isprintable()).strip().lower()
     name = _UNIT_NAMES.get(text.rstrip("s"), text)
     distance = neighbour_distance(positions)
@@ -130,11 +131,11 @@ def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[fl
         metres = METRES[name] * distance
         likely = np.isnan(metres) or _NEAREST <= metres <= _FARTHEST
         doubt = f"neighbouring markers are {metres:.3g} m apart by the file's unit, {name}: is it right?"
-        return METRES[name], [] if likely else [doubt]
+        return name, [] if likely else [doubt]
     guess = "m" if distance < _LONGEST_M else "mm" if distance >= _SHORTEST_MM else "cm"
     why = "the file states no unit" if not text else f"the unit '{text[:20]}' is unknown"
     size = "" if np.isnan(distance) else f": neighbouring markers are {distance:.3g} {guess} apart"
-    return METRES[guess], [f"{why}; {guess} is taken by the size of the hand{size}"]
+    return guess, [f"{why}; {guess} is taken by the size of the hand{size}"]
 
 
 def neighbour_distance(positions: Array, frames: int = 50) -> float:
