@@ -50,6 +50,7 @@ REWRITTEN = (
     "docs/keypoints.md",
     "docs/limitations.md",
     "docs/marker-formats.md",
+    "docs/marker-synthesis.md",
     "docs/metrics.md",
     "docs/parameters.md",
     "docs/rigs.md",

@@ -26,7 +26,8 @@ class Command:
     """
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
-    """Run folders from `depthtrack track`, or marker folders from `depthtrack markers`."""
+    """Run folders from `depthtrack track`, marker folders from `depthtrack markers`, or capture files with linked
+    trajectories."""
     sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the runs, if it was moved, or of the predictions."""
     residuals: bool = True
@@ -52,7 +53,7 @@ class Command:
 
         if self.report is not None:
             check_output_folder(self.report, "--report")
-        if self.predictions is None and any(is_marker_folder(folder) for folder in self.runs):
+        if self.predictions is None and any(is_marker_folder(path) or path.is_file() for path in self.runs):
             self._print(*self._markers())
             return
         evaluations = self._evaluations() if self.predictions is None else []
@@ -72,14 +73,25 @@ class Command:
         print(dumps(values, indent=2, allow_nan=False) if self.json else "\n\n".join(texts))
 
     def _markers(self) -> tuple[list[dict[str, Any]], list[str]]:
-        from depthtrack.cli.markers.evaluation_text import evaluation_text
-        from depthtrack.evaluation.marker_evaluation import evaluate_marker_folder
+        from depthtrack.cli.markers.evaluation_text import evaluation_text, trajectory_text
+        from depthtrack.evaluation.marker_evaluation import evaluate_marker_folder, evaluate_trajectories
 
         for option in ("report", "sequence", "benchmark"):
             if getattr(self, option) is not None:
                 raise InputError(f"--{option} is for runs: evaluate the run of a hand inside the marker folder with it")
-        found = [evaluate_marker_folder(folder, self.labels, self.truth) for folder in self.runs]
-        return [each.to_json() for each in found], [evaluation_text(each) for each in found]
+        reports, texts = list[dict[str, Any]](), list[str]()
+        for path in self.runs:
+            if path.is_file():
+                if self.labels is None:
+                    raise InputError(f"{path} is a file of trajectories: give the true ones as --labels FILE")
+                score = evaluate_trajectories(path, self.labels)
+                reports.append({"capture": str(path), "truth": str(self.labels), **score.to_json()})
+                texts.append(trajectory_text(str(path), score))
+            else:
+                found = evaluate_marker_folder(path, self.labels, self.truth)
+                reports.append(found.to_json())
+                texts.append(evaluation_text(found))
+        return reports, texts
 
     def _evaluations(self) -> "list[Evaluation]":
         from depthtrack.evaluation.evaluate import evaluate_run

@@ -9,8 +9,16 @@ from typing import Any
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.evaluation.metrics.markers import MEASURED, AngleErrors, LabelScore, PositionErrors, label_score
+from depthtrack.evaluation.metrics.markers import (
+    AngleErrors,
+    LabelScore,
+    PositionErrors,
+    label_score,
+    matching_samples,
+)
+from depthtrack.evaluation.metrics.trajectories import TrajectoryScore, trajectory_score
 from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.filled_capture import FilledCapture, Filling
 from depthtrack.markers.folder.contents import is_marker_folder
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.formats.registry import read_capture
@@ -126,35 +134,73 @@ def evaluate_marker_folder(path: Path, labels: Path | None = None, truth: Path |
         if beside is None or not is_marker_folder(beside / TRUTH):
             raise InputError(f"the truth about {path} is unknown: give --labels FILE or --truth FOLDER")
         known = MarkerTruth.of_folder(beside)
-    return evaluate_labelled(folder.labelled, known, str(path))
+    return evaluate_labelled(folder.labelled, known, str(path), folder.filled)
 
 
-def evaluate_labelled(labelled: LabelledCapture, truth: MarkerTruth, name: str = "") -> MarkerEvaluation:
-    """Return the evaluation of a labelled capture.
+def evaluate_trajectories(path: Path, labels: Path) -> TrajectoryScore:
+    """Return the score of a capture file whose trajectories were linked without models.
+
+    labels: labelled capture file of the same points.
 
     Raises:
-        InputError: if the truth has other frames, or none of the markers.
+        InputError: if a file is missing or malformed, or they have different numbers of frames.
+    """
+    given, truth = read_capture(path), MarkerTruth.of_capture(labels)
+    if len(given) != len(truth.samples):
+        raise InputError(f"{labels} must have the {len(given)} frames of {path}, found {len(truth.samples)}")
+    return trajectory_score(given.positions, truth.samples.positions)
+
+
+def evaluate_labelled(
+    labelled: LabelledCapture, truth: MarkerTruth, name: str = "", filled: FilledCapture | None = None
+) -> MarkerEvaluation:
+    """Return the evaluation of a labelled capture, and of its filled gaps.
+
+    True samples that are not in the capture, because they were cut out of it, need no label.
+
+    Raises:
+        InputError: if the truth has other frames, none of the markers, or none of the points.
     """
     frames = len(labelled.capture)
     if len(truth.samples) != frames:
         raise InputError(f"{truth.name} must have the {frames} frames that were labelled, found {len(truth.samples)}")
-    given = labelled.labelled()
-    expected = _expected(labelled, truth.samples.labels)
+    labels, expected = labelled.labelled().labels, _expected(labelled, truth.samples.labels)
     if np.all(expected < 0):
         raise InputError(
-            f"{truth.name} has none of the labels, such as '{given.labels[0]}', but '{truth.samples.labels[0]}': "
+            f"{truth.name} has none of the labels, such as '{labels[0]}', but '{truth.samples.labels[0]}': "
             "use a layout with its labels (docs/marker-synthesis.md)"
         )
-    points = int(np.isfinite(labelled.capture.positions).all(axis=-1).sum())
-    score = label_score(given.labels, given.positions, truth.samples.positions, truth.samples.labels, expected, points)
-    true = np.where(expected[:, None] >= 0, truth.positions.positions[:, expected], np.nan)
-    positions = PositionErrors(
-        given.labels,
-        1000 * np.linalg.norm(given.positions - true, axis=-1),
-        np.full((frames, len(given.labels)), MEASURED),
-        np.full((frames, len(given.labels)), np.nan),
+    points = labelled.capture.positions
+    captured = matching_samples(truth.samples.positions, points) >= 0
+    if not captured.any():
+        raise InputError(f"{truth.name} has no point at the position of one that was labelled: it is another capture")
+    score = label_score(
+        labels,
+        labelled.labelled().positions,
+        np.where(captured[..., None], truth.samples.positions, np.nan),
+        truth.samples.labels,
+        expected,
+        int(np.isfinite(points).all(axis=-1).sum()),
     )
-    return MarkerEvaluation(name, truth.name, frames, score, positions, dict(_angles(labelled, truth)))
+    errors = _position_errors(labelled, truth, expected, filled)
+    return MarkerEvaluation(name, truth.name, frames, score, errors, dict(_angles(labelled, truth)))
+
+
+def _position_errors(
+    labelled: LabelledCapture, truth: MarkerTruth, expected: Index, filled: FilledCapture | None
+) -> PositionErrors:
+    """Return the distances of all markers, measured or filled, from their true positions."""
+    given = labelled.labelled()
+    true = np.where(expected[:, None] >= 0, truth.positions.positions[:, expected], np.nan)
+    positions, how = given.positions, np.full(given.positions.shape[:2], Filling.MEASURED, dtype=np.int64)
+    stated = np.full(how.shape, np.nan)
+    if filled is not None:
+        positions, how = np.concatenate(filled.positions, axis=1), np.concatenate(filled.how, axis=1)
+        stated = np.concatenate(filled.expected_error, axis=1)
+    words = np.array([way.word for way in Filling])
+    return PositionErrors(
+        given.labels, 1000 * np.linalg.norm(positions - true, axis=-1), words[how], 1000 * np.asarray(stated)
+    )
 
 
 def _angles(labelled: LabelledCapture, truth: MarkerTruth) -> Iterator[tuple[str, AngleErrors]]:

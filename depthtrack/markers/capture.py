@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from depthtrack.types import Array, Index
+from depthtrack.types import Array, Index, Mask
 
 UNLABELLED = "*"
 """First character of the label of an unlabelled trajectory, as in C3D files."""
@@ -42,7 +42,7 @@ class MarkerCapture:
         return np.arange(len(self)) / self.rate
 
     @cached_property
-    def is_labelled(self) -> Array:
+    def is_labelled(self) -> Mask:
         """Whether each trajectory (M,) has a label."""
         return np.array([not label.startswith(UNLABELLED) for label in self.labels], dtype=np.bool_)
 

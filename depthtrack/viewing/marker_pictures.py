@@ -1,5 +1,7 @@
 """The picture of a labelled scene: all models, and each alone with its names."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from depthtrack.markers.labelled_capture import LabelledCapture
@@ -31,6 +33,31 @@ def scene_picture(scene: MarkerScene, frame: int, title: str) -> Image:
     number = labelled.capture.first_frame + frame
     subtitle = f"frame {number}  ·  {labelled.capture.times[frame]:.3f} s  ·  {unlabelled} points without a label"
     return framed(stacked([_headline(title, subtitle, grid.shape[1]), grid, _legend(grid.shape[1])], gap=10))
+
+
+def marker_sheet(scene: MarkerScene, frames: Sequence[int], title: str, columns: int = 4, width: int = 400) -> Image:
+    """Return a page of frames of a labelled capture in reading order, all in one view.
+
+    width: of a picture, pixels.
+    """
+    capture, view = scene.labelled.capture, whole_view(scene)
+    small = view.resized(width / view.camera.width)
+    tiles = [
+        captioned(
+            scene.draw(frame, small, named=False),
+            f"frame {capture.first_frame + frame}",
+            f"{capture.times[frame]:.2f} s  ·  {_count_text(scene.labelled, frame)}",
+        )
+        for frame in frames
+    ]
+    grid = tile_grid(tiles, min(columns, len(tiles)))
+    subtitle = f"{len(capture)} frames, {capture.rate:g} Hz"
+    return framed(stacked([_headline(title, subtitle, grid.shape[1]), grid, _legend(grid.shape[1])], gap=10))
+
+
+def _count_text(labelled: LabelledCapture, frame: int) -> str:
+    measured = sum(int((columns[frame] >= 0).sum()) for columns in labelled.columns)
+    return f"{measured} of {sum(len(model.labels) for model in labelled.models)} markers"
 
 
 def fullest_frame(labelled: LabelledCapture) -> int:

@@ -20,7 +20,8 @@ _LEAST_SCALE = 2.0
 def residual_png(labelled: LabelledCapture, title: str) -> bytes:
     """Return a PNG file of the residuals over time.
 
-    A model has a line, the root mean square of its markers, and a row for each marker. A frame without the marker is grey.
+    A model has a line, the root mean square of its markers, and a row for each marker.
+    A frame without the marker is grey.
     """
     models = labelled.models
     heights = [_LINE + 0.25 + _ROW * len(model.labels) + 0.35 for model in models]

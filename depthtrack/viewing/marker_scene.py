@@ -12,6 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.pose import FINGERS, transformed
 from depthtrack.hand.shape import HandShape
+from depthtrack.markers.filled_capture import FilledCapture
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.rendering.rendered_surface import RenderedSurface
@@ -68,6 +69,11 @@ class MarkerScene:
     def of(cls, labelled: LabelledCapture) -> Self:
         """Return the scene of the measured markers."""
         return cls(labelled, tuple(labelled.positions(k) for k in range(len(labelled.models))))
+
+    @classmethod
+    def of_filled(cls, filled: FilledCapture) -> Self:
+        """Return the scene of the measured and filled markers."""
+        return cls(replace(filled.labelled, poses=filled.poses), filled.positions)
 
     @cached_property
     def rest(self) -> Array:

@@ -14,6 +14,7 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.marker_evaluation import MarkerEvaluation, MarkerTruth, evaluate_labelled
 from depthtrack.evaluation.metrics.markers import AngleErrors, PositionErrors, label_score
 from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.filled_capture import FilledCapture, Filling
 from depthtrack.markers.folder.contents import Source
 from depthtrack.markers.folder.writing import write_marker_folder
 from depthtrack.markers.formats.registry import write_capture
@@ -214,3 +215,32 @@ def test_other_frames_and_other_labels_are_rejected(synthetic: SyntheticMarkers)
     strange = MarkerCapture(200.0, ("x",), np.zeros((FRAMES, 1, 3)))
     with pytest.raises(InputError, match="has none of the labels"):
         evaluate_labelled(synthetic.truth, MarkerTruth("file", strange, strange, {}))
+
+
+def test_cut_samples_need_no_label_and_filled_ones_are_compared(synthetic: SyntheticMarkers) -> None:
+    columns, points = synthetic.truth.columns[0].copy(), synthetic.truth.capture.positions.copy()
+    seen = np.flatnonzero(columns[10:30, 4] >= 0) + 10
+    points[seen, columns[seen, 4]] = np.nan
+    columns[10:30, 4] = -1
+    cut = with_columns(replace(synthetic.truth, capture=replace(synthetic.truth.capture, positions=points)), 0, columns)
+    positions = [cut.positions(k) for k in range(len(cut.models))]
+    how = [np.where(c >= 0, Filling.MEASURED, Filling.GAP) for c in cut.columns]
+    expected = [np.full(c.shape, np.nan) for c in cut.columns]
+    positions[0][10:30, 4] = synthetic.positions[0][10:30, 4] + [0, 0.003, 0]
+    how[0][10:30, 4], expected[0][10:30, 4] = Filling.SMOOTHED, 0.002
+    filled = FilledCapture(cut, tuple(positions), tuple(how), tuple(expected), cut.poses)
+    found = evaluate_labelled(cut, truth_of(synthetic), filled=filled)
+    assert found.labels.recall == 1
+    report = found.to_json()["position_error_mm"]
+    assert report["by_way"] == {
+        "smoothed": {"samples": 20, **dict.fromkeys(("mean", "median", "p95", "max"), pytest.approx(3))}
+    }
+    assert report["filled_error_over_expected"] == pytest.approx(1.5)
+    assert [(gap["first"], gap["last"]) for gap in report["gaps"]] == [(10, 29)]
+
+
+def test_another_capture_of_the_same_labels_is_rejected(synthetic: SyntheticMarkers) -> None:
+    truth = truth_of(synthetic)
+    moved = replace(truth, samples=replace(truth.samples, positions=truth.samples.positions + 0.001))
+    with pytest.raises(InputError, match="another capture"):
+        evaluate_labelled(synthetic.truth, moved)

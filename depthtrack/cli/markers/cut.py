@@ -6,6 +6,8 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.markers.capture_options import CaptureOptions
+
 
 @dataclass(frozen=True)
 class Command:
@@ -14,8 +16,7 @@ class Command:
     Fill the result, and compare it with the capture: `depthtrack evaluate FOLDER --labels CAPTURE`.
     """
 
-    capture: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CAPTURE")]
-    """File of a labelled capture, of any format."""
+    capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
     frames: Annotated[tuple[int, int], tyro.conf.arg(metavar="FRAMES FRAMES")] = (16, 57)
@@ -28,12 +29,12 @@ class Command:
     def run(self) -> None:
         import numpy as np
 
-        from depthtrack.markers.formats.registry import read_capture, write_capture
+        from depthtrack.markers.formats.registry import write_capture
         from depthtrack.options import check_seed
         from depthtrack.synthesis.recorded_capture import cut_stretches
 
         check_seed(self.seed)
-        whole = read_capture(self.capture)
+        whole = self.capture.read()
         cut = cut_stretches(whole, self.frames, self.share / 100, self.seed)
         write_capture(self.out, cut)
         lost = int(np.isfinite(whole.positions[..., 0]).sum() - np.isfinite(cut.positions[..., 0]).sum())

@@ -1,4 +1,4 @@
-"""Text of the evaluation of a marker folder."""
+"""Texts of the evaluation of markers."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from depthtrack.evaluation.marker_evaluation import MarkerEvaluation
     from depthtrack.evaluation.metrics.markers import Mislabelling
+    from depthtrack.evaluation.metrics.trajectories import TrajectoryScore
 
 MOST_ERRORS = 20
 """Number of wrong stretches that the text lists; JSON has them all."""
@@ -14,6 +15,16 @@ MOST_ERRORS = 20
 def evaluation_text(evaluation: "MarkerEvaluation") -> str:
     """Return the table that `depthtrack evaluate` prints."""
     return "\n".join(_lines(evaluation))
+
+
+def trajectory_text(name: str, score: "TrajectoryScore") -> str:
+    """Return the text on trajectories that were linked without models."""
+    fragments = "-" if score.fragments is None else f"{score.fragments:.2f}"
+    return (
+        f"{name}: {score.trajectories} trajectories of {score.samples} samples, which have {score.stretches} stretches"
+        f" without a gap\n  recall {_percent(score.recall)}, purity {_percent(score.purity)},"
+        f" {score.switches} switches, {score.mixed} trajectories of several markers, {fragments} trajectories a marker"
+    )
 
 
 def _lines(evaluation: "MarkerEvaluation") -> Iterator[str]:

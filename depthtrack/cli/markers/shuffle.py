@@ -6,6 +6,8 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.markers.capture_options import CaptureOptions
+
 
 @dataclass(frozen=True)
 class Command:
@@ -14,19 +16,18 @@ class Command:
     Label the result, and compare it with the capture: `depthtrack evaluate FOLDER --labels CAPTURE`.
     """
 
-    capture: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CAPTURE")]
-    """File of a capture, of any format."""
+    capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
     seed: int = 0
     """Seed of the order."""
 
     def run(self) -> None:
-        from depthtrack.markers.formats.registry import read_capture, write_capture
+        from depthtrack.markers.formats.registry import write_capture
         from depthtrack.options import check_seed
         from depthtrack.synthesis.recorded_capture import strip_labels
 
         check_seed(self.seed)
-        shuffled = strip_labels(read_capture(self.capture), self.seed)
+        shuffled = strip_labels(self.capture.read(), self.seed)
         write_capture(self.out, shuffled)
         print(f"{self.out}: {len(shuffled)} frames of up to {len(shuffled.labels)} points without labels")

@@ -225,7 +225,7 @@ class PositionErrors:
 
 
 MEASURED = "measured"
-"""Word for positions that were measured."""
+"""Word of `PositionErrors.how` for positions that were measured."""
 
 
 @dataclass(frozen=True, eq=False)
