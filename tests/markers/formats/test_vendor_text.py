@@ -92,6 +92,17 @@ def test_motive_csv_takes_the_measured_markers(tmp_path: Path) -> None:
     assert capture.is_labelled.tolist() == [True, False]
 
 
+def test_vicon_csv_may_begin_with_blank_lines(tmp_path: Path) -> None:
+    assert len(read(tmp_path, "\n\n" + VICON).labels) == 3
+
+
+def test_motive_columns_without_axis_are_passed_over(tmp_path: Path) -> None:
+    lines = MOTIVE.splitlines()
+    lines[2:6] = [f"{line},Marker Quality,Marker Quality" for line in lines[2:6]]
+    lines[6:] = [lines[6] + ",,", lines[7] + ",0.9,0.8", lines[8]]
+    np.testing.assert_allclose(read(tmp_path, "\n".join(lines)).positions[0, 0], [0.12, 0.22, 0.32])
+
+
 def test_motive_csv_without_measured_markers_takes_the_solved_ones(tmp_path: Path) -> None:
     text = MOTIVE.replace(",Marker", ",Bone").replace("Rigid Body Bone", "Rigid Body Marker")
     capture = read(tmp_path, text)
