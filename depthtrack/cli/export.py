@@ -20,7 +20,7 @@ class Command:
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
     """Run folder from `depthtrack track`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
-    """File to write: a table, numpy arrays, or a benchmark's text (u v d of each joint in pixels and millimetres)."""
+    """File to write: a table, numpy arrays, angles for OpenSim (.mot), or a benchmark's text (u v d of joints)."""
     format: Annotated[str | None, stated_default(metavar="|".join(EXPORTERS))] = None
     """Format of the file (default: by its suffix). A .txt file needs the benchmark whose joints and camera it uses."""
 

@@ -1,4 +1,4 @@
-"""Initialisation in any posture, with unknown sizes, missing and ghost markers, and several models."""
+"""Initialisation in any posture, with unknown sizes, ghosts, and several models."""
 
 from functools import cache
 
@@ -11,7 +11,7 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import COUNT, prior_covariance, resized
 from depthtrack.markers.initialisation.assignment import assign_within
-from depthtrack.markers.initialisation.fingers import FingerTables
+from depthtrack.markers.initialisation.finger_tables import FingerTables
 from depthtrack.markers.initialisation.initialise import initialise
 from depthtrack.markers.initialisation.options import SearchOptions
 from depthtrack.markers.initialisation.palms import (

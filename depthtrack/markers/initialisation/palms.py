@@ -1,4 +1,4 @@
-"""Hypotheses of the palm: positions and orientations at which markers of the hand meet points.
+"""Palms to search fingers on: positions and orientations at which markers meet points.
 
 Two sources. Three markers of the palm and three points with similar distances determine a palm. And typical postures,
 turned in many ways, are aligned to the points by iterative closest points, which needs no marker of the palm.
@@ -44,7 +44,9 @@ def palms_of_triples(model: MarkerModel, deviation: Array, points: Array) -> Arr
 
 @compiled(nogil=True)
 def match_triples(offsets: Array, triples: Index, deviation: Array, points: Array, found: Array) -> int:
-    """Write the transforms of all triples whose three distances agree within three deviations; return their number.
+    """Write the transforms of all triples with similar distances; return their number.
+
+    Distances agree within three deviations.
 
     offsets: (M, 3) metres, palm frame. triples: (N, 3) markers. points: (K, 3) metres. found: (P, 3, 4).
     """
@@ -89,7 +91,7 @@ def match_triples(offsets: Array, triples: Index, deviation: Array, points: Arra
 
 @compiled(nogil=True)
 def triangle_frame(a: Array, b: Array, c: Array, axes: Array) -> bool:
-    """Write the axes of a triangle as rows of `axes` (3, 3); return False if its corners are on a line.
+    """Write the axes of a triangle as rows (3, 3); return False if it has no area.
 
     The first axis bisects the direction of the edge a-b and that of the median from c, so that each corner counts.
     """
@@ -134,7 +136,7 @@ def spread_quaternions(count: int) -> Array:
 
 
 def neighbourhood_centres(points: Array, size: int) -> Array:
-    """Return the centres (C, 3), metres, of the `size` points nearest to each point; similar ones once."""
+    """Return the centres (C, 3), metres, of the `size` points nearest to each point, once each."""
     D = np.linalg.norm(points[:, None] - points, axis=-1)
     nearest = np.argsort(D, axis=1, kind="stable")[:, :size]
     spread = np.take_along_axis(D, nearest, axis=1).sum(axis=1)
@@ -148,9 +150,10 @@ def neighbourhood_centres(points: Array, size: int) -> Array:
 
 @compiled(nogil=True)
 def align_postures(shapes: Array, R: Array, centres: Array, points: Array, found: Array) -> None:
-    """Write the transform (3, 4) of each shape, rotation and centre after a few ICP steps to `found`.
+    """Write the transform of each shape, rotation and centre after a few ICP steps.
 
     shapes: (S, M, 3) palm frame. R: (N, 3, 3). centres: (C, 3). points: (K, 3).
+    found: (S C N, 3, 4).
     """
     M, K, n = shapes.shape[1], points.shape[0], 0
     nearest = np.empty(M, np.int64)
@@ -187,7 +190,10 @@ def align_postures(shapes: Array, R: Array, centres: Array, points: Array, found
 
 @compiled(nogil=True)
 def align_to(shape: Array, points: Array, nearest: Index, T: Array) -> None:
-    """Write the transform of the least squares alignment of shape (M, 3) to its points to T (3, 4); Kabsch 1976."""
+    """Write the least squares alignment of shape (M, 3) to its points to T (3, 4).
+
+    Source: Kabsch, Acta Cryst. A32, 1976.
+    """
     M = shape.shape[0]
     p, q, C = np.zeros(3), np.zeros(3), np.zeros((3, 3))
     for i in range(M):

@@ -1,4 +1,7 @@
-"""Rigid bodies by their exact distances: patterns of three and more markers, some of which may be missing."""
+"""Rigid bodies by their exact distances: patterns of three and more markers.
+
+Markers may be missing, as long as three have points.
+"""
 
 from itertools import combinations
 
@@ -21,7 +24,9 @@ _ROUNDS = 4
 
 
 def body_hypotheses(fitter: SizedFitter, points: Array, options: SearchOptions) -> list[Hypothesis]:
-    """Return different assignments of a rigid body, the most probable first; none for fewer than three markers.
+    """Return different assignments of a rigid body, the most probable first.
+
+    There is none for fewer than three markers.
 
     points: (K, 3) metres. A symmetric pattern has several assignments of the same energy.
     """
@@ -48,7 +53,7 @@ def _score(fitter: SizedFitter, places: Array, points: Array, missing: float) ->
 
 
 def _fitted(fitter: SizedFitter, places: Array, points: Array, missing: float) -> Hypothesis | None:
-    """Return the hypothesis that alternating assignment and alignment reach, if three markers have points."""
+    """Return what alternating assignment and alignment reach; None below three points."""
     model, assigned = fitter.model, np.full(len(places), -1)
     for _ in range(_ROUNDS):
         square = np.square(places[:, None] - points).sum(axis=-1)

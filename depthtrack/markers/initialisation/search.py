@@ -1,5 +1,6 @@
-"""Initialisation beyond the paper: any posture, unknown sizes, missing and ghost markers, hands that touch.
+"""Initialisation beyond the paper: any posture, any size, and several models.
 
+Markers may be missing, points may be ghosts, and hands may touch.
 Rigid bodies come first, because their distances are exact. Each hand is then searched among all other points. If two
 hands claim the same points, each is searched again without the points of the other, and the more probable pair is kept.
 """
@@ -10,7 +11,8 @@ from itertools import permutations
 
 import numpy as np
 
-from depthtrack.markers.initialisation.hypotheses import HandSearch, Hypothesis
+from depthtrack.markers.initialisation.hand_search import HandSearch
+from depthtrack.markers.initialisation.hypotheses import Hypothesis
 from depthtrack.markers.initialisation.options import SearchOptions
 from depthtrack.markers.initialisation.rigid_bodies import body_hypotheses
 from depthtrack.markers.initialisation.started import StartedModel
@@ -35,7 +37,7 @@ class ModelSearch:
         """Return the search for a model."""
         prior = PosturePrior.from_synergies(options.widening, options.residual)
         fitter = SizedFitter(model, options.noise, prior)
-        return ModelSearch(fitter, None if model.is_rigid else HandSearch.of(fitter, options), options)
+        return ModelSearch(fitter, None if model.is_rigid else HandSearch(fitter, options), options)
 
     def hypotheses(self, points: Array, allowed: Mask) -> list[Hypothesis]:
         """Return different assignments to some of the points (K, 3), the most probable first."""
@@ -94,7 +96,7 @@ def _hands(hands: list[int], searches: list[ModelSearch], points: Array, free: M
 
 
 def _disjoint(found: dict[int, list[Hypothesis]], searches: list[ModelSearch]) -> dict[int, list[Hypothesis]]:
-    """Return the hypotheses with those first whose combination has the least energy without common points."""
+    """Return the hypotheses, the best combination without common points first."""
     keys = list(found)
 
     def combined(n: int, taken: frozenset[int]) -> Iterator[tuple[float, tuple[int, ...]]]:
