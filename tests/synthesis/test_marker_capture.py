@@ -152,6 +152,10 @@ def test_shuffled_points_are_found_at_their_columns(frames: int, markers: int, s
     assert np.isfinite(shuffled).sum() == np.isfinite(points).sum()
 
 
+def test_a_random_motion_lasts_five_seconds_by_default() -> None:
+    assert len(made(motion="random", frames=None, rate=20).capture) == 100
+
+
 def test_the_start_in_the_motion_shifts_it() -> None:
     early, late = made(errors=NO_ERRORS), made(errors=NO_ERRORS, start=0.5, frames=100)
     np.testing.assert_allclose(late.truth.poses[0], early.truth.poses[0][100:], atol=1e-12)
