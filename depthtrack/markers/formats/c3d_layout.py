@@ -113,8 +113,9 @@ def read_layout(head: bytes, length: int, where: str) -> Layout:
         if points > 0 and analogs >= 0 and start > section
     }
     sizes, notes = _chosen(found, length, where)
-    if 0 in counts:
-        notes += (f"the header counts to {_HEADER_FRAMES:,}; the file is long enough for {sizes.frames:,} frames",)
+    if sizes.frames > _HEADER_FRAMES:
+        source = "the file is long enough for" if 0 in counts else "the parameters state"
+        notes += (f"the header counts to {_HEADER_FRAMES:,}; {source} {sizes.frames:,} frames",)
     check_dimensions(sizes.frames, sizes.points, where)
     length_of_unit = scales[-1] if np.isfinite(scales[-1]) else 1.0
     return Layout(sizes, parameters, header, first_frame, abs(length_of_unit), 0 in counts, notes)

@@ -1,4 +1,4 @@
-"""Markers as a function of the pose and of the sizes of the hand, compiled, with its exact Jacobian.
+"""Markers as a function of the pose and of the hand's sizes, with its exact Jacobian.
 
 The sizes are the 35 parameters of `hand.size_parameters`, relative to the hand of the model. A marker moves with the
 skin: its offset stretches along the bone with the length, across it with the width, and on the palm with the palm.
@@ -43,7 +43,7 @@ class SizedMarkers(NamedTuple):
 
     @staticmethod
     def of(model: MarkerModel) -> "SizedMarkers":
-        """Return the markers of a model, with its own sizes; those of a rigid body are on the palm of any hand."""
+        """Return the markers of a model; those of a rigid body are on the palm of any hand."""
         hand = HandShape() if model.hand is None else model.hand
         chain = Chain.of(hand)
         return SizedMarkers(
@@ -90,7 +90,10 @@ def set_sizes(markers: SizedMarkers, sizes: Array) -> None:
 
 @compiled(nogil=True)
 def place_markers(markers: SizedMarkers, bodies: BodyPoses, pose: Array, out: Array) -> None:
-    """Write the markers (M, 3), metres, capture frame, of a pose (27,) to `out`; `bodies` receives the hand."""
+    """Write the markers of a pose (27,) to `out` (M, 3), metres, capture frame.
+
+    bodies: receive the hand.
+    """
     forward_kinematics(markers.chain, pose, bodies)
     for i in range(markers.bodies.shape[0]):
         T, x = bodies.T[markers.bodies[i]], markers.local[i]

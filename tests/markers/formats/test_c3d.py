@@ -98,6 +98,7 @@ def test_more_frames_than_the_header_counts(tmp_path: Path, how: str, last: int)
     found = read(tmp_path, C3dFile(stored, ("a",), first_frame=7, extra=LONG_COUNTS[how], header={5: last}))
     assert (len(found), found.first_frame) == (70000, 7)
     assert "the first frame in the file is 7" in found.notes
+    assert "the header counts to 65,535" in found.notes[0]
 
 
 @pytest.mark.parametrize("header", [{2: 2}, {5: 3}, {9: 4}, {3: 1}])
