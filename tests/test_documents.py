@@ -28,7 +28,7 @@ OTHER_OPTIONS = {"check", "help", "only"}
 def command_line_options() -> set[str]:
     """Return all options of the commands, as their dataclasses and the configurations state them."""
     found = set(OTHER_OPTIONS)
-    for path in (ROOT / "depthtrack" / "cli").glob("*.py"):
+    for path in (ROOT / "depthtrack" / "cli").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
                 found.add(node.target.id.replace("_", "-"))

@@ -1,4 +1,4 @@
-"""A capture whose points are assigned to the markers of models: labels and poses of every frame."""
+"""A capture with labels and poses: its points are assigned to the markers of models."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,9 @@ from depthtrack.types import Array, Index
 
 @dataclass(frozen=True, eq=False)
 class LabelledCapture:
-    """Labels and poses of models in a capture. The tuples have an entry for each model, with M markers each.
+    """Labels and poses of models in a capture.
+
+    The tuples have an entry for each model; model k has M markers.
 
     columns: (T, M) trajectory of the capture that holds the marker in each frame; -1 if it was not measured.
     poses: (T, 27) capture frame, metres and radians; NaN while a model is lost.
@@ -31,11 +33,11 @@ class LabelledCapture:
         return np.where((chosen >= 0)[..., None], self.capture.positions[rows, np.maximum(chosen, 0)], np.nan)
 
     def residuals(self, k: int) -> Array:
-        """Return the distance (T, M) of the measured markers of model k from those of its pose, metres."""
+        """Return the distances (T, M), metres, of measured markers of model k from its pose."""
         return np.asarray(np.linalg.norm(self.positions(k) - self.models[k].positions(self.poses[k]), axis=-1))
 
     def labels(self, k: int) -> tuple[str, ...]:
-        """Return the labels of model k, with the model's name before them if there are several models."""
+        """Return the labels of model k, after its name and a colon if there are several models."""
         model = self.models[k]
         return tuple(f"{model.name}:{label}" if len(self.models) > 1 else label for label in model.labels)
 

@@ -13,11 +13,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
-from depthtrack.calibration.parameters import SCALE, hand_of, prior_covariance
 from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.rows import Cell
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import SCALE, hand_of, prior_covariance
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import Sequence
 from depthtrack.synthesis.generate import SensorName, Synthesis, Synthesiser, write_recording

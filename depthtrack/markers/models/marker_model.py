@@ -16,6 +16,7 @@ from depthtrack.files import compact_json, read_json
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.size_parameters import COUNT
 from depthtrack.types import Array, Index
 
 MAX_MARKERS = 256
@@ -33,6 +34,7 @@ class MarkerModel:
     offsets: (M, 3) metres, frame of the body.
     spread: (M,) metres, standard deviation of the offsets.
     hand: sizes of the hand; None for a rigid body.
+    size_spread: (35,) standard deviation of these sizes, see `hand.size_parameters`; None if they are not measured.
 
     Raises:
         InputError: if the fields do not agree, or a number is out of range.
@@ -44,6 +46,7 @@ class MarkerModel:
     offsets: Array
     spread: Array
     hand: HandShape | None = None
+    size_spread: Array | None = None
 
     def __post_init__(self) -> None:
         count = len(self.labels)
@@ -60,6 +63,8 @@ class MarkerModel:
             raise InputError(f"markers of '{self.name}' must be on bodies 0 to {largest}, found {bodies.max()}")
         if not np.all(np.abs(offsets) <= _FARTHEST) or not np.all((spread >= 0) & (spread <= _FARTHEST)):
             raise InputError(f"offsets of markers must be below {_FARTHEST:g} m: is the file in millimetres?")
+        if self.size_spread is not None:
+            object.__setattr__(self, "size_spread", _checked_size_spread(self.size_spread))
         for name, array in (("bodies", bodies), ("offsets", offsets), ("spread", spread)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -75,31 +80,41 @@ class MarkerModel:
         return HandModel(HandShape() if self.hand is None else self.hand)
 
     def positions(self, poses: ArrayLike) -> Array:
-        """Return the markers (..., M, 3), metres, capture frame, of poses (..., 27). Source: Maycock 2015, s(theta)."""
+        """Return the markers (..., M, 3), metres, capture frame, of poses (..., 27).
+
+        Source: Maycock et al. 2015, s(theta) in Eq. (4).
+        """
         return self.kinematics.transform_points(poses, self.bodies, self.offsets)
 
     def with_(self, **changes: Any) -> Self:
-        """Return a copy with some fields replaced and all checked again. Raises InputError as the constructor does."""
+        """Return a copy with some fields replaced and all checked again.
+
+        Raises:
+            InputError: as the constructor does.
+        """
         return replace(self, **changes)
 
     def to_json(self) -> str:
         """Return the text of the model's file, lengths in millimetres."""
+        return compact_json(self.to_fields())
+
+    def to_fields(self) -> dict[str, Any]:
+        """Return the contents of the model's file, lengths in millimetres."""
         rows = zip(self.labels, self.bodies, self.offsets, self.spread, strict=True)
-        return compact_json(
-            {
-                "name": self.name,
-                "markers": [
-                    {
-                        "label": label,
-                        "body": int(body),
-                        "offset_mm": np.round(offset * 1000, 6).tolist(),
-                        "spread_mm": round(float(spread) * 1000, 6),
-                    }
-                    for label, body, offset, spread in rows
-                ],
-                **({} if self.hand is None else {"hand": self.hand.to_fields()}),
-            }
-        )
+        return {
+            "name": self.name,
+            "markers": [
+                {
+                    "label": label,
+                    "body": int(body),
+                    "offset_mm": np.round(offset * 1000, 6).tolist(),
+                    "spread_mm": round(float(spread) * 1000, 6),
+                }
+                for label, body, offset, spread in rows
+            ],
+            **({} if self.hand is None else {"hand": self.hand.to_fields()}),
+            **({} if self.size_spread is None else {"size_spread": np.round(self.size_spread, 6).tolist()}),
+        }
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
@@ -126,4 +141,13 @@ class MarkerModel:
             offsets=np.array([row["offset_mm"] for row in rows], dtype=np.float64).reshape(-1, 3) / 1000,
             spread=np.array([float(row.get("spread_mm", 0.0)) for row in rows]) / 1000,
             hand=None if fields.get("hand") is None else HandShape.from_fields(fields["hand"]),
+            size_spread=None if fields.get("size_spread") is None else np.array(fields["size_spread"], np.float64),
         )
+
+
+def _checked_size_spread(values: Array) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != (COUNT,) or not np.all((array >= 0) & (array <= 1)):
+        raise InputError(f"the spread of the sizes must be {COUNT} numbers from 0 to 1, found shape {array.shape}")
+    array.flags.writeable = False
+    return array
