@@ -1,10 +1,11 @@
 """A capture with labels and poses: its points are assigned to the markers of models."""
 
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
-from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.capture import UNLABELLED, MarkerCapture
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Index
 
@@ -46,3 +47,19 @@ class LabelledCapture:
         labels = tuple(label for k in range(len(self.models)) for label in self.labels(k))
         positions = np.concatenate([self.positions(k) for k in range(len(self.models))], axis=1)
         return replace(self.capture, labels=labels, positions=positions, residuals=None, notes=())
+
+    def rest(self) -> MarkerCapture:
+        """Return the capture of the points without a label.
+
+        A trajectory keeps its own label unless a marker has it; it is unlabelled then.
+        """
+        positions = self.capture.positions.copy()
+        for columns in self.columns:
+            frames, markers = np.nonzero(columns >= 0)
+            positions[frames, columns[frames, markers]] = np.nan
+        left = np.flatnonzero(np.isfinite(positions).all(axis=-1).any(axis=0))
+        taken = {label for k in range(len(self.models)) for label in self.labels(k)}
+        named = [self.capture.labels[column] for column in left]
+        free = (label for n in count(1) if (label := f"{UNLABELLED}{n}") not in self.capture.labels)
+        labels = tuple(next(free) if label in taken else label for label in named)
+        return replace(self.capture, labels=labels, positions=positions[:, left], residuals=None, notes=())

@@ -10,6 +10,8 @@ from depthtrack.types import Array
 
 MAX_SAMPLES = 1 << 25
 """Largest number of frames times trajectories: an hour of 46 markers at 200 Hz."""
+FARTHEST = 1e7
+"""Largest coordinate, any unit."""
 MAX_TRAJECTORIES = 65_535
 """Largest number of trajectories, the limit of C3D."""
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import check_size
-from depthtrack.markers.formats.stored_capture import MAX_SAMPLES, check_dimensions
+from depthtrack.markers.formats.stored_capture import FARTHEST, MAX_SAMPLES, check_dimensions
 from depthtrack.types import Array, Index
 
 MAX_BYTES = 1 << 31
 """Largest text file read."""
 _LONGEST_LINE = 1 << 23
 """Bytes of a line at most: 65,535 trajectories with 40 bytes a number."""
-_FARTHEST = 1e7
-"""Largest coordinate, any unit."""
 
 Line = tuple[int, str]
 """A line's number from 1, and its text without the end of line."""
@@ -83,11 +81,11 @@ def read_rows(lines: Iterable[Line], separator: str, key_count: int, trajectorie
             check_dimensions(len(places), trajectories, f"{path}, line {number}")
     check_dimensions(len(places), trajectories, str(path))
     table, line_numbers = np.frombuffer(values).reshape(-1, width), np.frombuffer(places, dtype=np.int64)
-    wrong = np.argwhere(np.abs(table) > _FARTHEST)
+    wrong = np.argwhere(np.abs(table) > FARTHEST)
     if len(wrong):
         row, column = wrong[0]
         raise InputError(
-            f"{path}, line {line_numbers[row]}, cell {column + 1}: expected a number below {_FARTHEST:g},"
+            f"{path}, line {line_numbers[row]}, cell {column + 1}: expected a number below {FARTHEST:g},"
             f" found {table[row, column]:g}"
         )
     return Rows(table[:, :key_count], table[:, key_count:].reshape(len(table), trajectories, 3), line_numbers)
@@ -155,7 +153,7 @@ def timing(
 def positive_number(text: str, what: str) -> float:
     """Return the number of a header, such as a rate; `what` has its place. Raises InputError unless it is above 0."""
     value = _float(text)
-    if not 0 < value < _FARTHEST:
+    if not 0 < value < FARTHEST:
         raise InputError(f"{what} must be a number above 0, found {text[:40]!r}")
     return value
 

@@ -35,7 +35,7 @@ _FARTHEST = 0.06
 """Largest distance of a marker from its bone, metres, in a hand of scale 1."""
 _STEP = 0.0005
 """Distance of the samples that bracket the skin, metres."""
-_HALVINGS = 30
+_SECANTS = 4
 
 
 @dataclass(frozen=True)
@@ -212,11 +212,15 @@ def _crossings(solid: ImplicitHand, starts: Array, directions: Array, radius: fl
     """
     t = np.arange(0, _FARTHEST, _STEP)
     points = starts[:, None] + t[:, None] * directions[:, None]
-    outside = solid.distance(points.reshape(-1, 3)).reshape(len(starts), -1) > radius
-    first = np.argmax(outside, axis=1)
-    low, high = t[np.maximum(first - 1, 0)], t[first]
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        out = solid.distance(starts + middle[:, None] * directions) > radius
-        low, high = np.where(out, low, middle), np.where(out, middle, high)
-    return np.where(first > 0, high, np.nan)
+    beyond = solid.distance(points.reshape(-1, 3)).reshape(len(starts), -1) - radius
+    first = np.argmax(beyond > 0, axis=1)
+    rays, before = np.arange(len(starts)), np.maximum(first - 1, 0)
+    low, high, below, above = t[before], t[first], beyond[rays, before], beyond[rays, first]
+    # The distance is all but linear along so short a bracket.
+    for _ in range(_SECANTS):
+        found = low - below * (high - low) / np.where(first > 0, above - below, 1)
+        value = solid.distance(starts + found[:, None] * directions) - radius
+        out = value > 0
+        low, below = np.where(out, low, found), np.where(out, below, value)
+        high, above = np.where(out, found, high), np.where(out, value, above)
+    return np.where(first > 0, found, np.nan)
