@@ -4,6 +4,7 @@ import numpy as np
 
 from depthtrack.compilation import compiled
 from depthtrack.markers.labelling.hungarian import assign_rows
+from depthtrack.markers.labelling.prediction import mahalanobis
 from depthtrack.markers.labelling.scene import Scene
 from depthtrack.markers.labelling.state import FrameLabels, Settings, TrackState
 from depthtrack.types import Array
@@ -68,15 +69,12 @@ def _assign_likely(points: Array, scene: Scene, settings: Settings, state: Track
         if not state.active[g]:
             continue
         for i in range(scene.first[g], scene.first[g + 1]):
-            p, variance = out.expected[i], out.deviation[i] ** 2
             odds = settings.seen_again if state.missing[i] == 0 else settings.reappears
-            best = odds - settings.clutter - 1.5 * np.log(2 * np.pi * variance)
-            reach = 2 * variance * best
+            best = odds - settings.clutter + out.peak[i]
             for j in range(K):
-                x, y, z = points[j, 0] - p[0], points[j, 1] - p[1], points[j, 2] - p[2]
-                square = x * x + y * y + z * z
-                if square < reach:
-                    score[i, j] = best - 0.5 * square / variance
+                value = best - 0.5 * mahalanobis(out.precision[i], out.expected[i], points[j])
+                if value > 0:
+                    score[i, j] = value
                     in_row[i] += 1
                     in_column[j] += 1
                     only[i] = j

@@ -8,7 +8,7 @@ from depthtrack.compilation import compiled
 from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.markers.labelling.pose_fit import PoseFit, fit_pose
-from depthtrack.markers.labelling.prediction import model_deviation
+from depthtrack.markers.labelling.prediction import model_precision
 from depthtrack.markers.labelling.scene import Scene, place_markers
 from depthtrack.markers.labelling.state import Settings
 from depthtrack.markers.labelling.step import determined_angles
@@ -22,29 +22,51 @@ class FittedFrames(NamedTuple):
     determined: (T, G, 20) whether each angle moves a visible marker.
     loose: (T, G) whether fewer than three markers are visible.
     residuals: (T, M, 3) of the visible markers in the frames of their bodies, metres; NaN if missing.
+    usual: (M, 3) median of those, metres.
+    scatter: (M,) standard deviation of them about it in one coordinate, metres.
     """
 
     poses: Array
     determined: Mask
     loose: Mask
     residuals: Array
+    usual: Array
+    scatter: Array
 
 
-def fit_capture(positions: Array, labels: Index, scene: Scene, settings: Settings, starts: Array) -> FittedFrames:
+def fit_capture(
+    positions: Array, labels: Index, scene: Scene, settings: Settings, starts: Array, last: FittedFrames | None = None
+) -> FittedFrames:
     """Return the poses that fit the labelled points; angles without a visible marker are interpolated in time.
 
     positions: (N, 3) metres.
     labels: (T, M) numbers of points; -1 for a missing marker.
     starts: (T, G, 27) poses near the solution; NaN where a model is not tracked.
+    last: an earlier fit, whose usual residuals say which points are outliers.
     """
     T, G = starts.shape[:2]
     poses = np.ascontiguousarray(starts).copy()
     determined, loose = np.zeros((T, G, 20), np.bool_), np.zeros((T, G), np.bool_)
     residuals = np.full((*labels.shape, 3), np.nan)
-    _fit_frames(positions, labels, scene, settings, poses, determined, loose, residuals)
+    M = labels.shape[1]
+    usual = np.zeros((M, 3)) if last is None else last.usual
+    scatter = np.maximum(scene.spread, settings.least_spread) if last is None else last.scatter
+    _fit_frames(positions, labels, scene, settings, poses, usual, scatter, determined, loose, residuals)
     for g in range(G):
         _interpolate(poses[:, g], determined[:, g], loose[:, g])
-    return FittedFrames(poses, determined, loose, residuals)
+    return FittedFrames(poses, determined, loose, residuals, *_usual_residuals(residuals, scene, settings))
+
+
+def _usual_residuals(residuals: Array, scene: Scene, settings: Settings) -> tuple[Array, Array]:
+    """Return the median (M, 3) of residuals and their standard deviation (M,) about it, robustly."""
+    M = residuals.shape[1]
+    usual, scatter = np.zeros((M, 3)), np.maximum(scene.spread, settings.least_spread)
+    for i in range(M):
+        seen = residuals[np.isfinite(residuals[:, i, 0]), i]
+        if len(seen) >= settings.familiar:
+            usual[i] = np.median(seen, axis=0)
+            scatter[i] = max(1.4826 * float(np.median(np.abs(seen - usual[i]))), settings.least_spread)
+    return usual, scatter
 
 
 def _interpolate(poses: Array, determined: Mask, loose: Mask) -> None:
@@ -74,6 +96,8 @@ def _fit_frames(
     scene: Scene,
     settings: Settings,
     poses: Array,
+    usual: Array,
+    scatter: Array,
     determined: Mask,
     loose: Mask,
     residuals: Array,
@@ -105,9 +129,11 @@ def _fit_frames(
                 outliers = False
                 for i in range(scene.first[g], scene.first[g + 1]):
                     if labels[t, i] >= 0:
-                        spread = np.sqrt(max(scene.spread[i], settings.least_spread) ** 2 + 3 * settings.noise**2)
-                        x, y, z = targets[i] - placed[i]
-                        share = np.sqrt(x * x + y * y + z * z) / (settings.robust * spread)
+                        R, e, square = bodies.T[scene.body[i]], usual[i], 0.0
+                        for r in range(3):
+                            kept = R[r, 0] * e[0] + R[r, 1] * e[1] + R[r, 2] * e[2]
+                            square += (targets[i, r] - placed[i, r] - kept) ** 2
+                        share = np.sqrt(square / (scatter[i] ** 2 + 3 * settings.noise**2)) / settings.robust
                         weights[i] = 1 / (1 + share * share) ** 2
                         outliers |= share > 1.0
                 if not outliers:
@@ -126,52 +152,48 @@ class ExpectedFrames(NamedTuple):
     """Where markers are expected from the other frames and markers.
 
     position: (T, M, 3) metres; NaN where the model is not tracked.
-    deviation: (T, M) standard deviation in one coordinate, metres.
+    precision: (T, M, 3, 3) inverse of its covariance, 1/m^2.
+    peak: (T, M) logarithm of the normal density at the expected position, 1/m^3.
     """
 
     position: Array
-    deviation: Array
+    precision: Array
+    peak: Array
 
 
 def expect_markers(fitted: FittedFrames, scene: Scene, settings: Settings) -> ExpectedFrames:
-    """Return the places of all markers on the fitted models, with the residuals of the nearest frames."""
+    """Return the places of all markers on the fitted models, with their usual residuals."""
     T, M = fitted.residuals.shape[:2]
-    residuals, limit = np.zeros((T, M, 3)), 3 * np.maximum(scene.spread, settings.least_spread)
-    frames = np.arange(T)
     absent = np.zeros((T, M), np.int64)
     for i in range(M):
-        seen = np.flatnonzero(np.isfinite(fitted.residuals[:, i, 0]))
-        absent[:, i] = _frames_to_nearest(seen, T)
-        for r in range(3):
-            if len(seen):
-                kept = np.clip(fitted.residuals[seen, i, r], -limit[i], limit[i])
-                residuals[:, i, r] = np.interp(frames, seen, kept)
+        absent[:, i] = _frames_to_nearest(np.isfinite(fitted.residuals[:, i, 0]))
     undetermined = np.zeros(fitted.determined.shape, np.int64)
     loose = np.zeros(fitted.loose.shape, np.int64)
     for g in range(loose.shape[1]):
-        loose[:, g] = _frames_to_nearest(np.flatnonzero(~fitted.loose[:, g]), T)
+        loose[:, g] = _frames_to_nearest(~fitted.loose[:, g])
         for a in range(20):
-            undetermined[:, g, a] = _frames_to_nearest(np.flatnonzero(fitted.determined[:, g, a]), T)
-    out = ExpectedFrames(np.full((T, M, 3), np.nan), np.full((T, M), np.nan))
-    _expect(fitted.poses, residuals, absent, undetermined, loose, scene, settings, out)
+            undetermined[:, g, a] = _frames_to_nearest(fitted.determined[:, g, a])
+    out = ExpectedFrames(np.full((T, M, 3), np.nan), np.zeros((T, M, 3, 3)), np.zeros((T, M)))
+    _expect(fitted.poses, fitted.usual, fitted.scatter, absent, undetermined, loose, scene, settings, out)
     return out
 
 
-def _frames_to_nearest(known: Index, count: int) -> Index:
-    """Return the distance (count,) of each frame to the nearest of some frames; 1000 if there is none."""
-    frames = np.arange(count)
-    if len(known) == 0:
-        return np.full(count, 1000)
-    after = np.searchsorted(known, frames)
-    ahead = known[np.minimum(after, len(known) - 1)]
-    behind = known[np.maximum(after - 1, 0)]
+def _frames_to_nearest(known: Mask) -> Index:
+    """Return the distance (T,) of each frame to the nearest one of a mask (T,); 1000 if there is none."""
+    frames, chosen = np.arange(len(known)), np.flatnonzero(known)
+    if len(chosen) == 0:
+        return np.full(len(known), 1000)
+    after = np.searchsorted(chosen, frames)
+    ahead = chosen[np.minimum(after, len(chosen) - 1)]
+    behind = chosen[np.maximum(after - 1, 0)]
     return np.minimum(np.abs(ahead - frames), np.abs(frames - behind))
 
 
 @compiled(nogil=True)
 def _expect(
     poses: Array,
-    residuals: Array,
+    usual: Array,
+    scatter: Array,
     absent: Index,
     undetermined: Index,
     loose: Index,
@@ -187,9 +209,18 @@ def _expect(
                 continue
             place_markers(scene, g, poses[t, g], bodies, placed)
             for i in range(scene.first[g], scene.first[g + 1]):
-                T, e = bodies.T[scene.body[i]], residuals[t, i]
+                T, e = bodies.T[scene.body[i]], usual[i]
                 for r in range(3):
                     out.position[t, i, r] = placed[i, r] + T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2]
-                out.deviation[t, i] = model_deviation(
-                    scene, settings, i, bodies, placed[i], absent[t, i], undetermined[t, g], loose[t, g]
+                out.peak[t, i] = model_precision(
+                    scene,
+                    settings,
+                    i,
+                    bodies,
+                    placed[i],
+                    scatter[i],
+                    absent[t, i],
+                    undetermined[t, g],
+                    loose[t, g],
+                    out.precision[t, i],
                 )

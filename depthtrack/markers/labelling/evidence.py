@@ -6,11 +6,14 @@ from depthtrack.compilation import compiled
 from depthtrack.markers.labelling.capture_fit import ExpectedFrames
 from depthtrack.markers.labelling.hungarian import assign_rows
 from depthtrack.markers.labelling.packed import PackedPoints
+from depthtrack.markers.labelling.prediction import mahalanobis
 from depthtrack.markers.labelling.state import Settings
-from depthtrack.types import Array, Index
+from depthtrack.types import Array, Index, Mask
 
 LEAST, MOST = -20.0, 12.0
 """Limits of the log-likelihood ratio of one frame: no single frame decides."""
+CONTEST = -10.0
+"""Log-likelihood ratio from which on a point contests a label."""
 
 
 def tracklet_evidence(points: PackedPoints, tracklet: Index, expected: ExpectedFrames, settings: Settings) -> Array:
@@ -27,13 +30,45 @@ def _add_evidence(
     for n in range(position.shape[0]):
         t, k = frame[n], tracklet[n]
         for i in range(out.shape[1]):
-            p, variance = expected.position[t, i], expected.deviation[t, i] ** 2
-            if np.isnan(p[0]):
+            if np.isnan(expected.position[t, i, 0]):
                 out[k, i] += LEAST
                 continue
-            x, y, z = position[n, 0] - p[0], position[n, 1] - p[1], position[n, 2] - p[2]
-            ratio = -clutter - 1.5 * np.log(2 * np.pi * variance) - 0.5 * (x * x + y * y + z * z) / variance
+            square = mahalanobis(expected.precision[t, i], expected.position[t, i], position[n])
+            ratio = expected.peak[t, i] - clutter - 0.5 * square
             out[k, i] += min(max(ratio, LEAST), MOST)
+
+
+def contested(points: PackedPoints, tracklet: Index, labels: Index, expected: ExpectedFrames, clutter: float) -> Mask:
+    """Return whether each tracklet (K,) holds a marker that a point without a label could be in most of its frames.
+
+    The fit follows the points that it is given. So a ghost with a label makes the true point unlikely.
+    """
+    labelled = np.zeros(len(points.position), np.bool_)
+    labelled[labels[labels >= 0]] = True
+    doubtful = np.zeros(len(points.position), np.bool_)
+    _find_contested(points.position, points.frame, labels, labelled, expected, clutter, doubtful)
+    return np.asarray(2 * np.bincount(tracklet, weights=doubtful) > np.bincount(tracklet))
+
+
+@compiled(nogil=True)
+def _find_contested(
+    position: Array,
+    frame: Index,
+    labels: Index,
+    labelled: Mask,
+    expected: ExpectedFrames,
+    clutter: float,
+    out: Mask,
+) -> None:
+    for n in range(position.shape[0]):
+        if labelled[n]:
+            continue
+        t = frame[n]
+        for i in range(labels.shape[1]):
+            if labels[t, i] >= 0 and not np.isnan(expected.position[t, i, 0]):
+                square = mahalanobis(expected.precision[t, i], expected.position[t, i], position[n])
+                if expected.peak[t, i] - clutter - 0.5 * square > CONTEST:
+                    out[labels[t, i]] = True
 
 
 def assign_tracklets(points: PackedPoints, tracklet: Index, evidence: Array) -> Index:
@@ -45,21 +80,24 @@ def assign_tracklets(points: PackedPoints, tracklet: Index, evidence: Array) -> 
     K, M = evidence.shape
     votes = np.zeros((K, M), np.int64)
     _vote(points.ends, tracklet, evidence, votes)
-    marker = np.full(K, -1, np.int64)
     frames = np.bincount(tracklet, minlength=K)
+    pairs = np.argwhere(2 * votes > frames[:, None])
+    order = np.argsort(-votes[tuple(pairs.T)] * evidence[tuple(pairs.T)], kind="stable")
     begin = np.full(K, np.iinfo(np.int64).max)
     np.minimum.at(begin, tracklet, points.frame)
-    end = begin + frames
-    taken: list[list[tuple[int, int]]] = [[] for _ in range(M)]
-    wanted = np.argwhere(votes > 0)
-    order = np.argsort(-(votes[tuple(wanted.T)] * 1.0) * evidence[tuple(wanted.T)], kind="stable")
-    for k, i in wanted[order]:
-        if marker[k] >= 0 or 2 * votes[k, i] <= frames[k]:
-            continue
-        if all(end[k] <= a or b <= begin[k] for a, b in taken[i]):
-            marker[k] = i
-            taken[i].append((int(begin[k]), int(end[k])))
+    marker, taken = np.full(K, -1, np.int64), np.zeros((M, len(points.ends) - 1), np.bool_)
+    _take(pairs[order], begin, begin + frames, taken, marker)
     return marker
+
+
+@compiled(nogil=True)
+def _take(pairs: Index, begin: Index, end: Index, taken: Mask, marker: Index) -> None:
+    """Give each tracklet of the pairs (P, 2) its marker, unless the marker has a point in one of its frames already."""
+    for n in range(pairs.shape[0]):
+        k, i = pairs[n]
+        if marker[k] < 0 and not taken[i, begin[k] : end[k]].any():
+            marker[k] = i
+            taken[i, begin[k] : end[k]] = True
 
 
 @compiled(nogil=True)

@@ -7,8 +7,9 @@ import numpy as np
 
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.markers.labelling.adoption import adopt_tracklets
 from depthtrack.markers.labelling.capture_fit import FittedFrames, expect_markers, fit_capture
-from depthtrack.markers.labelling.evidence import assign_tracklets, label_points, tracklet_evidence
+from depthtrack.markers.labelling.evidence import assign_tracklets, contested, label_points, tracklet_evidence
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.labelling.packed import PackedPoints
 from depthtrack.markers.labelling.scene import Scene
@@ -42,13 +43,23 @@ def label_capture(
     tracklet = make_tracklets(points, LinkSettings.of(chosen, capture.rate))
     labels = np.where(forward.labels == backward.labels, forward.labels, -1)
     fitted = fit_capture(points.position, labels, scene, settings, starting)
+    shortest = round(chosen.offline.adopt * capture.rate)
     for _ in range(chosen.offline.rounds):
-        evidence = tracklet_evidence(points, tracklet, expect_markers(fitted, scene, settings), settings)
+        expected = expect_markers(fitted, scene, settings)
+        evidence = tracklet_evidence(points, tracklet, expected, settings)
+        open_to = contested(points, tracklet, labels, expected, settings.clutter)
+        if open_to.any():
+            kept = np.where((labels >= 0) & ~open_to[tracklet[labels]], labels, -1)
+            without = fit_capture(points.position, kept, scene, settings, fitted.poses, fitted)
+            fair = tracklet_evidence(points, tracklet, expect_markers(without, scene, settings), settings)
+            undecided = open_to | ~np.isin(np.arange(len(open_to)), tracklet[labels[labels >= 0]])
+            evidence = np.where(undecided[:, None], fair, evidence)
         new = label_points(points, tracklet, assign_tracklets(points, tracklet, evidence), labels.shape[1])
+        new = adopt_tracklets(points, tracklet, new, fitted, expected, scene, settings, shortest)
         if np.array_equal(new, labels):
             break
         labels = new
-        fitted = fit_capture(points.position, labels, scene, settings, fitted.poses)
+        fitted = fit_capture(points.position, labels, scene, settings, fitted.poses, fitted)
     return _labelled(capture, points, models, scene, labels, fitted.poses, np.ones(labels.shape))
 
 

@@ -29,7 +29,8 @@ class PredictionOptions:
     determined: float = option(0.08, "Standard deviation of a joint that moves a visible marker", unit="rad")
     palm_speed: float = option(0.5, "Drift of a model of which fewer than three markers are visible", unit="m/s")
     largest: float = option(0.06, "Largest standard deviation of a predicted position", unit="m")
-    residual_gain: float = option(0.2, "Share of a new residual in the residual that is kept while a marker is missing")
+    residual_gain: float = option(0.03, "Share of a new residual in the residual that is kept while a marker is missing")
+    familiar: int = option(5, "Frames after which a marker's own residual is used instead of its spread on the model")
 
 
 @dataclass(frozen=True)
@@ -80,9 +81,10 @@ class OfflineOptions:
 
     use: bool = option(True, "Track in both directions, and decide tracklets by all of their frames")
     rounds: int = option(6, "Rounds of pose fits and assignments of tracklets, at most")
-    link_gate: float = option(5.0, "Largest distance of a link between frames", unit="standard deviations")
-    link_clear: float = option(4.0, "By how much farther the next best link must be", unit="standard deviations")
-    link_speed: float = option(0.6, "Standard deviation of the speed of a point without a known motion", unit="m/s")
+    adopt: float = option(0.1, "Shortest tracklet without a label that is tried as a marker by a fit", unit="s")
+    link_gate: float = option(3.0, "Largest distance of a link between frames", unit="standard deviations")
+    link_clear: float = option(2.0, "By how much farther the next best link must be", unit="standard deviations")
+    link_speed: float = option(0.3, "Standard deviation of the speed of a point without a known motion", unit="m/s")
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ class TrackState(NamedTuple):
     position, velocity: (M, 3) of each marker when last seen, m and m/frame.
     residual: (M, 3) metres, frame of the body: its distance from the model, kept while it is missing.
     missing: (M,) frames since it was seen.
+    seen: (M,) frames in which it was seen.
     outlying: (M,) frames in a row with too large a residual.
     swap: (M, M) accumulated log-likelihood ratio of an exchange.
     """
@@ -43,6 +44,7 @@ class TrackState(NamedTuple):
     velocity: Array
     residual: Array
     missing: Index
+    seen: Index
     outlying: Index
     swap: Array
 
@@ -66,6 +68,7 @@ class TrackState(NamedTuple):
             np.zeros((M, 3)),
             np.full(M, NEVER, np.int64),
             np.zeros(M, np.int64),
+            np.zeros(M, np.int64),
             np.zeros((M, M)),
         )
 
@@ -78,7 +81,7 @@ class TrackState(NamedTuple):
             self.pose[g, 7:] = 0.0
         for array in (self.step, self.slope, self.error, self.failing, self.loose, self.undetermined):
             array[g] = 0
-        for array in (self.position, self.velocity, self.residual, self.outlying, self.swap):
+        for array in (self.position, self.velocity, self.residual, self.seen, self.outlying, self.swap):
             array[rows] = 0
         self.swap[:, rows] = 0
         self.missing[rows] = NEVER
@@ -93,7 +96,8 @@ class FrameLabels(NamedTuple):
 
     point: (M,) point of each marker; -1 if it has none.
     expected: (M, 3) position expected before the frame, metres.
-    deviation: (M,) standard deviation of that in one coordinate, metres.
+    precision: (M, 3, 3) inverse of its covariance, 1/m^2.
+    peak: (M,) logarithm of the normal density at the expected position, 1/m^3.
     score: (M,) log-likelihood ratio of the label against none.
     margin: (M,) by how much the next best explanation is worse.
     error: (M,) distance of the point from the fitted model, metres; NaN without a point.
@@ -101,7 +105,8 @@ class FrameLabels(NamedTuple):
 
     point: Index
     expected: Array
-    deviation: Array
+    precision: Array
+    peak: Array
     score: Array
     margin: Array
     error: Array
@@ -112,6 +117,7 @@ class FrameLabels(NamedTuple):
         return FrameLabels(
             np.full(count, -1, np.int64),
             np.full((count, 3), np.nan),
+            np.full((count, 3, 3), np.nan),
             np.full(count, np.nan),
             np.full(count, np.nan),
             np.full(count, np.nan),
@@ -132,6 +138,7 @@ class Settings(NamedTuple):
     palm_drift: float
     largest: float
     residual_gain: float
+    familiar: int
     padded: bool
     distance_term: float
     clutter: float
@@ -166,6 +173,7 @@ class Settings(NamedTuple):
             palm_drift=p.palm_speed * dt,
             largest=p.largest,
             residual_gain=p.residual_gain,
+            familiar=p.familiar,
             padded=a.padded,
             distance_term=a.distance_term,
             clutter=float(np.log(a.clutter)),

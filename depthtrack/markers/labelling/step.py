@@ -6,7 +6,7 @@ from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.markers.labelling.assignment import assign
 from depthtrack.markers.labelling.pose_fit import PoseFit, fit_pose
-from depthtrack.markers.labelling.prediction import predict
+from depthtrack.markers.labelling.prediction import predict, residual_spread
 from depthtrack.markers.labelling.scene import Scene, place_markers
 from depthtrack.markers.labelling.state import FrameLabels, Settings, TrackState
 from depthtrack.types import Array, Index, Mask
@@ -32,7 +32,7 @@ def track_frame(points: Array, scene: Scene, settings: Settings, state: TrackSta
             continue
         for _ in range(2):
             _fit(points, scene, g, settings, state, out, targets, weights, poses[g], placed, bodies)
-            if settings.padded or not _reject(scene, g, settings, state, out):
+            if settings.padded or not _reject(scene, g, settings, state, out, targets, placed, bodies):
                 break
         _keep_pose(scene, g, state, poses[g])
         _keep_residuals(points, scene, g, settings, state, out, placed, bodies)
@@ -121,7 +121,8 @@ def _fit(
     for i in range(scene.first[g], scene.first[g + 1]):
         if out.point[i] >= 0:
             out.error[i] = _distance(targets[i], placed[i])
-            share = out.error[i] / (settings.robust * _spread(scene, settings, i)) if settings.robust > 0 else 0.0
+            unusual = _unusual(targets[i], scene, settings, state, i, placed, bodies)
+            share = unusual / settings.robust if settings.robust > 0 else 0.0
             if share > 1.0:
                 outliers = True
             weights[i] = 1 / (1 + share * share) ** 2
@@ -144,7 +145,16 @@ def determined_angles(scene: Scene, g: int, point: Index, out: Mask) -> None:
 
 
 @compiled(nogil=True)
-def _reject(scene: Scene, g: int, settings: Settings, state: TrackState, out: FrameLabels) -> bool:
+def _reject(
+    scene: Scene,
+    g: int,
+    settings: Settings,
+    state: TrackState,
+    out: FrameLabels,
+    targets: Array,
+    placed: Array,
+    bodies: BodyPoses,
+) -> bool:
     """Remove labels whose point does not fit the model; return whether there was one.
 
     The paper's distance threshold: a ghost would pull the model to a wrong pose.
@@ -154,8 +164,8 @@ def _reject(scene: Scene, g: int, settings: Settings, state: TrackState, out: Fr
         if out.point[i] < 0:
             continue
         new = state.missing[i] > 0
-        largest = (settings.reject_new if new else settings.reject) * _spread(scene, settings, i)
-        if out.error[i] <= largest:
+        unusual = _unusual(targets[i], scene, settings, state, i, placed, bodies)
+        if unusual <= (settings.reject_new if new else settings.reject):
             state.outlying[i] = 0
         elif new or state.outlying[i] >= settings.patience:
             out.point[i], out.error[i], state.outlying[i], found = -1, np.nan, 0, True
@@ -203,7 +213,7 @@ def _keep_residuals(
         total += out.error[i]
         count += 1
         T, e = bodies.T[scene.body[i]], state.residual[i]
-        gain = settings.residual_gain if state.missing[i] == 0 else 1.0
+        gain = max(settings.residual_gain, 1 / (1.0 + state.seen[i]))
         length = 0.0
         for r in range(3):
             new = 0.0
@@ -249,6 +259,7 @@ def _exchange(
                     state.position[i, r], state.position[k, r] = state.position[k, r], state.position[i, r]
                     state.velocity[i, r], state.velocity[k, r] = state.velocity[k, r], state.velocity[i, r]
                     state.residual[i, r], state.residual[k, r] = 0.0, 0.0
+                state.seen[i], state.seen[k] = 0, 0
 
 
 @compiled(nogil=True)
@@ -273,6 +284,7 @@ def _keep_markers(
                 state.velocity[i, r] = _model_velocity(state, g, points[j], r)
             state.position[i, r] = points[j, r]
         state.missing[i] = 0
+        state.seen[i] += 1
     determined = np.zeros(20, np.bool_)
     determined_angles(scene, g, out.point, determined)
     for a in range(20):
@@ -305,6 +317,18 @@ def _check_lost(scene: Scene, g: int, settings: Settings, state: TrackState, out
             state.active[g] = False
     else:
         state.failing[g] = 0
+
+
+@compiled(nogil=True)
+def _unusual(
+    target: Array, scene: Scene, settings: Settings, state: TrackState, i: int, placed: Array, bodies: BodyPoses
+) -> float:
+    """Return the distance of a point from the marker with its usual residual, in standard deviations."""
+    T, e, total = bodies.T[scene.body[i]], state.residual[i], 0.0
+    for r in range(3):
+        x = target[r] - placed[i, r] - (T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2])
+        total += x * x
+    return float(np.sqrt(total / (residual_spread(scene, settings, state, i) ** 2 + 3 * settings.noise**2)))
 
 
 @compiled(nogil=True)
