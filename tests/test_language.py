@@ -49,6 +49,7 @@ REWRITTEN = (
     "docs/joints.md",
     "docs/keypoints.md",
     "docs/limitations.md",
+    "docs/marker-synthesis.md",
     "docs/metrics.md",
     "docs/parameters.md",
     "docs/rigs.md",

@@ -26,6 +26,8 @@ from depthtrack.viewing.timeline import Timeline
 RunLayer = Literal["recording", "overlay", "hypothesis", "residual", "skeleton"]
 LAYERS: tuple[RunLayer, ...] = ("recording", "hypothesis", "residual", "skeleton")
 """Views of `RunPainter.picture`."""
+LAYERS_WITHOUT_DEPTH: tuple[RunLayer, ...] = ("hypothesis", "skeleton")
+"""Those of a recording without depth images."""
 
 
 class RunPainter:
@@ -38,12 +40,14 @@ class RunPainter:
         self._regions = close_up_regions(camera, keypoints, _trusted(replay))
         self._near, self._far = hand_depth_range(replay)
         self._scene_near, self._scene_far = hand_depth_range(replay, margin=0.5)
+        self._layers = LAYERS if replay.sequence.has_depth else LAYERS_WITHOUT_DEPTH
         self._timeline: Timeline | None = None
 
     def picture(self, replayed: ReplayedFrame) -> Image:
-        """Return all four views of a frame (h, w, 3) with status, energy and timeline."""
-        views = {layer: self.view(replayed, layer) for layer in LAYERS}
-        _draw_scale(views["residual"])
+        """Return all views of a frame (h, w, 3) with status, energy and timeline."""
+        views = {layer: self.view(replayed, layer) for layer in self._layers}
+        if "residual" in views:
+            _draw_scale(views["residual"])
         tiles = [captioned(view, *self._caption(replayed, layer)) for layer, view in views.items()]
         grid = tile_grid(tiles, columns=2)
         if self._timeline is None:
@@ -116,7 +120,8 @@ class RunPainter:
         if layer == "recording":
             return "recording", f"frame {replayed.frame.index}  ·  {replayed.frame.timestamp:.2f} s"
         if layer == "hypothesis":
-            return "hypothesis over depth", "" if replayed.estimate.pose is not None else "no pose"
+            name = "hypothesis over depth" if self._replay.sequence.has_depth else "hypothesis"
+            return name, "" if replayed.estimate.pose is not None else "no pose"
         if layer == "residual":
             observation = replayed.observation
             with_object = observation is not None and observation.occluder is not None

@@ -5,6 +5,7 @@ import numpy as np
 from depthtrack.hand.pose import transformed
 from depthtrack.hand.shape import HandShape
 from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.filled_capture import FilledCapture, Filling
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.models.layout import load_layout
 from depthtrack.markers.models.marker_model import MarkerModel
@@ -35,7 +36,7 @@ def labelled_hands(frames: int = 60, seed: int = 0, sides: tuple[str, ...] = ("r
     true = [model.positions(pose) for model, pose in zip(models, poses, strict=True)]
     measured = [np.asarray(rng.random(points.shape[:2]) > 0.1) for points in true]
     measured[0][20:24] = False
-    measured[0][21, 0] = True
+    measured[0][21:22, 0] = True
     ghost = np.where(rng.random((frames, 1, 1)) < 0.3, rng.normal(0, 0.2, (frames, 1, 3)) + LAB[:3, 3], np.nan)
     points = [np.where(seen[..., None], at, np.nan) for at, seen in zip(true, measured, strict=True)]
     positions = np.concatenate([*points, ghost], axis=1) + rng.normal(0, 0.0003, (frames, 1, 3))
@@ -56,3 +57,20 @@ def true_hands(labelled: LabelledCapture, poses: Array) -> LabelledCapture:
     """The first hand of a capture with other poses (T, 27), as its truth."""
     columns, confidence = labelled.columns[:1], labelled.confidence[:1]
     return LabelledCapture(labelled.capture, labelled.models[:1], columns, (poses,), confidence)
+
+
+def filled_hands(labelled: LabelledCapture) -> FilledCapture:
+    """The capture with gaps filled from the poses, and one point of each model replaced.
+
+    The gaps of frames without a pose stay.
+    """
+    expected = [model.positions(poses) for model, poses in zip(labelled.models, labelled.poses, strict=True)]
+    how, positions = [], []
+    for k, at in enumerate(expected):
+        measured = labelled.columns[k] >= 0
+        way = np.where(measured, Filling.MEASURED, np.where(np.isfinite(at[..., 0]), Filling.SMOOTHED, Filling.GAP))
+        way[tuple(np.argwhere(measured)[0])] = Filling.REPLACED
+        how.append(way)
+        positions.append(np.where((way == Filling.MEASURED)[..., None], labelled.positions(k), at))
+    errors = tuple(np.where((way != Filling.MEASURED) & (way != Filling.GAP), 0.002, np.nan) for way in how)
+    return FilledCapture(labelled, tuple(positions), tuple(how), errors, labelled.poses)

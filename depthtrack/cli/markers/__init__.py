@@ -2,4 +2,8 @@
 
 from depthtrack.cli import CommandEntry
 
-COMMANDS: dict[str, CommandEntry] = {}
+COMMANDS: dict[str, CommandEntry] = {
+    "info": CommandEntry("depthtrack.cli.markers.info", "list frames, markers, gaps and size of a capture"),
+    "shuffle": CommandEntry("depthtrack.cli.markers.shuffle", "strip the labels of a capture, to test the labelling"),
+    "cut": CommandEntry("depthtrack.cli.markers.cut", "cut stretches out of trajectories, to test the gap filling"),
+}

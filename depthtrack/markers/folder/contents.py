@@ -128,6 +128,21 @@ def is_marker_folder(path: Path) -> bool:
     return (path / CONTENTS_FILE).is_file()
 
 
+def run_folder(path: Path) -> Path:
+    """Return the run folder at a path: in a marker folder, that of its only hand.
+
+    Raises:
+        InputError: if a marker folder has no hand, or several.
+    """
+    if not is_marker_folder(path):
+        return path
+    hands = [name for name in Contents.load(path).models if (path / name / "run.json").exists()]
+    if len(hands) != 1:
+        found = ", ".join(str(path / name) for name in hands) or "none"
+        raise InputError(f"{path} must have one hand to be a run: name the run folder of a hand, found {found}")
+    return path / hands[0]
+
+
 def check_names(names: Sequence[str]) -> None:
     """Raise InputError unless the names of the models can name files, each its own."""
     for name in names:

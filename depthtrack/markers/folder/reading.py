@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.filled_capture import FilledCapture
 from depthtrack.markers.folder.contents import MODELS, Contents
+from depthtrack.markers.folder.filled_samples import read_filled
 from depthtrack.markers.folder.tables import read_rigid_poses, read_values
 from depthtrack.markers.formats.conditioning import METRES
 from depthtrack.markers.formats.registry import find_format
@@ -24,11 +27,13 @@ class MarkerFolder:
     path: of the folder.
     contents: of its `markers.json`.
     labelled: labels and poses. Its capture has the labelled trajectories, then those without a label.
+    filled: the capture without gaps; None if none were filled. Both have the poses of the filled capture then.
     """
 
     path: Path
     contents: Contents
     labelled: LabelledCapture
+    filled: FilledCapture | None = None
 
     @classmethod
     def load(cls, path: Path) -> "MarkerFolder":
@@ -44,14 +49,26 @@ class MarkerFolder:
         poses = tuple(_poses(path, model, len(capture)) for model in models)
         unread = LabelledCapture(capture, models, (), poses, ())
         labels = [unread.labels(k) for k in range(len(models))]
-        columns = tuple(_columns(capture, each, path / contents.labelled) for each in labels)
         every = [label for each in labels for label in each]
+        place = _place(capture, every, path / contents.labelled)
+        positions = capture.positions[:, place]
+        filled = read_filled(path / "filled.csv", every, contents.first_frame, positions) if contents.filled else None
+        if filled is not None:
+            capture.positions[:, place] = np.where(filled.is_filled[..., None], np.nan, positions)
+        measured = np.isfinite(capture.positions[:, place]).all(axis=-1)
         confidence = read_values(path / "confidence.csv", every, len(capture))
         if np.any((confidence < 0) | (confidence > 1)):
             raise InputError(f"{path / 'confidence.csv'}: expected probabilities from 0 to 1")
         ends = np.cumsum([len(each) for each in labels])[:-1]
-        parts = tuple(np.split(confidence, ends, axis=1))
-        return cls(path, contents, LabelledCapture(capture, models, columns, poses, parts))
+
+        def split(values: Any) -> tuple[Any, ...]:
+            return tuple(np.split(values, ends, axis=1))
+
+        labelled = LabelledCapture(capture, models, split(np.where(measured, place, -1)), poses, split(confidence))
+        if filled is None:
+            return cls(path, contents, labelled)
+        how, errors = split(filled.how), split(filled.expected_error)
+        return cls(path, contents, labelled, FilledCapture(labelled, split(positions), how, errors, poses))
 
     def check_source(self) -> None:
         """Raise InputError if the source of the folder is missing or has changed since."""
@@ -78,14 +95,13 @@ def _trajectories(path: Path, contents: Contents) -> MarkerCapture:
     return MarkerCapture(contents.rate, labels, positions, None, contents.first_frame, contents.notes)
 
 
-def _columns(capture: MarkerCapture, labels: tuple[str, ...], path: Path) -> Index:
-    """Return the trajectory (T, M) of each marker, -1 where it was not measured."""
+def _place(capture: MarkerCapture, labels: list[str], path: Path) -> Index:
+    """Return the trajectory (M,) of each marker. Raises InputError if one is missing."""
     column = {label: k for k, label in enumerate(capture.labels)}
     missing = [label for label in labels if label not in column]
     if missing:
         raise InputError(f"{path}: expected the marker '{missing[0][:80]}' of a model, found no such trajectory")
-    chosen = np.array([column[label] for label in labels], dtype=np.int64)
-    return np.where(np.isfinite(capture.positions[:, chosen]).all(axis=-1), chosen, -1)
+    return np.array([column[label] for label in labels], dtype=np.int64)
 
 
 def _poses(path: Path, model: MarkerModel, frames: int) -> Array:

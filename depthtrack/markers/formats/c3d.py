@@ -63,7 +63,7 @@ def read(path: Path) -> StoredCapture:
 
 
 def _samples(path: Path, layout: Layout) -> tuple[Array, Array]:
-    """Return positions (T, M, 3) and residuals (T, M), unit of the file; below 0 where nothing was measured."""
+    """Return positions (T, M, 3) and residuals (T, M), unit of the file; residual -1 in gaps."""
     sizes = layout.sizes
     positions, residuals = np.empty((sizes.frames, sizes.points, 3)), np.empty((sizes.frames, sizes.points))
     width = sizes.value_bytes

@@ -1,4 +1,4 @@
-"""The layout of the samples in a C3D file: the sizes that its header and parameters declare, held against its length.
+"""The layout of the samples in a C3D file, held against its length.
 
 Source: The C3D File Format User Guide, c3d.org, "The Header Section" and "POINT" and "TRIAL".
 """
@@ -58,7 +58,7 @@ class Sizes:
         return (4 * self.points + self.analogs) * self.value_bytes
 
     def filling(self, length: int) -> "Sizes":
-        """Return the sizes with the frames that a file of this length holds, if their number is unknown."""
+        """Return the sizes with the frames that fill a file of this length, if their number is 0."""
         return self if self.frames else replace(self, frames=max(length - self.start, 0) // self.frame_bytes)
 
     @property
@@ -121,7 +121,7 @@ def read_layout(head: bytes, length: int, where: str) -> Layout:
 
 
 def _chosen(found: set[Sizes], length: int, where: str) -> tuple[Sizes, tuple[str, ...]]:
-    """Return the sizes on which header and parameters agree, else the only ones that fill the file."""
+    """Return the sizes that header and parameters share, else the only ones that fill the file."""
     if not found:
         raise InputError(f"{where}, byte 2: the header and the parameters declare no point, scale or place of samples")
     if len(found) == 1:
@@ -167,7 +167,7 @@ def _analogs(parameters: Parameters) -> float | None:
 
 
 def _frame_counts(header: Header, parameters: Parameters) -> tuple[set[int], int]:
-    """Return the possible numbers of frames, and the number of the first one. 0 means up to the end of the file.
+    """Return the possible counts of frames, 0 for all of the file, and the first number.
 
     The header's numbers end at 65,535. Beyond it TRIAL:ACTUAL_START_FIELD and ACTUAL_END_FIELD hold them as two
     words each, low and high; POINT:LONG_FRAMES or a POINT:FRAMES of floats hold the count.

@@ -110,7 +110,7 @@ def read_parameters(section: bytes, start: int, where: str) -> Parameters:
 
 
 def floats(data: bytes, processor: Processor) -> Array:
-    """Return 4-byte floats of a processor; those of DEC have their halves exchanged and four times the value."""
+    """Return 4-byte floats; those of DEC have exchanged halves and four times the value."""
     # A damaged value may be a signalling NaN, which numpy warns of.
     with np.errstate(invalid="ignore"):
         if processor == "dec":
@@ -126,7 +126,7 @@ def word_type(processor: Processor) -> str:
 
 @dataclass(frozen=True)
 class _Record:
-    """A group if its number is negative, else a parameter of the group; its contents are section[body:end]."""
+    """A group if its number is below 0, else a parameter of it; contents section[body:end]."""
 
     name: str
     group: int

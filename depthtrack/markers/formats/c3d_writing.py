@@ -1,4 +1,4 @@
-"""Writing of C3D: floats of Intel processors, in millimetres, that ezc3d and the guide's readers read alike.
+"""Writing of C3D: floats of Intel processors, in millimetres.
 
 Source: The C3D File Format User Guide, c3d.org.
 """
@@ -29,7 +29,7 @@ _CHUNK = 1 << 16
 
 
 def write(path: Path, capture: MarkerCapture) -> None:
-    """Write a capture in millimetres of single precision. Gaps are 0 0 0 with the fourth value -1.
+    """Write a capture, millimetres in single precision. Gaps are 0 0 0 and -1.
 
     Raises:
         InputError: if the capture has no trajectory or too many, a label is too long, or the file cannot be written.
@@ -114,7 +114,7 @@ def _scale(capture: MarkerCapture) -> float:
 
 
 def _samples(positions: Array, residuals: Array | None, scale: float) -> bytes:
-    """Return frames (T, M, 3), metres, as floats x, y, z and the fourth value: the residual in units of the scale."""
+    """Return frames (T, M, 3), metres, as floats x, y, z and the residual in units of `scale`."""
     measured = np.asarray(np.isfinite(positions).all(axis=-1))
     values = np.zeros((*measured.shape, 4), dtype="<f4")
     values[..., :3] = np.where(measured[..., None], positions * 1000, 0)

@@ -1,4 +1,4 @@
-"""From what a file states to a capture: labels, gaps, units and rate put in order, and each change noted."""
+"""From what a file states to a capture: labels, gaps, units and rate, each change noted."""
 
 import re
 from collections import Counter
@@ -25,6 +25,8 @@ _UNIT_NAMES = {
     "millimeter": "mm",
 }
 _UNIDENTIFIED = re.compile(r"(?:.*:)?(?:unlabell?ed|unidentified)[ _:-]*(\d*)", re.IGNORECASE)
+_NEAREST, _FARTHEST = 0.002, 1.0
+"""Distances between neighbouring markers, metres, outside which a file's unit is questioned."""
 _SHORTEST_MM, _LONGEST_M = 6.0, 0.5
 """Distance between neighbouring markers: above the first it is in millimetres, below the second in metres."""
 
@@ -41,18 +43,19 @@ def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | Non
     labels, label_notes = _labels(stored.labels, stored.positions.shape[1])
     measured, gap_notes = _measured(stored)
     positions = np.where(measured[..., None], stored.positions, np.nan)
-    scale, unit_notes = _scale(positions, stored.unit, unit)
+    name, unit_notes = _unit(positions, stored.unit, unit)
+    scale = METRES[name]
     hertz, rate_notes = _rate(stored.rate, rate)
     residuals = stored.residuals
     if residuals is not None:
         residuals = np.where(measured & (residuals >= 0), residuals, np.nan) * scale
     first = () if stored.first_frame == 1 else (f"the first frame in the file is {stored.first_frame}",)
     notes = (*stored.notes, *label_notes, *gap_notes, *unit_notes, *rate_notes, *first)
-    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes)
+    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes, name)
 
 
 def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[str]]:
-    """Return `count` different labels: prefixes removed, blank ones numbered, repeated ones given a number."""
+    """Return `count` different labels: without prefix, blank and repeated ones numbered."""
     labels, notes = [_clean(label) for label in stated], list[str]()
     if len(labels) > count:
         notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count]}' on")
@@ -74,7 +77,7 @@ def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[
 
 
 def _clean(label: str) -> str:
-    """Return a label without control characters or outer blanks; an unidentified one begins with `*`."""
+    """Return a label without control characters; an unidentified one begins with `*`."""
     label = "".join(c for c in label if c.isprintable()).strip()
     unidentified = _UNIDENTIFIED.fullmatch(label)
     return f"{UNLABELLED}{unidentified[1]}" if unidentified else label
@@ -96,7 +99,7 @@ def _distinct(labels: list[str]) -> tuple[str, ...]:
 
 
 def _measured(stored: StoredCapture) -> tuple[Mask, list[str]]:
-    """Return which samples (T, M) were measured: finite, residual not below 0, not 0 0 0 without a residual."""
+    """Return the measured samples (T, M): finite, residual not below 0, no bare 0 0 0."""
     finite = np.isfinite(stored.positions).all(axis=-1)
     zero = (stored.positions == 0).all(axis=-1)
     if stored.residuals is None:
@@ -115,27 +118,30 @@ def _measured(stored: StoredCapture) -> tuple[Mask, list[str]]:
     return np.asarray(measured), notes
 
 
-def _scale(positions: Array, stated: str | None, chosen: str | None) -> tuple[float, list[str]]:
-    """Return the length of the unit in metres: the user's, the file's, else by the size of the hand."""
+def _unit(positions: Array, stated: str | None, chosen: str | None) -> tuple[str, list[str]]:
+    """Return the unit: the user's, the file's, else by the size of the hand."""
     if chosen is not None:
         if chosen not in METRES:
             raise InputError(f"the unit must be one of {', '.join(METRES)}, found '{chosen[:40]}'")
-        return METRES[chosen], [f"the unit is {chosen}, as chosen"]
+        return chosen, [f"the unit is {chosen}, as chosen"]
     text = "" if stated is None else "".join(c for c in stated if c.isprintable()).strip().lower()
     name = _UNIT_NAMES.get(text.rstrip("s"), text)
-    if name in METRES:
-        return METRES[name], []
     distance = neighbour_distance(positions)
+    if name in METRES:
+        metres = METRES[name] * distance
+        likely = np.isnan(metres) or _NEAREST <= metres <= _FARTHEST
+        doubt = f"neighbouring markers are {metres:.3g} m apart by the file's unit, {name}: is it right?"
+        return name, [] if likely else [doubt]
     guess = "m" if distance < _LONGEST_M else "mm" if distance >= _SHORTEST_MM else "cm"
     why = "the file states no unit" if not text else f"the unit '{text[:20]}' is unknown"
     size = "" if np.isnan(distance) else f": neighbouring markers are {distance:.3g} {guess} apart"
-    return METRES[guess], [f"{why}; {guess} is taken by the size of the hand{size}"]
+    return guess, [f"{why}; {guess} is taken by the size of the hand{size}"]
 
 
 def neighbour_distance(positions: Array, frames: int = 50) -> float:
-    """Return the median distance between a marker (T, M, 3) and its nearest neighbour, over evenly spaced frames.
+    """Return the median distance of a marker (T, M, 3) to its nearest neighbour.
 
-    NaN if no frame has two markers.
+    frames: evenly spaced, to look at. The result is NaN if none has two markers.
     """
     found = []
     for frame in np.unique(np.linspace(0, len(positions) - 1, frames).astype(int)):

@@ -1,4 +1,4 @@
-"""Plain CSV: one header row `name-X,name-Y,name-Z` for each marker, perhaps `frame` and `time` (s) before it."""
+"""Plain CSV: one header row of `name-X,name-Y,name-Z`, perhaps after `frame` and `time` (s)."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,8 @@ from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.formats.stored_capture import CaptureFormat, StoredCapture
-from depthtrack.markers.formats.text_rows import decoded, read_rows, text_lines, timing
+from depthtrack.markers.formats.text_rows import Columns, decoded, read_rows, text_lines
+from depthtrack.markers.formats.timing import timing
 
 _COORDINATE = re.compile(r"(.*?)[-_. :]?([XYZ])", re.IGNORECASE | re.DOTALL)
 _KEYS = ("frame", "time")
@@ -33,16 +34,15 @@ def read(path: Path) -> StoredCapture:
         cells.pop()
     keys = _keys(cells)
     labels = tuple(_labels(cells, len(keys), path))
-    rows = read_rows(lines, ",", len(keys), len(labels), path)
-    columns = {key: column for column, key in enumerate(keys)}
-    clock = timing(rows, path, columns.get("frame"), columns.get("time"))
+    rows = read_rows(lines, ",", Columns.plain(tuple(keys), len(labels)), path)
+    clock = timing(rows, path)
     return StoredCapture(
         labels, clock.spread(rows.points), clock.rate, first_frame=clock.first_frame, notes=clock.notes
     )
 
 
 def write(path: Path, capture: MarkerCapture) -> None:
-    """Write a capture in millimetres with a column `time` in seconds; NaN where nothing was measured.
+    """Write a capture in millimetres after `frame` and `time` (s); NaN in gaps.
 
     Raises:
         InputError: if a label holds a comma or a quote, or the file cannot be written.

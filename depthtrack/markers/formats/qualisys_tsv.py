@@ -1,4 +1,4 @@
-"""TSV of Qualisys Track Manager: a header of names and values, then a row a frame, in millimetres.
+"""TSV of Qualisys Track Manager: names and values, then a row a frame, in millimetres.
 
 Source: QTM user manual, "TSV file formats", motion data.
 """
@@ -10,15 +10,16 @@ from pathlib import Path
 from depthtrack.errors import InputError
 from depthtrack.markers.formats.stored_capture import CaptureFormat, StoredCapture
 from depthtrack.markers.formats.text_rows import (
+    Columns,
     Line,
     count_note,
     is_number,
     positive_number,
     read_rows,
     text_lines,
-    timing,
     whole_number,
 )
+from depthtrack.markers.formats.timing import timing
 
 _LONGEST_HEADER = 100
 """Lines before the numbers, at most."""
@@ -76,11 +77,11 @@ def _read_rows(header: _Header, lines: "chain[Line]") -> StoredCapture:
     count = whole_number(*header.first("NO_OF_MARKERS", str(len(labels))))
     while len(labels) > count and not labels[-1]:
         labels.pop()
-    rows = read_rows(lines, "\t", len(header.columns), count, header.path)
-    clock = timing(rows, header.path, frame=0 if header.columns else None, rate=rate)
+    rows = read_rows(lines, "\t", Columns.plain(header.columns, count), header.path)
+    clock = timing(rows, header.path, rate)
     stated = header.first("NO_OF_FRAMES", str(len(rows.points)))[0]
     notes = (*count_note("frames", stated, len(rows.points)), *clock.notes)
-    return StoredCapture(tuple(labels), clock.spread(rows.points), rate, "mm", None, clock.first_frame, notes)
+    return StoredCapture(tuple(labels), clock.spread(rows.points), clock.rate, "mm", None, clock.first_frame, notes)
 
 
 FORMAT = CaptureFormat("Qualisys TSV", (".tsv",), matches, read)

@@ -5,13 +5,22 @@ A new format is a module with a `CaptureFormat` and an entry in FORMATS.
 
 from pathlib import Path
 
+import numpy as np
+
 from depthtrack.errors import InputError
 from depthtrack.markers.capture import MarkerCapture
-from depthtrack.markers.formats import c3d, plain_csv, qualisys_tsv
+from depthtrack.markers.formats import c3d, motive_csv, plain_csv, qualisys_tsv, trc, vicon_csv
 from depthtrack.markers.formats.conditioning import to_capture
 from depthtrack.markers.formats.stored_capture import CaptureFormat
 
-FORMATS: tuple[CaptureFormat, ...] = (c3d.FORMAT, qualisys_tsv.FORMAT, plain_csv.FORMAT)
+FORMATS: tuple[CaptureFormat, ...] = (
+    c3d.FORMAT,
+    qualisys_tsv.FORMAT,
+    vicon_csv.FORMAT,
+    motive_csv.FORMAT,
+    trc.FORMAT,
+    plain_csv.FORMAT,
+)
 _HEAD = 1 << 16
 """Bytes by which a format is found."""
 
@@ -19,15 +28,16 @@ _HEAD = 1 << 16
 def read_capture(path: Path | str, rate: float | None = None, unit: str | None = None) -> MarkerCapture:
     """Read a capture; its format is found by its content.
 
-    rate: Hz, in place of that of the file; required in effect where the file states none, else 120 Hz is taken.
+    rate: Hz, in place of that of the file; 120 Hz if neither states one.
     unit: m, cm or mm, in place of that of the file, or of the one that fits the size of the hand.
 
     Raises:
         InputError: if the file is missing, damaged, too large, of no known format, or has no sample.
-        MissingExtraError: if it is C3D and ezc3d is not installed.
     """
     path = Path(path)
     capture = to_capture(find_format(path).read(path), rate, unit)
+    if not np.isfinite(capture.positions).any():
+        raise InputError(f"{path} holds no measured point: every sample is a gap")
     return capture
 
 
@@ -36,7 +46,6 @@ def write_capture(path: Path | str, capture: MarkerCapture) -> None:
 
     Raises:
         InputError: if no format has this suffix, the format cannot hold the capture, or the file cannot be written.
-        MissingExtraError: if it is C3D and ezc3d is not installed.
     """
     path = Path(path)
     for candidate in FORMATS:
@@ -48,7 +57,7 @@ def write_capture(path: Path | str, capture: MarkerCapture) -> None:
 
 
 def find_format(path: Path) -> CaptureFormat:
-    """Return the format of a file. Raises InputError if the file is missing or of no known format."""
+    """Return the format of a file. Raises InputError if it is missing or of no known format."""
     if not path.is_file():
         raise InputError(f"there is no capture at {path}: no such file")
     with path.open("rb") as file:

@@ -4,7 +4,9 @@ import math
 from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -15,6 +17,8 @@ from depthtrack.types import Array, Index
 
 MAX_BYTES = 1 << 31
 """Largest text file read."""
+_BLANKS = ("", "nan", "-nan")
+"""Texts in cells of gaps, in lower case."""
 _LONGEST_LINE = 1 << 23
 """Bytes of a line at most: 65,535 trajectories with 40 bytes a number."""
 
@@ -49,109 +53,91 @@ def decoded(line: bytes) -> str:
         return line.decode("latin-1")
 
 
+@dataclass(frozen=True)
+class Columns:
+    """What the cells of a row hold.
+
+    width: number of cells.
+    coordinates: (M,) cell of x of each trajectory; those of y and z follow it.
+    frame, time: cells of the frame's number and its time in seconds, if any.
+    """
+
+    width: int
+    coordinates: tuple[int, ...]
+    frame: int | None = None
+    time: int | None = None
+
+    @classmethod
+    def plain(cls, keys: tuple[str, ...], trajectories: int) -> Self:
+        """Return the columns of rows of `keys`, of "frame" and "time", and coordinates."""
+        first = len(keys)
+        columns = {name: column for column, name in enumerate(keys)}
+        coordinates = tuple(range(first, first + 3 * trajectories, 3))
+        return cls(first + 3 * trajectories, coordinates, columns.get("frame"), columns.get("time"))
+
+    @property
+    def keys(self) -> tuple[int, ...]:
+        """Cells that must not be blank."""
+        return tuple(column for column in (self.frame, self.time) if column is not None)
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """The rows of numbers below a header.
 
-    keys: (T, K) of the K leading cells, such as frame and time.
     points: (T, M, 3) coordinates; NaN in blank cells.
     lines: (T,) line of each row.
+    frames, times: (T,) as stated; None if the rows have none.
     """
 
-    keys: Array
     points: Array
     lines: Index
+    frames: Array | None = None
+    times: Array | None = None
 
 
-def read_rows(lines: Iterable[Line], separator: str, key_count: int, trajectories: int, path: Path) -> Rows:
-    """Return rows of `key_count` leading cells and three coordinates a trajectory. Blank lines are passed over.
+def read_rows(lines: Iterable[Line], separator: str, columns: Columns, path: Path) -> Rows:
+    """Return the rows of lines. Blank lines are passed over.
 
     Raises:
         InputError: if a cell is no number, cells are missing or too many, or there are too many rows or none.
     """
-    width = key_count + 3 * trajectories
-    values, places = array("d"), array("q")
+    trajectories = len(columns.coordinates)
     check_dimensions(1, trajectories, str(path))
+    chosen = (*columns.keys, *(first + axis for first in columns.coordinates for axis in range(3)))
+    select = itemgetter(*chosen)
+    values, places = array("d"), array("q")
     for number, line in lines:
         if not line.strip(separator + " \t\r"):
             continue
-        values.extend(_numbers(line, separator, width, key_count, f"{path}, line {number}"))
+        where = f"{path}, line {number}"
+        cells = _cells(line, separator, columns.width, where)
+        try:
+            numbers = [float(cell or "nan") for cell in select(cells)]
+        except ValueError:
+            numbers = []
+        # Python reads 1_0 as a number, other programs do not.
+        if not numbers or "_" in line:
+            numbers = [_number(cells[column], f"{where}, cell {column + 1}") for column in chosen]
+        values.extend(numbers)
         places.append(number)
         if len(places) * trajectories > MAX_SAMPLES:
-            check_dimensions(len(places), trajectories, f"{path}, line {number}")
+            check_dimensions(len(places), trajectories, where)
     check_dimensions(len(places), trajectories, str(path))
-    table, line_numbers = np.frombuffer(values).reshape(-1, width), np.frombuffer(places, dtype=np.int64)
-    wrong = np.argwhere(np.abs(table) > FARTHEST)
+    table, line_numbers = np.frombuffer(values).reshape(-1, len(chosen)), np.frombuffer(places, dtype=np.int64)
+    keys = len(columns.keys)
+    wrong = np.argwhere((np.abs(table) > FARTHEST) | (np.isnan(table) & (np.arange(len(chosen)) < keys)))
     if len(wrong):
         row, column = wrong[0]
-        raise InputError(
-            f"{path}, line {line_numbers[row]}, cell {column + 1}: expected a number below {FARTHEST:g},"
-            f" found {table[row, column]:g}"
-        )
-    return Rows(table[:, :key_count], table[:, key_count:].reshape(len(table), trajectories, 3), line_numbers)
-
-
-@dataclass(frozen=True, eq=False)
-class Timing:
-    """The frames of rows.
-
-    frames: (T,) place of each row, from 0; places without a row are gaps.
-    rate: Hz; None if unknown.
-    first_frame: number of the first frame.
-    notes: on missing rows.
-    """
-
-    frames: Index
-    rate: float | None
-    first_frame: int
-    notes: tuple[str, ...]
-
-    def spread(self, points: Array) -> Array:
-        """Return points (T, M, 3) with rows of NaN where frames are missing."""
-        count = int(self.frames[-1]) + 1
-        if count == len(points):
-            return points
-        complete = np.full((count, *points.shape[1:]), np.nan)
-        complete[self.frames] = points
-        return complete
-
-
-def timing(
-    rows: Rows, path: Path, frame: int | None = None, time: int | None = None, rate: float | None = None
-) -> Timing:
-    """Return the timing that rows state.
-
-    frame, time: columns of `rows.keys` with the frame's number and its time in seconds, if any.
-    rate: Hz, as the header states it; otherwise that of the median interval.
-
-    Raises:
-        InputError: if frames or times do not increase, or would leave more gaps than a capture may have frames.
-    """
-    times = None if time is None else rows.keys[:, time]
-    if times is not None:
-        _check_increase(times, rows.lines, path, "times")
-        if rate is None and len(times) > 1:
-            rate = 1 / float(np.median(np.diff(times)))
-    if frame is not None:
-        numbers = rows.keys[:, frame]
-        _check_increase(numbers, rows.lines, path, "frames")
-        if np.any(numbers != np.floor(numbers)):
-            line = rows.lines[np.argmax(numbers != np.floor(numbers))]
-            raise InputError(f"{path}, line {line}: expected the whole number of a frame in the first cell")
-    elif times is not None and rate is not None:
-        numbers = np.round((times - times[0]) * rate) + 1
-        _check_increase(numbers, rows.lines, path, "times at a constant rate")
-    else:
-        numbers = np.arange(1.0, len(rows.points) + 1)
-    places = (numbers - numbers[0]).astype(np.int64)
-    check_dimensions(int(places[-1]) + 1, rows.points.shape[1], str(path))
-    missing = int(places[-1]) + 1 - len(places)
-    notes = (f"{missing} frames have no row in the file and are gaps",) if missing else ()
-    return Timing(places, rate, int(numbers[0]), notes)
+        place, found = f"{path}, line {line_numbers[row]}, cell {chosen[column] + 1}", table[row, column]
+        raise InputError(f"{place}: expected a number below {FARTHEST:g}, found {found:g}")
+    frames = None if columns.frame is None else table[:, 0]
+    times = None if columns.time is None else table[:, keys - 1]
+    return Rows(table[:, keys:].reshape(len(table), trajectories, 3), line_numbers, frames, times)
 
 
 def positive_number(text: str, what: str) -> float:
-    """Return the number of a header, such as a rate; `what` has its place. Raises InputError unless it is above 0."""
+    """Return a number above 0 of a header; `what` has its place. Raises InputError."""
     value = _float(text)
     if not 0 < value < FARTHEST:
         raise InputError(f"{what} must be a number above 0, found {text[:40]!r}")
@@ -159,7 +145,7 @@ def positive_number(text: str, what: str) -> float:
 
 
 def whole_number(text: str, what: str) -> int:
-    """Return the whole number of a header; `what` has its place. Raises InputError unless it is above 0."""
+    """Return a whole number above 0 of a header; `what` has its place. Raises InputError."""
     value = positive_number(text, what)
     if value != int(value):
         raise InputError(f"{what} must be a whole number, found {text[:40]!r}")
@@ -176,28 +162,20 @@ def count_note(what: str, stated: str, found: int) -> tuple[str, ...]:
     return () if _float(stated) == found else (f"the header states {stated[:20]} {what}, the file has {found}",)
 
 
-def _numbers(line: str, separator: str, width: int, key_count: int, where: str) -> list[float]:
+def _cells(line: str, separator: str, width: int, where: str) -> list[str]:
     cells = line.split(separator, width + 1)
     while len(cells) > width and not cells[-1].strip():
         cells.pop()
     if len(cells) != width:
         raise InputError(f"{where}: expected {width} cells as in the header, found {line.count(separator) + 1}")
-    if "_" not in line:
-        try:
-            numbers = list(map(float, cells))
-            if not any(map(math.isnan, numbers[:key_count])):
-                return numbers
-        except ValueError:
-            pass
-    return [_number(cell, column < key_count, f"{where}, cell {column + 1}") for column, cell in enumerate(cells)]
+    return cells
 
 
-def _number(cell: str, required: bool, where: str) -> float:
+def _number(cell: str, where: str) -> float:
     """Return the number in a cell, NaN if it is blank. Raises InputError."""
     value = _float(cell)
-    blank = cell.strip().lower() in ("", "nan", "-nan")
-    if math.isnan(value) and (required or not blank):
-        raise InputError(f"{where}: expected a number{'' if required else ' or a blank'}, found {cell.strip()[:40]!r}")
+    if math.isnan(value) and cell.strip().lower() not in _BLANKS:
+        raise InputError(f"{where}: expected a number or a blank, found {cell.strip()[:40]!r}")
     return value
 
 
@@ -206,12 +184,3 @@ def _float(text: str) -> float:
         return math.nan if "_" in text else float(text)
     except ValueError:
         return math.nan
-
-
-def _check_increase(values: Array, lines: Index, path: Path, what: str) -> None:
-    falls = np.flatnonzero(np.diff(values) <= 0)
-    if len(falls):
-        row = falls[0] + 1
-        raise InputError(
-            f"{path}, line {lines[row]}: {what} must increase, found {values[row]:.10g} after {values[row - 1]:.10g}"
-        )

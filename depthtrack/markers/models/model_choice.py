@@ -43,7 +43,7 @@ def _model(word: str, hand: HandShape) -> MarkerModel:
 
 
 def _is_layout(path: Path) -> bool:
-    """Return whether a JSON file is a layout; what is wrong with it otherwise, its reader states."""
+    """Return whether a JSON file is a layout; its reader states what else is wrong with it."""
     try:
         fields = json.loads(read_text(path))
         return "like" in fields or "bone" in fields["markers"][0]

@@ -74,7 +74,8 @@ def test_units(tmp_path: Path, unit: str, factor: float) -> None:
     stored = points(2, 3)
     found = read(tmp_path, C3dFile(stored, ("a", "b", "c"), units=unit))
     np.testing.assert_allclose(found.positions, stored[..., :3] * factor)
-    assert bool(found.notes) == (unit == "")
+    assert any("states no unit" in note for note in found.notes) == (unit == "")
+    assert any("is it right?" in note for note in found.notes) == (factor > 0.001)
 
 
 LONG_COUNTS = {
