@@ -23,12 +23,8 @@ from depthtrack.markers.folder.contents import is_marker_folder
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.formats.registry import read_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.synthesis.marker_folder import COMPLETE_FILE, TRUTH
 from depthtrack.types import Array, Index
-
-TRUTH = "truth"
-"""Folder of the truth beside a synthetic capture."""
-COMPLETE_FILE = "complete.csv"
-"""File of the complete true positions in it."""
 
 
 @dataclass(frozen=True, eq=False)
