@@ -175,7 +175,10 @@ def _frame_counts(header: Header, parameters: Parameters) -> tuple[set[int], int
     """
     first, last = header.first_frame, header.last_frame
     trial = [parameters.numbers("TRIAL", f"ACTUAL_{which}_FIELD") for which in ("START", "END")]
-    start, end = (int(field[0] % 65536 + 65536 * field[1]) if len(field) == 2 else 0 for field in trial)
+    start, end = (
+        int(field[0] % 65536 + 65536 * field[1]) if len(field) == 2 and np.isfinite(field).all() else 0
+        for field in trial
+    )
     count = int(parameters.number("POINT", "LONG_FRAMES") or parameters.number("POINT", "FRAMES") or 0)
     saturated = last == _HEADER_FRAMES and count in (0, _HEADER_FRAMES)
     if 0 < start <= end and end > _HEADER_FRAMES and (last == _HEADER_FRAMES or (end - last) % 65536 == 0):
