@@ -62,13 +62,13 @@ def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[
     """Return `count` different labels: without prefix, blank and repeated ones numbered."""
     labels, notes = [_clean(label) for label in stated], list[str]()
     if len(labels) > count:
-        notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count]}' on")
+        notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count][:40]}' on")
     labels = (labels + [""] * count)[:count]
     subjects = {label.partition(":")[0] for label in labels if ":" in label[1:] and not label.startswith(UNLABELLED)}
     if len(subjects) == 1:
         (subject,) = subjects
         labels = [label.removeprefix(f"{subject}:") or label for label in labels]
-        notes.append(f"the prefix '{subject}:' is removed from the labels")
+        notes.append(f"the prefix '{subject[:40]}:' is removed from the labels")
     elif subjects:
         notes.append(f"the prefixes of {len(subjects)} subjects are kept in the labels")
     blank = labels.count("")
@@ -76,7 +76,9 @@ def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[
         notes.append(f"{blank} trajectories have no label and are numbered with '{UNLABELLED}'")
     repeated = [label for label, times in Counter(filter(None, labels)).items() if times > 1]
     if repeated:
-        notes.append(f"the labels of {len(repeated)} trajectories are repeated and get a number, '{repeated[0]}' first")
+        notes.append(
+            f"the labels of {len(repeated)} trajectories are repeated and get a number, '{repeated[0][:40]}' first"
+        )
     return _distinct(labels), notes
 
 

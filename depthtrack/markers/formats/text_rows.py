@@ -157,7 +157,7 @@ def is_number(text: str) -> bool:
 
 def count_note(what: str, stated: str, found: int) -> tuple[str, ...]:
     """Return a note if a header states another count than the file has."""
-    return () if _float(stated) == found else (f"the header states {stated[:20]} {what}, the file has {found}",)
+    return () if _float(stated) == found else (f"the header states {stated[:20]!r} {what}, the file has {found}",)
 
 
 def _cells(line: str, separator: str, least: int, width: int, where: str) -> list[str]:

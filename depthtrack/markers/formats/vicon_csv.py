@@ -53,7 +53,8 @@ def _columns(axes: Line, path: Path) -> Columns:
     cells = _cells(axes)
     coordinates = tuple(first for first in range(len(cells) - 2) if cells[first : first + 3] == ["X", "Y", "Z"])
     if not coordinates or cells[0] != "Frame":
-        raise InputError(f"{path}, line {axes[0]}: expected Frame, Sub Frame, X, Y, Z and so on, found {cells[:5]}")
+        found = ", ".join(cells[:5])[:60]
+        raise InputError(f"{path}, line {axes[0]}: expected Frame, Sub Frame, X, Y, Z and so on, found {found!r}")
     return Columns(len(cells), coordinates, frame=0)
 
 

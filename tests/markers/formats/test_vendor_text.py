@@ -70,10 +70,17 @@ def test_a_trc_header_that_contradicts_the_rows_gives_way(tmp_path: Path) -> Non
     assert capture.rate == pytest.approx(2 / 0.017)
     assert capture.labels == ("thumb", "index")
     assert [note.split(";")[0][:30] for note in capture.notes] == [
-        "the header states 4 markers, t",
-        "the header states 7 frames, th",
+        "the header states '4' markers,",
+        "the header states '7' frames, ",
         "the header states 60 Hz, the t",
     ]
+
+
+def test_trc_without_a_row_of_axes_counts_by_its_header(tmp_path: Path) -> None:
+    text = TRC.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t\n\n", "")
+    assert read(tmp_path, text).labels == ("thumb", "index")
+    with pytest.raises(InputError, match="line 3: NumMarkers must be a number"):
+        read(tmp_path, text.replace("3\t2\tmm", "3\t" + "9" * 5000 + "\tmm"))
 
 
 def test_vicon_csv(tmp_path: Path) -> None:
