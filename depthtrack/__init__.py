@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from depthtrack.hand.kinematics import HandModel as HandModel
     from depthtrack.hand.shape import HandShape as HandShape
     from depthtrack.hand.synergies import Synergies as Synergies
+    from depthtrack.markers.capture import MarkerCapture as MarkerCapture
+    from depthtrack.markers.formats.registry import read_capture as read_capture
+    from depthtrack.markers.formats.registry import write_capture as write_capture
     from depthtrack.recording.run_folder import Run as Run
     from depthtrack.recording.sequence import Frame as Frame
     from depthtrack.recording.sequence import GroundTruth as GroundTruth
@@ -69,6 +72,8 @@ _MODULES = {
     "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),
+    "markers.capture": ("MarkerCapture",),
+    "markers.formats.registry": ("read_capture", "write_capture"),
     "recording.run_folder": ("Run",),
     "recording.sequence": ("Frame", "GroundTruth", "ImageKeypoints", "Sequence"),
     "recording.status": ("Status",),

@@ -49,6 +49,7 @@ REWRITTEN = (
     "docs/joints.md",
     "docs/keypoints.md",
     "docs/limitations.md",
+    "docs/marker-formats.md",
     "docs/marker-synthesis.md",
     "docs/metrics.md",
     "docs/parameters.md",

@@ -54,7 +54,7 @@ class Command:
     """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
     to 7 are 75 degrees to the right, above, left."""
     frames: Annotated[int | None, stated_default(metavar="COUNT")] = None
-    """Number of frames (default: the whole motion, or 360 of the random motion)."""
+    """Number of frames (default: the whole motion; of the random one 360, or 5 s of markers)."""
     fps: Annotated[float | None, stated_default(metavar="HZ")] = None
     """Frames per second (default: 30, or 200 of markers)."""
 

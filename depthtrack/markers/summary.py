@@ -14,6 +14,7 @@ class TrajectoryGaps:
     """The gaps of a trajectory: number, longest one in frames, share of all frames."""
 
     label: str
+    is_labelled: bool
     gaps: int
     longest: int
     missing: float
@@ -58,9 +59,10 @@ class CaptureSummary:
 def summarise_capture(capture: MarkerCapture) -> CaptureSummary:
     """Return the summary of a capture that has at least one measured point."""
     measured = np.asarray(np.isfinite(capture.positions).all(axis=-1))
-    gaps = tuple(_gaps(label, column) for label, column in zip(capture.labels, measured.T, strict=True))
+    columns = zip(capture.labels, capture.is_labelled.tolist(), measured.T, strict=True)
+    gaps = tuple(_gaps(*column) for column in columns)
     labelled = int(capture.is_labelled.sum())
-    counted = [gap for gap, is_labelled in zip(gaps, capture.is_labelled, strict=True) if is_labelled or not labelled]
+    counted = [gap for gap in gaps if gap.is_labelled or not labelled]
     visible = measured.sum(axis=1)
     points = capture.positions[measured]
     steps = np.linalg.norm(np.diff(capture.positions, axis=0), axis=-1)
@@ -96,9 +98,10 @@ def gap_runs(measured: Mask) -> list[tuple[int, int]]:
     return list(zip(starts.tolist(), (ends - starts).tolist(), strict=True))
 
 
-def _gaps(label: str, measured: Mask) -> TrajectoryGaps:
+def _gaps(label: str, is_labelled: bool, measured: Mask) -> TrajectoryGaps:
     runs = gap_runs(measured)
-    return TrajectoryGaps(label, len(runs), max((length for _, length in runs), default=0), float(np.mean(~measured)))
+    longest = max((length for _, length in runs), default=0)
+    return TrajectoryGaps(label, is_labelled, len(runs), longest, float(np.mean(~measured)))
 
 
 def _residual(capture: MarkerCapture) -> float | None:

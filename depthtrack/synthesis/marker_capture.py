@@ -25,6 +25,8 @@ from depthtrack.synthesis.scene_frame import mirrored, orientation
 from depthtrack.synthesis.two_hands import two_hand_poses
 from depthtrack.types import Array
 
+RANDOM_DURATION = 5.0
+"""Default duration of a random motion, seconds: that of the trials of Maycock et al. 2015, Sec. IV."""
 _T_CAPTURE_SCENE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 1], [0, 0, 0, 1]])
 """The capture frame has z up; the nominal palm position is 1 m above its origin."""
 _BODY_HALF = (0.02, 0.06)
@@ -47,7 +49,7 @@ class MarkerSynthesis:
     touching: whether two hands approach until they touch, again and again.
     rigid_bodies, rigid_markers: number of rigid bodies, and of the markers on each.
     start: time in the motion of the first frame, seconds.
-    frames: number of frames; None for the rest of the motion.
+    frames: number of frames; None for the rest of the motion, or 5 s of a random one.
     rate: frames a second, Hz.
     size_spread: spread of the subject's hand sizes about `hand`, as a share of that among people.
     placement: standard deviation of the markers' positions on the subject about the layout's, metres, each axis.
@@ -122,7 +124,10 @@ def synthesise_markers(options: MarkerSynthesis) -> SyntheticMarkers:
         InputError: if the motion or the layout is unknown, or the motion is shorter than the frames asked for.
     """
     motion, layout = load_motion(options.motion), find_layout(options.layout)
-    times = frame_times(motion, options.rate, options.frames, options.start)
+    frames = (
+        round(RANDOM_DURATION * options.rate) if options.frames is None and motion.duration is None else options.frames
+    )
+    times = frame_times(motion, options.rate, frames, options.start)
     nominal = [layout.on(hand) for hand in _hands(options.hand, options.two_hands)]
     bodies = [_rigid_body(options, k) for k in range(options.rigid_bodies)]
     subject = (*(_worn(options, layout, model) for model in nominal), *bodies)

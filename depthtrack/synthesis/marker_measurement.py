@@ -1,7 +1,6 @@
 """Errors of an optical motion capture system: noise, dropouts, ghosts and lost labels.
 
-Dropouts come in bursts. Random numbers come from streams of one seed, in order of time:
-a longer capture begins with the shorter one.
+Dropouts come in bursts. Random numbers come from streams of one seed.
 """
 
 from dataclasses import dataclass
@@ -18,6 +17,8 @@ _CLEAR = 0.008
 """Smallest distance of a new ghost from its marker, metres: cameras merge points that are closer."""
 _FOLLOWS = 0.5
 """Share of the ghosts that move with a marker; the others stay in place."""
+_TRIES = 20
+"""Random places that are tried for each burst, so that it does not join another one."""
 
 
 @dataclass(frozen=True)
@@ -68,24 +69,20 @@ class MeasurementErrors:
         return shuffled, columns[:, : positions.shape[1]]
 
     def _missing(self, shape: tuple[int, int], rate: float, seed: int) -> Mask:
-        """Return whether a sample (T, P) is missing: bursts and visible stretches in turn."""
-        missing = np.zeros(shape, dtype=np.bool_)
-        if self.dropouts == 0:
-            return missing
-        visible = np.mean(self.bursts) * (1 - self.dropouts) / self.dropouts
-        for marker in range(shape[1]):
-            rng, time = generator(seed, marker, Stream.DROPOUTS), 0.0
-            if not self.complete_start and rng.random() < self.dropouts:
-                time = -rng.uniform(*self.bursts)
-            else:
-                time = rng.exponential(visible)
-            while (first := round(time * rate)) < shape[0]:
-                burst = rng.uniform(*self.bursts)
-                last = max(round((time + burst) * rate), first + 1)
-                missing[max(first, 0) : max(last, 0), marker] = True
-                time += burst + rng.exponential(visible)
-        if self.complete_start:
-            missing[0] = False
+        """Return whether a sample (T, P) is missing.
+
+        Bursts are at random times, as many as their share needs.
+        """
+        missing, rng = np.zeros(shape, dtype=np.bool_), generator(seed, 0, Stream.DROPOUTS)
+        least = int(self.complete_start)
+        while missing.sum() < self.dropouts * missing[least:].size:
+            length = max(round(rng.uniform(*self.bursts) * rate), 1)
+            for _ in range(_TRIES):
+                marker, first = rng.integers(shape[1]), int(rng.integers(1 - length, shape[0]))
+                # A frame on either side keeps bursts apart.
+                if not missing[max(first - 1, 0) : first + length + 1, marker].any():
+                    break
+            missing[max(first, least) : first + length, marker] = True
         return missing
 
     def _ghosts(self, positions: Array, rate: float, seed: int) -> Array:

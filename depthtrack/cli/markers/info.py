@@ -68,7 +68,9 @@ def _text(name: str, summary: "CaptureSummary") -> str:
 
 
 def _gap_lines(summary: "CaptureSummary") -> list[str]:
-    worst = sorted((gap for gap in summary.trajectories if gap.gaps), key=lambda gap: -gap.missing)
+    """Return a line for each labelled trajectory with gaps, or for all, the worst first."""
+    counted = [gap for gap in summary.trajectories if gap.is_labelled or not summary.labelled]
+    worst = sorted((gap for gap in counted if gap.gaps), key=lambda gap: -gap.missing)
     return [f"{gap.label}: {gap.gaps}, longest {gap.longest} frames, {100 * gap.missing:.2f} %" for gap in worst]
 
 

@@ -76,12 +76,12 @@ def _samples(path: Path, layout: Layout) -> tuple[Array, Array]:
         # The high byte has the cameras, the low one the residual; both together are below 0 in a gap.
         fourth = np.nan_to_num(values[..., 3].clip(-1, 0x7FFF), nan=-1).astype(np.int64)
         residuals[chunk] = np.where(fourth < 0, -1, (fourth & 0xFF) * layout.scale)
-    wrong = np.argwhere((np.abs(positions) > FARTHEST) & (residuals >= 0)[..., None])
-    if len(wrong):
-        frame, point, axis = wrong[0].tolist()
-        byte = sizes.start + frame * sizes.frame_bytes + (4 * point + axis) * width
-        found = positions[frame, point, axis]
-        raise InputError(f"{path}, byte {byte}: expected a coordinate below {FARTHEST:g}, found {found:.3g}")
+        wrong = np.argwhere((np.abs(positions[chunk]) > FARTHEST) & (residuals[chunk] >= 0)[..., None])
+        if len(wrong):
+            frame, point, axis = (wrong[0] + (first, 0, 0)).tolist()
+            byte = sizes.start + frame * sizes.frame_bytes + (4 * point + axis) * width
+            found = positions[frame, point, axis]
+            raise InputError(f"{path}, byte {byte}: expected a coordinate below {FARTHEST:g}, found {found:.3g}")
     return positions, residuals
 
 

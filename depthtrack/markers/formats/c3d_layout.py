@@ -113,8 +113,9 @@ def read_layout(head: bytes, length: int, where: str) -> Layout:
         if points > 0 and analogs >= 0 and start > section
     }
     sizes, notes = _chosen(found, length, where)
-    if 0 in counts:
-        notes += (f"the header counts to {_HEADER_FRAMES:,}; the file is long enough for {sizes.frames:,} frames",)
+    if sizes.frames > _HEADER_FRAMES:
+        source = "the file is long enough for" if 0 in counts else "the parameters state"
+        notes += (f"the header counts to {_HEADER_FRAMES:,}; {source} {sizes.frames:,} frames",)
     check_dimensions(sizes.frames, sizes.points, where)
     length_of_unit = scales[-1] if np.isfinite(scales[-1]) else 1.0
     return Layout(sizes, parameters, header, first_frame, abs(length_of_unit), 0 in counts, notes)
@@ -174,7 +175,10 @@ def _frame_counts(header: Header, parameters: Parameters) -> tuple[set[int], int
     """
     first, last = header.first_frame, header.last_frame
     trial = [parameters.numbers("TRIAL", f"ACTUAL_{which}_FIELD") for which in ("START", "END")]
-    start, end = (int(field[0] % 65536 + 65536 * field[1]) if len(field) == 2 else 0 for field in trial)
+    start, end = (
+        int(field[0] % 65536 + 65536 * field[1]) if len(field) == 2 and np.isfinite(field).all() else 0
+        for field in trial
+    )
     count = int(parameters.number("POINT", "LONG_FRAMES") or parameters.number("POINT", "FRAMES") or 0)
     saturated = last == _HEADER_FRAMES and count in (0, _HEADER_FRAMES)
     if 0 < start <= end and end > _HEADER_FRAMES and (last == _HEADER_FRAMES or (end - last) % 65536 == 0):

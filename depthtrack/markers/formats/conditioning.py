@@ -27,8 +27,11 @@ _UNIT_NAMES = {
 _UNIDENTIFIED = re.compile(r"(?:.*:)?(?:unlabell?ed|unidentified)[ _:-]*(\d*)", re.IGNORECASE)
 _NEAREST, _FARTHEST = 0.002, 1.0
 """Distances between neighbouring markers, metres, outside which a file's unit is questioned."""
-_SHORTEST_MM, _LONGEST_M = 6.0, 0.5
-"""Distance between neighbouring markers: above the first it is in millimetres, below the second in metres."""
+_SHORTEST_MM, _LONGEST_M = 8.0, 0.4
+"""Distance between neighbouring markers: from the first on it is in millimetres, below the second in metres.
+
+It is 20 to 30 mm on hands, and 60 to 100 mm on bodies and rigid bodies.
+"""
 
 
 def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | None = None) -> MarkerCapture:
@@ -45,26 +48,27 @@ def to_capture(stored: StoredCapture, rate: float | None = None, unit: str | Non
     positions = np.where(measured[..., None], stored.positions, np.nan)
     name, unit_notes = _unit(positions, stored.unit, unit)
     scale = METRES[name]
+    positions *= scale
     hertz, rate_notes = _rate(stored.rate, rate)
     residuals = stored.residuals
     if residuals is not None:
         residuals = np.where(measured & (residuals >= 0), residuals, np.nan) * scale
     first = () if stored.first_frame == 1 else (f"the first frame in the file is {stored.first_frame}",)
     notes = (*stored.notes, *label_notes, *gap_notes, *unit_notes, *rate_notes, *first)
-    return MarkerCapture(hertz, labels, positions * scale, residuals, stored.first_frame, notes, name)
+    return MarkerCapture(hertz, labels, positions, residuals, stored.first_frame, notes, name)
 
 
 def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[str]]:
     """Return `count` different labels: without prefix, blank and repeated ones numbered."""
     labels, notes = [_clean(label) for label in stated], list[str]()
     if len(labels) > count:
-        notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count]}' on")
+        notes.append(f"{len(labels) - count} labels have no trajectory and are dropped, from '{labels[count][:40]}' on")
     labels = (labels + [""] * count)[:count]
     subjects = {label.partition(":")[0] for label in labels if ":" in label[1:] and not label.startswith(UNLABELLED)}
     if len(subjects) == 1:
         (subject,) = subjects
         labels = [label.removeprefix(f"{subject}:") or label for label in labels]
-        notes.append(f"the prefix '{subject}:' is removed from the labels")
+        notes.append(f"the prefix '{subject[:40]}:' is removed from the labels")
     elif subjects:
         notes.append(f"the prefixes of {len(subjects)} subjects are kept in the labels")
     blank = labels.count("")
@@ -72,7 +76,9 @@ def _labels(stated: tuple[str, ...], count: int) -> tuple[tuple[str, ...], list[
         notes.append(f"{blank} trajectories have no label and are numbered with '{UNLABELLED}'")
     repeated = [label for label, times in Counter(filter(None, labels)).items() if times > 1]
     if repeated:
-        notes.append(f"the labels of {len(repeated)} trajectories are repeated and get a number, '{repeated[0]}' first")
+        notes.append(
+            f"the labels of {len(repeated)} trajectories are repeated and get a number, '{repeated[0][:40]}' first"
+        )
     return _distinct(labels), notes
 
 

@@ -4,7 +4,7 @@ Source: OptiTrack documentation, "Data Export: CSV".
 """
 
 from collections.abc import Iterator
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 from depthtrack.errors import InputError
@@ -35,16 +35,14 @@ def read(path: Path) -> StoredCapture:
     head = _header(lines, path)
     pairs = _cells(head[0])
     values = dict(zip(pairs[::2], pairs[1::2], strict=False))
-    columns, kind = _columns(head, path)
-    names = _row(head, "Name")
-    labels = tuple(names[first] if first < len(names) else "" for first in columns.coordinates)
+    columns, names, kind = _columns(head, path)
     stated = next((values[name] for name in _RATES if is_number(values.get(name, ""))), None)
     rate = None if stated is None else positive_number(stated, f"{path}, line 1: the frame rate")
     rows = read_rows(lines, ",", columns, path)
     clock = timing(rows, path, rate)
     solved = ("the file has no measured markers; these are the solver's",) if kind in _SOLVED else ()
     notes, unit = (*solved, *clock.notes), values.get("Length Units")
-    return StoredCapture(labels, clock.spread(rows.points), clock.rate, unit, None, clock.first_frame, notes)
+    return StoredCapture(tuple(names), clock.spread(rows.points), clock.rate, unit, None, clock.first_frame, notes)
 
 
 def _header(lines: Iterator[Line], path: Path) -> list[Line]:
@@ -57,29 +55,25 @@ def _header(lines: Iterator[Line], path: Path) -> list[Line]:
     raise InputError(f"{path}: expected a row 'Frame,Time (Seconds),X,Y,Z' within {_LONGEST_HEADER} lines, found none")
 
 
-def _columns(head: list[Line], path: Path) -> tuple[Columns, str]:
-    """Return the columns of the markers' positions, and the type of the first one."""
-    axes = _cells(head[-1])
-    while axes and not axes[-1]:
-        axes.pop()
-    kinds = _row(head, "Type")
-    quantities = next((cells for line in head[1:-1] if "Position" in (cells := _cells(line))), [])
-    positions = [
-        first
-        for first in range(2, min(len(axes) - 2, len(kinds), len(quantities)))
-        if axes[first : first + 3] == ["X", "Y", "Z"] and quantities[first] == "Position"
-    ]
+def _columns(head: list[Line], path: Path) -> tuple[Columns, list[str], str]:
+    """Return the columns of the markers' positions, their names, and the type of the first one."""
+    *described, axes = [_cells(line) for line in head[1:]]
+    quantities = next((cells for cells in described if "Position" in cells), [])
     for wanted in (_MEASURED, _SOLVED):
-        chosen = tuple(first for first in positions if kinds[first] in wanted)
-        if chosen:
-            return Columns(len(axes), chosen, frame=0, time=1), kinds[chosen[0]]
+        # The names stand below the types.
+        for kinds, names in pairwise(described):
+            chosen = [
+                first
+                for first in range(2, min(len(axes) - 2, len(kinds), len(names), len(quantities)))
+                if kinds[first] in wanted
+                and quantities[first] == "Position"
+                and axes[first : first + 3] == ["X", "Y", "Z"]
+            ]
+            if chosen:
+                columns = Columns(len(axes), tuple(chosen), frame=0, time=1)
+                return columns, [names[first] for first in chosen], kinds[chosen[0]]
     place = f"{path}, line {head[-1][0]}"
     raise InputError(f"{place}: expected columns X, Y, Z of markers, found none: export the markers")
-
-
-def _row(head: list[Line], name: str) -> list[str]:
-    """Return the row with this name in its second cell."""
-    return next((cells for line in head[1:-1] if (cells := _cells(line))[1:2] == [name]), [])
 
 
 def _cells(line: Line) -> list[str]:

@@ -57,7 +57,7 @@ def decoded(line: bytes) -> str:
 class Columns:
     """What the cells of a row hold.
 
-    width: number of cells.
+    width: largest number of cells; those after the last column that is read may be missing.
     coordinates: (M,) cell of x of each trajectory; those of y and z follow it.
     frame, time: cells of the frame's number and its time in seconds, if any.
     """
@@ -105,21 +105,19 @@ def read_rows(lines: Iterable[Line], separator: str, columns: Columns, path: Pat
     trajectories = len(columns.coordinates)
     check_dimensions(1, trajectories, str(path))
     chosen = (*columns.keys, *(first + axis for first in columns.coordinates for axis in range(3)))
-    select = itemgetter(*chosen)
+    select, least = itemgetter(*chosen), max(chosen) + 1
     values, places = array("d"), array("q")
     for number, line in lines:
         if not line.strip(separator + " \t\r"):
             continue
         where = f"{path}, line {number}"
-        cells = _cells(line, separator, columns.width, where)
+        cells = _cells(line, separator, least, columns.width, where)
         try:
-            numbers = [float(cell or "nan") for cell in select(cells)]
+            # Python reads 1_0 as a number, other programs do not.
+            numbers = [] if "_" in line else list(map(float, select(cells)))
         except ValueError:
             numbers = []
-        # Python reads 1_0 as a number, other programs do not.
-        if not numbers or "_" in line:
-            numbers = [_number(cells[column], f"{where}, cell {column + 1}") for column in chosen]
-        values.extend(numbers)
+        values.extend(numbers or [_number(cells[column], column, where) for column in chosen])
         places.append(number)
         if len(places) * trajectories > MAX_SAMPLES:
             check_dimensions(len(places), trajectories, where)
@@ -159,23 +157,23 @@ def is_number(text: str) -> bool:
 
 def count_note(what: str, stated: str, found: int) -> tuple[str, ...]:
     """Return a note if a header states another count than the file has."""
-    return () if _float(stated) == found else (f"the header states {stated[:20]} {what}, the file has {found}",)
+    return () if _float(stated) == found else (f"the header states {stated[:20]!r} {what}, the file has {found}",)
 
 
-def _cells(line: str, separator: str, width: int, where: str) -> list[str]:
+def _cells(line: str, separator: str, least: int, width: int, where: str) -> list[str]:
     cells = line.split(separator, width + 1)
     while len(cells) > width and not cells[-1].strip():
         cells.pop()
-    if len(cells) != width:
+    if not least <= len(cells) <= width:
         raise InputError(f"{where}: expected {width} cells as in the header, found {line.count(separator) + 1}")
     return cells
 
 
-def _number(cell: str, where: str) -> float:
+def _number(cell: str, column: int, where: str) -> float:
     """Return the number in a cell, NaN if it is blank. Raises InputError."""
     value = _float(cell)
     if math.isnan(value) and cell.strip().lower() not in _BLANKS:
-        raise InputError(f"{where}: expected a number or a blank, found {cell.strip()[:40]!r}")
+        raise InputError(f"{where}, cell {column + 1}: expected a number or a blank, found {cell.strip()[:40]!r}")
     return value
 
 

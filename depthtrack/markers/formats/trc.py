@@ -21,6 +21,7 @@ from depthtrack.markers.formats.text_rows import (
     positive_number,
     read_rows,
     text_lines,
+    whole_number,
 )
 from depthtrack.markers.formats.timing import timing
 
@@ -105,10 +106,9 @@ def _labels(names: Line, axes: Line, stated: str, path: Path) -> tuple[tuple[str
     labels = labels[::3] if apart else [label for label in labels if label]
     while labels and not labels[-1]:
         labels.pop()
-    count = (
-        len(coordinates) // 3 if coordinates else int(stated) if stated.isascii() and stated.isdigit() else len(labels)
-    )
-    return tuple(labels), count
+    if coordinates:
+        return tuple(labels), len(coordinates) // 3
+    return tuple(labels), whole_number(stated, f"{path}, line 3: NumMarkers") if stated else len(labels)
 
 
 FORMAT = CaptureFormat("TRC", (".trc",), matches, read, write)

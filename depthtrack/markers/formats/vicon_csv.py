@@ -17,8 +17,9 @@ _SECTIONS = (_SECTION, "Devices", "Joints", "Model Outputs", "Segments", "Events
 
 
 def matches(head: bytes) -> bool:
-    """Return whether the first line is the name of a section."""
-    return head.partition(b"\n")[0].strip(b'\r", ').decode("latin-1") in _SECTIONS
+    """Return whether the first line that is not blank is the name of a section."""
+    first = head.lstrip(b'\r\n", ').partition(b"\n")[0]
+    return first.strip(b'\r", ').decode("latin-1") in _SECTIONS
 
 
 def read(path: Path) -> StoredCapture:
@@ -50,11 +51,10 @@ def _cells(line: Line) -> list[str]:
 
 def _columns(axes: Line, path: Path) -> Columns:
     cells = _cells(axes)
-    while cells and not cells[-1]:
-        cells.pop()
     coordinates = tuple(first for first in range(len(cells) - 2) if cells[first : first + 3] == ["X", "Y", "Z"])
     if not coordinates or cells[0] != "Frame":
-        raise InputError(f"{path}, line {axes[0]}: expected Frame, Sub Frame, X, Y, Z and so on, found {cells[:5]}")
+        found = ", ".join(cells[:5])[:60]
+        raise InputError(f"{path}, line {axes[0]}: expected Frame, Sub Frame, X, Y, Z and so on, found {found!r}")
     return Columns(len(cells), coordinates, frame=0)
 
 

@@ -1,1 +1,1 @@
-"""Initialisation: which points of a frame are which markers of which model (Maycock et al. 2015, Sec. III-A)."""
+"""Initialisation: assignment of the points of a frame to markers (Maycock 2015, Sec. III-A)."""

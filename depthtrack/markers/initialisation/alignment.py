@@ -1,4 +1,4 @@
-"""Alignment of a model's markers to a cluster of points (Maycock et al. 2015, Sec. III-A, *Alignment and Scaling*)."""
+"""*Alignment and Scaling* of a model to a cluster (Maycock et al. 2015, Sec. III-A)."""
 
 from itertools import product
 from typing import NamedTuple
@@ -43,18 +43,18 @@ def box_scale(source: CanonicalForm, target: CanonicalForm, limits: tuple[float,
 
 
 def principal_alignments(source: CanonicalForm, target: CanonicalForm) -> list[tuple[Array, Array]]:
-    """Return rotation and translation T_s^t = T_t T_s^-1 for all signs of the eigenvectors: Eq. (1)."""
+    """Return T_s^t = T_t T_s^-1, Eq. (1), for all signs of the eigenvectors."""
     rotations = [target.R @ S @ source.R.T for S in SIGNS]
     return [(R, target.t - R @ source.t) for R in rotations]
 
 
 def mean_distance(source: Array, target: Array) -> float:
-    """Return the mean distance of source points (N, 3) to their nearest target (K, 3), metres."""
+    """Return the mean distance of points (N, 3) to the nearest target (K, 3), metres."""
     return float(np.mean(cKDTree(target).query(source)[0]))
 
 
 def rigid_icp(source: Array, target: Array, R: Array, t: Array, iterations: int) -> tuple[Array, Array]:
-    """Return the rotation and translation refined by iterative closest points (Besl and McKay 1992).
+    """Return rotation and translation refined by rigid ICP (Besl and McKay 1992).
 
     source: (N, 3), target: (K, 3) metres.
     """

@@ -1,4 +1,4 @@
-"""Optimal assignment of markers to points: the Hungarian method with padding (Maycock et al. 2015, Eq. 3)."""
+"""Optimal assignment: the Hungarian method with padding (Maycock et al. 2015, Eq. 3)."""
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -10,7 +10,7 @@ PADDING = 1e6
 
 
 def assign_all(cost: Array) -> Index:
-    """Return the point (M,) of each marker, -1 for those left over, with the least sum of costs: Eq. (3).
+    """Return the point (M,) of each marker, -1 for those left over: Eq. (3).
 
     cost: (M, K) below `PADDING`. The matrix is padded to a square one.
     """

@@ -7,6 +7,7 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.markers.initialisation.options import InitialisationOptions
 from depthtrack.markers.initialisation.paper import initialise_as_paper
+from depthtrack.markers.initialisation.search import initialise_by_search
 from depthtrack.markers.initialisation.started import StartedModels
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array
@@ -27,5 +28,8 @@ def initialise(
     if not models:
         raise InputError("an initialisation needs a model: give a layout or the file of a model")
     measured = np.flatnonzero(np.isfinite(points).all(axis=-1))
-    found = initialise_as_paper(points[measured], tuple(models), options.paper)
+    if options.method == "paper":
+        found = initialise_as_paper(points[measured], tuple(models), options.paper)
+    else:
+        found = initialise_by_search(points[measured], tuple(models), options.search)
     return StartedModels(tuple(started if started is None else started.renumbered(measured) for started in found))

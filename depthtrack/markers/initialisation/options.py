@@ -29,19 +29,23 @@ class SearchOptions:
     """Initialisation by a search over palms and fingers."""
 
     noise: float = option(0.001, "Standard deviation of a measured point, its marker's spread aside", unit="m")
-    missing: float = option(9.0, "Energy of a marker without a point, half a squared deviation")
+    missing: float = option(11.0, "Energy of a marker without a point, half a squared deviation")
     coarse: float = option(0.012, "Standard deviation that the steps of the search add", unit="m")
     rotations: int = option(150, "Orientations that each posture is aligned from")
     palms: int = option(60, "Palms whose fingers are searched closely")
     hypotheses: int = option(24, "Assignments that are fitted with unknown sizes")
-    widening: float = option(1.5, "Factor of the spread of postures along the synergies")
-    residual: float = option(0.25, "Standard deviation of an angle about the synergies", unit="rad")
-    temperature: float = option(4.0, "Divides energies that confidence is computed from: their errors are not normal")
+    expansions: int = option(12, "Most assignments whose neighbours are fitted")
+    least_expansions: int = option(2, "Fewest such assignments")
+    promising: float = option(4.0, "Energy above the best at which an assignment's neighbours are not fitted")
+    widening: float = option(2.0, "Factor of the spread of postures along the synergies")
+    residual: float = option(0.35, "Standard deviation of an angle about the synergies", unit="rad")
+    least_share: float = option(0.5, "Smallest share of the markers of a model that must have points")
+    temperature: float = option(1.0, "Divides the energies that the confidence is computed from; 1: as probabilities")
 
 
 @dataclass(frozen=True)
 class InitialisationOptions:
-    """Which points of a frame are which markers of which model."""
+    """Assignment of the points of a frame to the markers of models."""
 
     method: Literal["search", "paper"] = option("search", "Search over palms and fingers, or the method of the paper")
     paper: PaperOptions = option(PaperOptions(), "Method of Maycock et al. 2015", advanced=True)

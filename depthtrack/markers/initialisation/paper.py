@@ -46,7 +46,7 @@ class _Match:
 def initialise_as_paper(
     points: Array, models: tuple[MarkerModel, ...], options: PaperOptions | None = None
 ) -> tuple[StartedModel | None, ...]:
-    """Return each model in the cluster that it matches best, one model a cluster; None without a cluster.
+    """Return each model in the cluster that it matches best; None without a cluster.
 
     points: (K, 3) metres, capture frame, finite.
     """
@@ -96,7 +96,7 @@ def _scaled(model: MarkerModel, factor: float) -> MarkerModel:
 
 
 def _fitted(model: MarkerModel, target: Array, assigned: Index, pose: Array) -> Array:
-    """Return the pose of inverse kinematics, Eq. (4) to (6); that of rigid alignment for a rigid body."""
+    """Return the pose of inverse kinematics, Eq. (4) to (6)."""
     targets = np.where((assigned >= 0)[:, None], target[assigned], np.nan)
     return fit_points(model.kinematics.chain, model.bodies, model.offsets, targets, start=pose).pose
 

@@ -1,4 +1,4 @@
-"""The result of an initialisation, and the JSON file in which it is saved for later captures.
+"""The result of an initialisation, and its JSON file for later captures.
 
 Maycock et al. 2015, Sec. III-A: "This configuration can be saved and later loaded to ensure subsequent trials are
 automated."
@@ -70,7 +70,7 @@ class StartedModel:
 
 @dataclass(frozen=True, eq=False)
 class StartedModels:
-    """The models found in a frame, in the order in which they were given; None for a model that was not found.
+    """The models found in a frame, in the order given; None for one that was not found.
 
     frame: index of the frame in its capture.
     """

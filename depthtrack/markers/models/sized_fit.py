@@ -26,6 +26,8 @@ from depthtrack.markers.models.sized_markers import (
 from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.types import Array, Index
 
+_HELD = 1e-3
+"""Standard deviation of calibrated sizes in a fit: a tenth of a percent."""
 _SMALLEST_GAIN = 1e-4
 """Decrease of the energy, without unit, below which a fit ends."""
 
@@ -43,7 +45,7 @@ class PosturePrior:
 
     @staticmethod
     def from_synergies(widening: float, residual: float) -> "PosturePrior":
-        """Return the distribution of the postures of the synergies that come with depthtrack, made wider.
+        """Return a wider distribution than that of the synergies of depthtrack.
 
         widening: factor of the standard deviation along each synergy.
         residual: standard deviation of an angle about its synergies, rad.
@@ -85,13 +87,16 @@ class SizedFitter:
 
     @cached_property
     def size_precision(self) -> Array:
-        """The inverse covariance (35, 35) of the sizes."""
+        """The inverse covariance (35, 35) of the sizes; calibrated sizes are held.
+
+        Their errors are shared with those of the offsets: both place the markers where they were measured.
+        """
         if self.model.size_spread is not None:
-            return np.diag(1 / np.maximum(self.model.size_spread, 1e-5) ** 2)
+            return np.eye(COUNT) / _HELD**2
         return np.asarray(np.linalg.inv(prior_covariance()))
 
     def fit(self, pose: Array, sizes: Array, points: Array, assigned: Index) -> tuple[float, Array]:
-        """Fit pose (27,) and sizes (35,), both changed in place; return energy and markers (M, 3), metres.
+        """Fit pose (27,) and sizes (35,) in place; return energy and markers (M, 3), metres.
 
         points: (K, 3) metres, capture frame.
         assigned: (M,) point of each marker, -1 for none.
@@ -212,7 +217,7 @@ def fit_sized(
 
 @compiled(nogil=True)
 def _accumulate(A: Array, b: Array, J: Array, e: Array, weight: float) -> None:
-    """Add a marker to the normal equations A (n, n) and b (n,); most of its Jacobian J (3, 61) is zero."""
+    """Add a marker to A (n, n) and b (n,); most of its Jacobian J (3, 61) is zero."""
     n = b.shape[0]
     columns, count = np.empty(n, np.int64), 0
     for j in range(n):

@@ -63,6 +63,12 @@ def test_labels_are_put_in_order(tmp_path: Path) -> None:
     assert [note.split()[0] for note in found.notes] == ["1", "the", "1", "the"]
 
 
+def test_numbers_that_are_none_are_passed_over(tmp_path: Path) -> None:
+    nan = b"\4\1\2" + struct.pack("<ff", np.nan, np.inf) + b"\0"
+    extra = {"TRIAL:ACTUAL_START_FIELD": nan, "TRIAL:ACTUAL_END_FIELD": nan, "POINT:LONG_FRAMES": nan}
+    assert len(read(tmp_path, C3dFile(points(40, 1), ("a",), extra=extra))) == 40
+
+
 def test_angles_and_forces_are_left_out(tmp_path: Path) -> None:
     angles = C3dFile(points(2, 1)).strings(("knee",))
     found = read(tmp_path, C3dFile(points(2, 3), ("a", "knee", "b"), extra={"POINT:ANGLES": angles}))
@@ -98,6 +104,7 @@ def test_more_frames_than_the_header_counts(tmp_path: Path, how: str, last: int)
     found = read(tmp_path, C3dFile(stored, ("a",), first_frame=7, extra=LONG_COUNTS[how], header={5: last}))
     assert (len(found), found.first_frame) == (70000, 7)
     assert "the first frame in the file is 7" in found.notes
+    assert "the header counts to 65,535" in found.notes[0]
 
 
 @pytest.mark.parametrize("header", [{2: 2}, {5: 3}, {9: 4}, {3: 1}])

@@ -44,7 +44,7 @@ def test_a_wrong_count_and_surplus_labels_are_noted(tmp_path: Path) -> None:
     header = [line.replace("\tindex\t", "\tindex\tring") for line in HEADER]
     capture = read_capture(saved(tmp_path, *header, *ROWS[:2]))
     assert capture.labels == ("thumb", "index")
-    assert any("states 3 frames, the file has 2" in note for note in capture.notes)
+    assert any("states '3' frames, the file has 2" in note for note in capture.notes)
     assert any("1 labels have no trajectory" in note for note in capture.notes)
 
 

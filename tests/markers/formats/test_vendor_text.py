@@ -70,10 +70,17 @@ def test_a_trc_header_that_contradicts_the_rows_gives_way(tmp_path: Path) -> Non
     assert capture.rate == pytest.approx(2 / 0.017)
     assert capture.labels == ("thumb", "index")
     assert [note.split(";")[0][:30] for note in capture.notes] == [
-        "the header states 4 markers, t",
-        "the header states 7 frames, th",
+        "the header states '4' markers,",
+        "the header states '7' frames, ",
         "the header states 60 Hz, the t",
     ]
+
+
+def test_trc_without_a_row_of_axes_counts_by_its_header(tmp_path: Path) -> None:
+    text = TRC.replace("\t\tX1\tY1\tZ1\tX2\tY2\tZ2\t\n\n", "")
+    assert read(tmp_path, text).labels == ("thumb", "index")
+    with pytest.raises(InputError, match="line 3: NumMarkers must be a number"):
+        read(tmp_path, text.replace("3\t2\tmm", "3\t" + "9" * 5000 + "\tmm"))
 
 
 def test_vicon_csv(tmp_path: Path) -> None:
@@ -90,6 +97,17 @@ def test_motive_csv_takes_the_measured_markers(tmp_path: Path) -> None:
     np.testing.assert_allclose(capture.positions[0, 0], [0.12, 0.22, 0.32])
     np.testing.assert_allclose(capture.positions[1, 1], [0.14, 0.24, 0.34])
     assert capture.is_labelled.tolist() == [True, False]
+
+
+def test_vicon_csv_may_begin_with_blank_lines(tmp_path: Path) -> None:
+    assert len(read(tmp_path, "\n\n" + VICON).labels) == 3
+
+
+def test_motive_columns_without_axis_are_passed_over(tmp_path: Path) -> None:
+    lines = MOTIVE.splitlines()
+    lines[2:6] = [f"{line},Marker Quality,Marker Quality" for line in lines[2:6]]
+    lines[6:] = [lines[6] + ",,", lines[7] + ",0.9,0.8", lines[8]]
+    np.testing.assert_allclose(read(tmp_path, "\n".join(lines)).positions[0, 0], [0.12, 0.22, 0.32])
 
 
 def test_motive_csv_without_measured_markers_takes_the_solved_ones(tmp_path: Path) -> None:
