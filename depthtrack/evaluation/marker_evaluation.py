@@ -23,12 +23,8 @@ from depthtrack.markers.folder.contents import is_marker_folder
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.formats.registry import read_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.synthesis.marker_folder import COMPLETE_FILE, TRUTH
 from depthtrack.types import Array, Index
-
-TRUTH = "truth"
-"""Folder of the truth beside a synthetic capture."""
-COMPLETE_FILE = "complete.csv"
-"""File of the complete true positions in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +179,8 @@ def evaluate_labelled(
         int(np.isfinite(points).all(axis=-1).sum()),
     )
     errors = _position_errors(labelled, truth, expected, filled)
-    return MarkerEvaluation(name, truth.name, frames, score, errors, dict(_angles(labelled, truth)))
+    poses = labelled.poses if filled is None else filled.poses
+    return MarkerEvaluation(name, truth.name, frames, score, errors, dict(_angles(labelled, truth, poses)))
 
 
 def _position_errors(
@@ -203,11 +200,13 @@ def _position_errors(
     )
 
 
-def _angles(labelled: LabelledCapture, truth: MarkerTruth) -> Iterator[tuple[str, AngleErrors]]:
+def _angles(
+    labelled: LabelledCapture, truth: MarkerTruth, poses: tuple[Array, ...]
+) -> Iterator[tuple[str, AngleErrors]]:
     for k, model in enumerate(labelled.models):
         if model.name in truth.poses and model.hand is not None:
             measured = np.asarray(labelled.columns[k] >= 0)
-            yield model.name, AngleErrors.between(labelled.poses[k], truth.poses[model.name], measured, model.bodies)
+            yield model.name, AngleErrors.between(poses[k], truth.poses[model.name], measured, model.bodies)
 
 
 def _expected(labelled: LabelledCapture, true_labels: tuple[str, ...]) -> Index:

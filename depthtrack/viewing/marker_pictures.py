@@ -22,12 +22,12 @@ def scene_picture(scene: MarkerScene, frame: int, title: str) -> Image:
     labelled = scene.labelled
     tiles = []
     if len(labelled.models) > 1:
-        tiles.append(captioned(scene.draw(frame, whole_view(scene, frame), named=False), "all models"))
+        tiles.append(captioned(scene.draw(frame, whole_view(scene, frame)), "all models"))
     for k, model in enumerate(labelled.models):
         view = model_view(scene, k, frame)
         measured = int((labelled.columns[k][frame] >= 0).sum())
         remark = f"{measured} of {len(model.labels)} markers measured{_residual_text(labelled, k, frame)}"
-        tiles.append(captioned(scene.draw(frame, view), model.name, remark))
+        tiles.append(captioned(scene.draw(frame, view, named=k), model.name, remark))
     grid = tile_grid(tiles, min(2, len(tiles)))
     unlabelled = int(np.isfinite(scene.rest[frame]).all(axis=-1).sum())
     number = labelled.capture.first_frame + frame
@@ -44,7 +44,7 @@ def marker_sheet(scene: MarkerScene, frames: Sequence[int], title: str, columns:
     small = view.resized(width / view.camera.width)
     tiles = [
         captioned(
-            scene.draw(frame, small, named=False),
+            scene.draw(frame, small),
             f"frame {capture.first_frame + frame}",
             f"{capture.times[frame]:.2f} s  ·  {_count_text(scene.labelled, frame)}",
         )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Self
+from typing import NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -34,6 +34,14 @@ _RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))
 """Offsets of the dark rim of a name, pixels."""
 _FIXED_POINT = 4
 """Bits of a pixel's fraction in OpenCV's drawing functions."""
+
+
+class Dot(NamedTuple):
+    """A drawn marker: its name, pixel (2,) and colour."""
+
+    name: str
+    pixel: Array
+    colour: Rgb
 
 
 @dataclass(frozen=True)
@@ -85,8 +93,10 @@ class MarkerScene:
         """The surface of each hand; None for a rigid body."""
         return tuple(None if model.hand is None else _surface(model.hand) for model in self.labelled.models)
 
-    def draw(self, frame: int, view: View, named: bool = True) -> Image:
+    def draw(self, frame: int, view: View, named: int | None = None) -> Image:
         """Return a picture (h, w, 3) of a frame in a view.
+
+        named: model whose markers have their names beside them; None for none.
 
         Filled dots are markers that were measured, rings those that the pose or the filling puts there. Crosses are
         points without a label.
@@ -97,8 +107,8 @@ class MarkerScene:
         self._draw_rest(image, frame, fine)
         dots = self._draw_markers(image, frame, fine, surface)
         image = smaller(image, view.camera.width, view.camera.height)
-        if named:
-            _draw_names(image, dots)
+        if named is not None:
+            _draw_names(image, dots[named])
         return image
 
     def _rendered(self, frame: int, view: View) -> RenderedSurface:
@@ -122,11 +132,9 @@ class MarkerScene:
                 ends = _fixed([x - dx, y - dy]), _fixed([x + dx, y + dy])
                 cv2.line(image, *ends, UNLABELLED_COLOUR, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
 
-    def _draw_markers(
-        self, image: Image, frame: int, view: View, surface: RenderedSurface
-    ) -> list[tuple[str, Array, Rgb]]:
-        """Draw the markers of all models; return name, pixel and colour of those in the image."""
-        dots = []
+    def _draw_markers(self, image: Image, frame: int, view: View, surface: RenderedSurface) -> list[list[Dot]]:
+        """Draw the markers; return those in the image of each model."""
+        dots: list[list[Dot]] = [[] for _ in self.labelled.models]
         for k, model in enumerate(self.labelled.models):
             expected = view.points(model.positions(self.labelled.poses[k][frame]))
             at = view.points(self.positions[k][frame])
@@ -142,7 +150,7 @@ class MarkerScene:
                 _draw_offset(image, pixel, view.camera.project(expected[m]), colours[m])
                 _draw_dot(image, pixel, colours[m], bool(measured[m]), bool(hidden[m]))
                 if 0 <= pixel[0] < view.camera.width and 0 <= pixel[1] < view.camera.height:
-                    dots.append((model.labels[m], pixel / _SUPERSAMPLING, colours[m]))
+                    dots[k].append(Dot(model.labels[m], pixel / _SUPERSAMPLING, colours[m]))
         return dots
 
     def colours(self, k: int) -> list[Rgb]:
@@ -204,20 +212,20 @@ def _draw_edges(image: Image, pixels: Array, colour: Rgb) -> None:
         cv2.line(image, _fixed(a), _fixed(b), colour, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
 
 
-def _draw_names(image: Image, dots: list[tuple[str, Array, Rgb]]) -> None:
+def _draw_names(image: Image, dots: list[Dot]) -> None:
     size = 12
-    pixels = np.array([pixel for _, pixel, _ in dots]).reshape(-1, 2)
-    boxes = np.array([[text_width(name, size), size] for name, _, _ in dots], dtype=np.float64).reshape(-1, 2)
+    pixels = np.array([dot.pixel for dot in dots]).reshape(-1, 2)
+    boxes = np.array([[text_width(dot.name, size), size] for dot in dots], dtype=np.float64).reshape(-1, 2)
     corners = place_names(pixels, boxes, image.shape[:2], clearance=8)
-    for (_, pixel, colour), corner, box in zip(dots, corners, boxes, strict=True):
-        nearest = np.clip(pixel, corner, corner + box)
-        if np.linalg.norm(nearest - pixel) > 14:
-            cv2.line(image, _fixed(pixel), _fixed(nearest), colour, 1, cv2.LINE_AA, _FIXED_POINT)
-    for (name, _, _), corner in zip(dots, corners, strict=True):
+    for dot, corner, box in zip(dots, corners, boxes, strict=True):
+        nearest = np.clip(dot.pixel, corner, corner + box)
+        if np.linalg.norm(nearest - dot.pixel) > 14:
+            cv2.line(image, _fixed(dot.pixel), _fixed(nearest), dot.colour, 1, cv2.LINE_AA, _FIXED_POINT)
+    for dot, corner in zip(dots, corners, strict=True):
         x, y = round(corner[0]), round(corner[1] + size / 2)
         for dx, dy in _RIM:
-            put_text(image, name, (x + dx, y + dy), size, OUTLINE)
-        put_text(image, name, (x, y), size, TEXT)
+            put_text(image, dot.name, (x + dx, y + dy), size, OUTLINE)
+        put_text(image, dot.name, (x, y), size, TEXT)
 
 
 def _fixed(pixel: "Array | list[float]") -> tuple[int, int]:

@@ -51,4 +51,4 @@ def _picture(scene: MarkerScene, frame: int, view: View) -> Image:
     lost = sum(not np.isfinite(poses[frame]).all() for poses in labelled.poses)
     remark = f"{measured} of {markers} markers" + (f"  ·  {lost} lost" if lost else "")
     left = f"frame {labelled.capture.first_frame + frame}  ·  {labelled.capture.times[frame]:.2f} s"
-    return captioned(scene.draw(frame, view, named=False), left, remark)
+    return captioned(scene.draw(frame, view), left, remark)

@@ -27,7 +27,7 @@ def scene() -> MarkerScene:
 
 def test_a_dot_is_where_each_measured_marker_is(scene: MarkerScene) -> None:
     frame, view = 30, model_view(scene, 0, 30)
-    image = scene.draw(frame, view, named=False)
+    image = scene.draw(frame, view)
     pixels = view.camera.project(view.points(scene.positions[0][frame]))
     expected = view.camera.project(view.points(scene.labelled.models[0].positions(scene.labelled.poses[0][frame])))
     measured = scene.labelled.columns[0][frame] >= 0
@@ -47,7 +47,7 @@ def test_points_without_a_label_are_crosses(scene: MarkerScene) -> None:
     ghost = scene.rest[with_ghost][np.isfinite(scene.rest[with_ghost]).all(axis=-1)][0]
     x, y = view.camera.project(view.points(ghost)).round().astype(int)
     if 4 <= x < view.camera.width - 4 and 4 <= y < view.camera.height - 4:
-        patch = scene.draw(with_ghost, view, named=False)[y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3).astype(int)
+        patch = scene.draw(with_ghost, view)[y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3).astype(int)
         assert np.abs(patch - np.array(UNLABELLED_COLOUR)).max(axis=1).min() < 60
 
 
@@ -71,9 +71,9 @@ def test_a_lost_hand_is_not_drawn_and_its_markers_have_no_rings(scene: MarkerSce
     columns = tuple(np.full_like(each, -1) for each in labelled.columns)
     empty = MarkerScene.of(replace(nowhere, columns=columns, capture=replace(labelled.capture)))
     view = whole_view(scene)
-    drawn = empty.draw(0, view, named=False)
+    drawn = empty.draw(0, view)
     colours = np.unique(drawn.reshape(-1, 3), axis=0)
-    assert len(colours) < len(np.unique(scene.draw(0, view, named=False).reshape(-1, 3), axis=0)) / 4
+    assert len(colours) < len(np.unique(scene.draw(0, view).reshape(-1, 3), axis=0)) / 4
 
 
 @given(seed=st.integers(0, 1000), count=st.integers(0, 30))

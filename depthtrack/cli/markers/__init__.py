@@ -3,6 +3,7 @@
 from depthtrack.cli import CommandEntry
 
 COMMANDS: dict[str, CommandEntry] = {
+    "label": CommandEntry("depthtrack.cli.markers.label", "find the markers of hands and rigid bodies in a capture"),
     "info": CommandEntry("depthtrack.cli.markers.info", "list frames, markers, gaps and size of a capture"),
     "shuffle": CommandEntry("depthtrack.cli.markers.shuffle", "strip the labels of a capture, to test the labelling"),
     "cut": CommandEntry("depthtrack.cli.markers.cut", "cut stretches out of trajectories, to test the gap filling"),

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 if TYPE_CHECKING:
+    from depthtrack.markers.filled_capture import FilledCapture
+    from depthtrack.markers.labelled_capture import LabelledCapture
     from depthtrack.markers.models.marker_model import MarkerModel
     from depthtrack.viewing.marker_scene import MarkerScene
 
@@ -32,14 +34,33 @@ class FolderOptions:
 
         check_output(self.out, tuple(model.name for model in models), f".{self.format}")
 
-    def draw(self, scene: "MarkerScene", title: str) -> None:
-        """Draw `scene.png` and `residual.png`, if wanted.
+    def write(
+        self,
+        labelled: "LabelledCapture",
+        source: Path,
+        configuration: dict[str, Any],
+        filled: "FilledCapture | None" = None,
+    ) -> None:
+        """Write the folder, with the true poses of a synthetic capture, and the pictures.
+
+        source: file of the capture.
 
         Raises:
             InputError: if a file cannot be written.
         """
-        if not self.pictures:
-            return
+        from depthtrack.markers.folder.contents import Source
+        from depthtrack.markers.folder.reading import truth_beside
+        from depthtrack.markers.folder.writing import write_marker_folder
+        from depthtrack.viewing.marker_scene import MarkerScene
+
+        write_marker_folder(
+            self.out, labelled, Source.of(source), configuration, truth_beside(source), f".{self.format}", filled
+        )
+        if self.pictures:
+            scene = MarkerScene.of(labelled) if filled is None else MarkerScene.of_filled(filled)
+            self._draw(scene, source.name)
+
+    def _draw(self, scene: "MarkerScene", title: str) -> None:
         from depthtrack.files import write_atomic
         from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.marker_pictures import fullest_frame, scene_picture

@@ -9,7 +9,7 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.filled_capture import FilledCapture
-from depthtrack.markers.folder.contents import MODELS, Contents
+from depthtrack.markers.folder.contents import MODELS, Contents, is_marker_folder
 from depthtrack.markers.folder.filled_samples import read_filled
 from depthtrack.markers.folder.tables import read_rigid_poses, read_values
 from depthtrack.markers.formats.conditioning import METRES
@@ -18,6 +18,9 @@ from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.recording.run_folder import Run
 from depthtrack.types import Array, Index
+
+TRUTH = "truth"
+"""Name of the folder with the truth of a synthetic capture."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,16 @@ class MarkerFolder:
         """Raise InputError if the source of the folder is missing or has changed since."""
         if self.contents.source is not None:
             self.contents.source.check()
+
+
+def truth_beside(source: Path) -> LabelledCapture | None:
+    """Return the truth of a synthetic capture, from the folder beside it; None without one.
+
+    Raises:
+        InputError: if that folder is malformed.
+    """
+    folder = source.parent / TRUTH
+    return MarkerFolder.load(folder).labelled if is_marker_folder(folder) else None
 
 
 def _model(path: Path, name: str) -> MarkerModel:
