@@ -57,6 +57,11 @@ def find_start(
     return best
 
 
+def sized_models(models: Sequence[MarkerModel], started: StartedModels) -> tuple[MarkerModel, ...]:
+    """Return the models with the sizes that a start found."""
+    return tuple(model if one is None else one.model for model, one in zip(models, started.models, strict=True))
+
+
 def label_from(
     capture: MarkerCapture,
     models: Sequence[MarkerModel],
@@ -65,17 +70,16 @@ def label_from(
 ) -> LabelledCapture:
     """Return the labels and poses of all frames, from the frame of a start in both directions.
 
-    models: those to label where the start found none.
-    started: as `find_start` returns it, or as it was saved from another capture of the same frame.
+    models: as `sized_models` returns them, or calibrated ones.
+    started: as `find_start` returns it, or as it was saved.
     """
     options = options or LabellingOptions()
-    sized = [one.model if one is not None else model for model, one in zip(models, started.models, strict=True)]
     poses = [None if one is None else one.pose for one in started.models]
     frame = started.frame
-    after = label_capture(capture.between(frame, len(capture)), sized, options, poses)
+    after = label_capture(capture.between(frame, len(capture)), models, options, poses)
     if frame == 0 or not options.offline.use:
-        return _joined(capture, _nothing(sized, frame), after)
-    before = label_capture(_reversed(capture.between(0, frame + 1)), sized, options, poses)
+        return _joined(capture, _nothing(models, frame), after)
+    before = label_capture(_reversed(capture.between(0, frame + 1)), models, options, poses)
     return _joined(capture, _reversed_labels(before), after)
 
 
