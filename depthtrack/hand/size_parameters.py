@@ -122,13 +122,15 @@ def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Ar
     return J
 
 
-def measures(values: Array) -> dict[str, tuple[float, Array]]:
+def measures(values: Array, reference: HandShape | None = None) -> dict[str, tuple[float, Array]]:
     """Return each length and width (m), and the gradient (35,) of its logarithm, by name.
 
     The hand length is from the wrist to the tip of the middle finger, a finger length from base joint to tip. A width
     is the diameter of the middle joint, or of the last joint of the thumb.
+
+    reference: hand that the sizes refer to; the average one if None.
     """
-    hand, table = hand_of(values, "right"), {}
+    hand, table = resized(reference or HandShape(), values), {}
     lengths = hand.lengths * hand.scale
     palm = (hand.palm_length / 2 + hand.bases[2, 1]) * hand.scale
     whole = np.eye(COUNT)[0]

@@ -26,6 +26,8 @@ from depthtrack.markers.models.sized_markers import (
 from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.types import Array, Index
 
+_HELD = 1e-3
+"""Standard deviation of calibrated sizes in a fit: a tenth of a percent."""
 _SMALLEST_GAIN = 1e-4
 """Decrease of the energy, without unit, below which a fit ends."""
 
@@ -85,9 +87,12 @@ class SizedFitter:
 
     @cached_property
     def size_precision(self) -> Array:
-        """The inverse covariance (35, 35) of the sizes."""
+        """The inverse covariance (35, 35) of the sizes; calibrated sizes are held.
+
+        Their errors are shared with those of the offsets: both place the markers where they were measured.
+        """
         if self.model.size_spread is not None:
-            return np.diag(1 / np.maximum(self.model.size_spread, 1e-5) ** 2)
+            return np.eye(COUNT) / _HELD**2
         return np.asarray(np.linalg.inv(prior_covariance()))
 
     def fit(self, pose: Array, sizes: Array, points: Array, assigned: Index) -> tuple[float, Array]:

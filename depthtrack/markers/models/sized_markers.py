@@ -77,15 +77,21 @@ def set_sizes(markers: SizedMarkers, sizes: Array) -> None:
             markers.chain.base[f, 0, 3] += step * markers.chain.mirror * sizes[_KNUCKLES + 2 * f - 2]
             markers.chain.base[f, 1, 3] += step * sizes[_KNUCKLES + 2 * f - 1]
     for i in range(markers.bodies.shape[0]):
-        b = markers.bodies[i]
-        if b == 0:
-            x, y, z = stretch[0], stretch[1], stretch[2]
-        else:
-            x = math.exp(sizes[_WIDTHS + (b - 1) // 3])
-            y, z = math.exp(sizes[_LENGTHS + b - 1]), x
-        markers.local[i, 0] = whole * x * markers.offsets[i, 0]
-        markers.local[i, 1] = whole * y * markers.offsets[i, 1]
-        markers.local[i, 2] = whole * z * markers.offsets[i, 2]
+        x, y, z = offset_stretch(sizes, markers.bodies[i])
+        markers.local[i, 0] = x * markers.offsets[i, 0]
+        markers.local[i, 1] = y * markers.offsets[i, 1]
+        markers.local[i, 2] = z * markers.offsets[i, 2]
+
+
+@compiled(nogil=True)
+def offset_stretch(sizes: Array, body: int) -> tuple[float, float, float]:
+    """Return the factors of an offset on a body, in its frame, for sizes (35,)."""
+    whole = math.exp(sizes[0])
+    if body == 0:
+        stretch = sizes[_PALM : _PALM + 3]
+        return whole * math.exp(stretch[0]), whole * math.exp(stretch[1]), whole * math.exp(stretch[2])
+    across = whole * math.exp(sizes[_WIDTHS + (body - 1) // 3])
+    return across, whole * math.exp(sizes[_LENGTHS + body - 1]), across
 
 
 @compiled(nogil=True)
