@@ -1,4 +1,7 @@
-"""The poses of a capture whose labels are known (Maycock et al. 2015, Eq. 4 to 6, without the assignment)."""
+"""The poses of a capture whose labels are known.
+
+Maycock et al. 2015, Eq. (4) to (6), without the assignment.
+"""
 
 from dataclasses import replace
 
@@ -28,9 +31,9 @@ _LEAST_SPREAD = 0.001
 
 
 def fit_poses(labelled: LabelledCapture, options: LabellingOptions | None = None) -> LabelledCapture:
-    """Return the capture with the poses that fit its labels; those of joints without a marker are interpolated.
+    """Return the capture with the poses that fit its labels.
 
-    A frame with fewer than three markers of a model has the interpolated pose if it lies between others, else none.
+    Angles of joints without a marker are interpolated. A frame with fewer than three markers of a model has the interpolated pose if it lies between others, else none.
     """
     options = options or LabellingOptions()
     starts = [_frame_poses(model, labelled.positions(k)) for k, model in enumerate(labelled.models)]

@@ -14,7 +14,7 @@ LEAST_SHARE = 0.5
 
 
 def labels_by_name(capture: MarkerCapture, models: Sequence[MarkerModel]) -> LabelledCapture | None:
-    """Return the capture with its own labels and without poses; None if it lacks those of a model.
+    """Return a capture with its own labels, without poses; None if it lacks those of a model.
 
     A label matches with the model's name and a colon before it, or alone if no other model has it.
     """
