@@ -33,7 +33,9 @@ def _rigid_bridge(poses: Array, start: int, stop: int, known: Mask) -> Array:
     if start == 0 and stop == len(poses):
         return poses[:, :7]
     reference = make_pose(
-        poses[start - 1 if start > 0 else stop, POSITION], poses[start - 1 if start > 0 else stop, ORIENTATION], np.zeros(20)
+        poses[start - 1 if start > 0 else stop, POSITION],
+        poses[start - 1 if start > 0 else stop, ORIENTATION],
+        np.zeros(20),
     )
     neighbours = np.clip(np.arange(start - 2, stop + 2), 0, len(poses) - 1)
     steps = np.full((len(poses), 6), np.nan)
@@ -55,5 +57,3 @@ def _bridge(values: Array, start: int, stop: int, known: Mask) -> Array:
     earlier = start - 2 if start >= 2 and known[start - 2] else start - 1
     later = stop + 1 if stop + 1 < last and known[stop + 1] else stop
     return minimal_acceleration(values[[earlier, start - 1]], values[[stop, later]], stop - start)
-
-

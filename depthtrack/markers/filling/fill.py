@@ -63,9 +63,7 @@ def _baseline(positions: Array, poses: Array, method: str) -> Prediction:
     return Prediction(positions, np.full(shape, int(_FILLING[method])), np.full(shape, np.nan), poses)
 
 
-def _pca(
-    labelled: LabelledCapture, measured: list[Array], gaps: list[list[Gap]], options: FillOptions
-) -> list[Array]:
+def _pca(labelled: LabelledCapture, measured: list[Array], gaps: list[list[Gap]], options: FillOptions) -> list[Array]:
     """Return the gaps (T, M, 3) of each model, filled with the markers of all models and other named trajectories."""
     used = {int(column) for columns in labelled.columns for column in np.unique(columns)}
     others = [c for c in np.flatnonzero(labelled.capture.is_labelled) if int(c) not in used]

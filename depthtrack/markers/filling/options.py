@@ -23,7 +23,9 @@ class PaperFillOptions:
     """Frozen joints and interpolated angles (Maycock et al. 2015, Sec. III-C)."""
 
     plausible_distance: float = option(
-        0.005, "A marker reappears where its distance from the model exceeds the mean by at most this", unit="m",
+        0.005,
+        "A marker reappears where its distance from the model exceeds the mean by at most this",
+        unit="m",
         source=_MAYCOCK,
     )
 

@@ -44,7 +44,7 @@ def adopt_tracklets(
         frames = points.frame[numbers]
         near = np.linalg.norm(expected.position[frames] - points.position[numbers][:, None], axis=-1)
         candidates = np.flatnonzero((out[frames] < 0).all(axis=0) & (np.median(near, axis=0) < REACH))
-        misfits = [_misfit(points.position, numbers, frames, out, i, fitted, scene, settings) for i in candidates]
+        misfits = [_misfit(points.position, numbers, frames, out, int(i), fitted, scene, settings) for i in candidates]
         if misfits and min(misfits) < settings.reject_new:
             out[frames, candidates[int(np.argmin(misfits))]] = numbers
     return out
@@ -60,7 +60,7 @@ def _misfit(
     scene: Scene,
     settings: Settings,
 ) -> float:
-    """Return the largest usual misfit of the marker's model with a tracklet as the marker, in standard deviations."""
+    """Return the misfit of a model with a tracklet as the marker, in standard deviations."""
     chosen = np.unique(np.linspace(0, len(numbers) - 1, SAMPLES).round().astype(int))
     trial = labels[frames[chosen]].copy()
     trial[:, marker] = numbers[chosen]

@@ -1,4 +1,7 @@
-"""Assignment of the points of a frame to the expected markers: likelihood ratios, or padded distances (Eq. 3)."""
+"""Assignment of the points of a frame to the expected markers.
+
+It maximises likelihood ratios, or minimises padded distances (Maycock et al. 2015, Eq. 3).
+"""
 
 import numpy as np
 
@@ -15,7 +18,7 @@ PADDING = 1e3
 
 @compiled(nogil=True)
 def assign(points: Array, scene: Scene, settings: Settings, state: TrackState, out: FrameLabels) -> None:
-    """Write the point of each marker of the active models to `out`; see `assign_padded` and `assign_likely`."""
+    """Write the point of each marker of the active models to `out`."""
     out.point[:] = -1
     out.score[:] = np.nan
     out.margin[:] = np.nan
@@ -58,8 +61,8 @@ def _assign_padded(points: Array, scene: Scene, settings: Settings, state: Track
 def _assign_likely(points: Array, scene: Scene, settings: Settings, state: TrackState, out: FrameLabels) -> None:
     """Maximise the sum of log-likelihood ratios of labels against none.
 
-    A label's ratio is the normal density of the point about the expected place, over the density of points without a
-    marker, times the odds that the marker is visible. Labels with a ratio below 1 are not made. Pairs that compete with
+    The ratio is the density of the point about the expected place over the density of points without a marker. It is
+    multiplied by the odds that the marker is visible. Labels with a ratio below 1 are not made. Pairs that compete with
     no other need no Hungarian method.
     """
     M, K = out.point.shape[0], points.shape[0]

@@ -37,7 +37,9 @@ class FittedFrames(NamedTuple):
 def fit_capture(
     positions: Array, labels: Index, scene: Scene, settings: Settings, starts: Array, last: FittedFrames | None = None
 ) -> FittedFrames:
-    """Return the poses that fit the labelled points; angles without a visible marker are interpolated in time.
+    """Return the poses that fit the labelled points.
+
+    Angles that move no visible marker are interpolated in time.
 
     positions: (N, 3) metres.
     labels: (T, M) numbers of points; -1 for a missing marker.
@@ -58,7 +60,7 @@ def fit_capture(
 
 
 def _usual_residuals(residuals: Array, scene: Scene, settings: Settings) -> tuple[Array, Array]:
-    """Return the median (M, 3) of residuals and their standard deviation (M,) about it, robustly."""
+    """Return the median (M, 3) of residuals and their robust standard deviation (M,)."""
     M = residuals.shape[1]
     usual, scatter = np.zeros((M, 3)), np.maximum(scene.spread, settings.least_spread)
     for i in range(M):
@@ -70,7 +72,7 @@ def _usual_residuals(residuals: Array, scene: Scene, settings: Settings) -> tupl
 
 
 def _interpolate(poses: Array, determined: Mask, loose: Mask) -> None:
-    """Replace undetermined angles, and palms with fewer than three markers, by interpolation in place."""
+    """Interpolate undetermined angles, and palms with fewer than three markers, in place."""
     tracked = np.isfinite(poses[:, 0])
     frames = np.flatnonzero(tracked)
     if len(frames) == 0:
@@ -124,7 +126,7 @@ def _fit_frames(
                 frozen[a] = not determined[t, g, a]
             if visible > 0:
                 fit_pose(scene, g, fit, targets, weights, frozen, pose, slope[g], bodies)
-            for repeat in range(2 if settings.robust > 0 else 0):
+            for _ in range(2 if settings.robust > 0 else 0):
                 place_markers(scene, g, pose, bodies, placed)
                 outliers = False
                 for i in range(scene.first[g], scene.first[g + 1]):
@@ -163,13 +165,13 @@ class ExpectedFrames(NamedTuple):
 
 def expect_markers(fitted: FittedFrames, scene: Scene, settings: Settings) -> ExpectedFrames:
     """Return the places of all markers on the fitted models, with their usual residuals."""
-    T, M = fitted.residuals.shape[:2]
+    T, M = len(fitted.poses), len(scene.body)
     absent = np.zeros((T, M), np.int64)
     for i in range(M):
         absent[:, i] = _frames_to_nearest(np.isfinite(fitted.residuals[:, i, 0]))
     undetermined = np.zeros(fitted.determined.shape, np.int64)
     loose = np.zeros(fitted.loose.shape, np.int64)
-    for g in range(loose.shape[1]):
+    for g in range(len(scene.rigid)):
         loose[:, g] = _frames_to_nearest(~fitted.loose[:, g])
         for a in range(20):
             undetermined[:, g, a] = _frames_to_nearest(fitted.determined[:, g, a])
@@ -179,7 +181,7 @@ def expect_markers(fitted: FittedFrames, scene: Scene, settings: Settings) -> Ex
 
 
 def _frames_to_nearest(known: Mask) -> Index:
-    """Return the distance (T,) of each frame to the nearest one of a mask (T,); 1000 if there is none."""
+    """Return the distance (T,) of each frame to the nearest of a mask (T,); 1000 for none."""
     frames, chosen = np.arange(len(known)), np.flatnonzero(known)
     if len(chosen) == 0:
         return np.full(len(known), 1000)

@@ -17,7 +17,7 @@ CONTEST = -10.0
 
 
 def tracklet_evidence(points: PackedPoints, tracklet: Index, expected: ExpectedFrames, settings: Settings) -> Array:
-    """Return the summed log-likelihood ratio (K, M) of K tracklets being a marker against being clutter."""
+    """Return the log-likelihood ratio (K, M) of K tracklets being a marker or clutter."""
     out = np.zeros((int(tracklet.max(initial=-1)) + 1, expected.position.shape[1]))
     _add_evidence(points.position, points.frame, tracklet, expected, settings.clutter, out)
     return out
@@ -39,7 +39,7 @@ def _add_evidence(
 
 
 def contested(points: PackedPoints, tracklet: Index, labels: Index, expected: ExpectedFrames, clutter: float) -> Mask:
-    """Return whether each tracklet (K,) holds a marker that a point without a label could be in most of its frames.
+    """Return whether each tracklet (K,) has a rival without a label in most of its frames.
 
     The fit follows the points that it is given. So a ghost with a label makes the true point unlikely.
     """
@@ -92,7 +92,7 @@ def assign_tracklets(points: PackedPoints, tracklet: Index, evidence: Array) -> 
 
 @compiled(nogil=True)
 def _take(pairs: Index, begin: Index, end: Index, taken: Mask, marker: Index) -> None:
-    """Give each tracklet of the pairs (P, 2) its marker, unless the marker has a point in one of its frames already."""
+    """Give each tracklet of the pairs (P, 2) its marker, if that has no point in its frames."""
     for n in range(pairs.shape[0]):
         k, i = pairs[n]
         if marker[k] < 0 and not taken[i, begin[k] : end[k]].any():

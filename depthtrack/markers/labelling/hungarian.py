@@ -1,4 +1,4 @@
-"""The Hungarian method, compiled: rectangular assignment of least cost by shortest augmenting paths.
+"""The Hungarian method, compiled: assignment of least cost by augmenting paths.
 
 Sources: Kuhn, "The Hungarian method for the assignment problem", 1955; Crouse, "On implementing 2D rectangular
 assignment algorithms", IEEE Trans. Aerospace and Electronic Systems 52(4), 2016.

@@ -1,4 +1,4 @@
-"""Offline labelling: the whole capture in both directions, then tracklets by all of their frames."""
+"""Offline labelling: both directions, then tracklets by the evidence of all their frames."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,7 +8,7 @@ import numpy as np
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.labelling.adoption import adopt_tracklets
-from depthtrack.markers.labelling.capture_fit import FittedFrames, expect_markers, fit_capture
+from depthtrack.markers.labelling.capture_fit import expect_markers, fit_capture
 from depthtrack.markers.labelling.evidence import assign_tracklets, contested, label_points, tracklet_evidence
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.labelling.packed import PackedPoints
@@ -27,18 +27,26 @@ def label_capture(
     options: LabellingOptions | None = None,
     starts: Sequence[Array | None] | None = None,
     starter: Starter | None = None,
+    frame: int = 0,
 ) -> LabelledCapture:
     """Return the capture with its points assigned to the markers of models.
 
-    starts: pose (27,) of each model in the first frame; None for one that is not known.
+    starts: pose (27,) of each model in one frame; None for one that is not known.
+    frame: index of that frame; the online method labels the frames before it backward.
     starter: initialisation of models that are not tracked; None: they stay lost.
     """
     chosen = options or LabellingOptions()
     points, scene, settings = PackedPoints.of(capture), Scene.of(models), Settings.of(chosen, capture.rate)
-    forward = track(points, models, scene, settings, starts, starter)
+    last = len(capture)
+    forward = track(points, models, scene, settings, starts, starter, frame, last)
     if not chosen.offline.use:
-        return _labelled(capture, points, models, scene, forward.labels, forward.poses, np.ones(forward.labels.shape))
-    backward = track(points, models, scene, settings, _last(forward.poses), starter, backward=True)
+        before = track(points, models, scene, settings, starts, starter, 0, frame, backward=True)
+        labels = np.where(np.arange(last)[:, None] < frame, before.labels, forward.labels)
+        poses = np.where(np.arange(last)[:, None, None] < frame, before.poses, forward.poses)
+        return _labelled(capture, points, models, scene, labels, poses, np.ones(labels.shape))
+    backward = track(points, models, scene, settings, _known(forward.poses[-1]), starter, 0, last, backward=True)
+    if frame > 0:
+        forward = track(points, models, scene, settings, _known(backward.poses[0]), starter, 0, last)
     starting = np.where(np.isnan(forward.poses), backward.poses, forward.poses)
     tracklet = make_tracklets(points, LinkSettings.of(chosen, capture.rate))
     labels = np.where(forward.labels == backward.labels, forward.labels, -1)
@@ -64,7 +72,7 @@ def label_capture(
 
 
 class Pass(NamedTuple):
-    """Labels (T, M), numbers of points, poses (T, G, 27) and margins (T, M) of the tracker in one direction."""
+    """Labels (T, M), poses (T, G, 27) and margins (T, M) of the tracker in one direction."""
 
     labels: Index
     poses: Array
@@ -78,25 +86,26 @@ def track(
     settings: Settings,
     starts: Sequence[Array | None] | None,
     starter: Starter | None,
+    begin: int,
+    end: int,
     backward: bool = False,
 ) -> Pass:
-    """Track all frames in one direction; models that are lost start again where the starter finds them."""
+    """Track frames in one direction; lost models start again where the starter finds them."""
     T, M, G = len(points.ends) - 1, len(scene.body), len(scene.rigid)
     out = Pass(np.full((T, M), -1, np.int64), np.full((T, G, 27), np.nan), np.full((T, M), np.nan))
     state, frame = TrackState.empty(scene), FrameLabels.empty(M)
     for g, pose in enumerate(starts or ()):
         if pose is not None:
             state.start(scene, g, pose)
-    begin, end = 0, T
     while begin < end:
         n = track_frames(points.position, points.ends, scene, settings, state, frame, begin, end, backward, *out)
         begin, end = (begin, end - n) if backward else (begin + n, end)
     return out
 
 
-def _last(poses: Array) -> list[Array | None]:
-    """Return the last pose (27,) of each model of poses (T, G, 27); None for a model that was never tracked."""
-    return [pose if np.isfinite(pose[0]) else None for pose in poses[-1]]
+def _known(poses: Array) -> list[Array | None]:
+    """Return the poses (G, 27) of a frame; None for a model that is not tracked."""
+    return [pose if np.isfinite(pose[0]) else None for pose in poses]
 
 
 def _labelled(

@@ -29,7 +29,9 @@ class PredictionOptions:
     determined: float = option(0.08, "Standard deviation of a joint that moves a visible marker", unit="rad")
     palm_speed: float = option(0.5, "Drift of a model of which fewer than three markers are visible", unit="m/s")
     largest: float = option(0.06, "Largest standard deviation of a predicted position", unit="m")
-    residual_gain: float = option(0.03, "Share of a new residual in the residual that is kept while a marker is missing")
+    residual_gain: float = option(
+        0.03, "Share of a new residual in the residual that is kept while a marker is missing"
+    )
     familiar: int = option(5, "Frames after which a marker's own residual is used instead of its spread on the model")
 
 

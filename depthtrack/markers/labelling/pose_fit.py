@@ -1,4 +1,4 @@
-"""Fit of one model's pose to its labelled points: Eq. (4) to (6) of Maycock et al. 2015 in a compiled kernel."""
+"""Fit of one model's pose to its labelled points (Maycock et al. 2015, Eq. 4 to 6)."""
 
 from typing import NamedTuple
 

@@ -64,7 +64,7 @@ def residual_spread(scene: Scene, settings: Settings, state: TrackState, i: int)
 
 @compiled(nogil=True)
 def isotropic(variance: float, precision: Array) -> float:
-    """Write the inverse (3, 3) of a covariance with this variance in each coordinate; return the log density at its peak."""
+    """Write the precision (3, 3) of equal variances; return the log density at the peak."""
     precision[:] = 0.0
     for r in range(3):
         precision[r, r] = 1 / variance
@@ -84,7 +84,7 @@ def model_precision(
     loose: int,
     precision: Array,
 ) -> float:
-    """Write the inverse covariance (3, 3) of a marker that the model predicts; return the log density at its peak.
+    """Write the precision (3, 3) of a marker on the model; return the log density at the peak.
 
     Each joint that moves the marker drifts from the frame on in which it last moved a visible one. Its drift moves the
     marker along an arc, and in no other direction.

@@ -1,4 +1,4 @@
-"""All models of a capture in arrays that compiled kernels read: G models with M markers in all."""
+"""All models of a capture in arrays that compiled kernels read."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -67,7 +67,7 @@ def chain_of(scene: Scene, g: int) -> Chain:
 
 @compiled(nogil=True)
 def place_markers(scene: Scene, g: int, pose: Array, bodies: BodyPoses, out: Array) -> None:
-    """Write the markers s(theta) of model g in a pose (27,) to their rows of `out` (M, 3), metres.
+    """Write the markers s(theta) of model g in a pose (27,) to `out` (M, 3), metres.
 
     bodies: receive the transforms.
     """

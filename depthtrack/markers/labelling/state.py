@@ -1,4 +1,4 @@
-"""State of the tracked models between frames, and the result of a frame, in arrays that kernels change in place."""
+"""State of the tracked models and result of a frame, changed in place by kernels."""
 
 from typing import NamedTuple
 
@@ -85,10 +85,6 @@ class TrackState(NamedTuple):
             array[rows] = 0
         self.swap[:, rows] = 0
         self.missing[rows] = NEVER
-
-    def copy(self) -> "TrackState":
-        """Return a state that shares no array."""
-        return TrackState(*(array.copy() for array in self))
 
 
 class FrameLabels(NamedTuple):

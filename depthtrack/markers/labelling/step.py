@@ -1,4 +1,7 @@
-"""One frame of the tracking in one kernel: predict, assign, fit, reject, exchange (Maycock et al. 2015, Fig. 3)."""
+"""One frame of the tracking in one kernel (Maycock et al. 2015, Fig. 3).
+
+It predicts, assigns, fits, rejects and exchanges.
+"""
 
 import numpy as np
 
@@ -59,7 +62,7 @@ def track_frames(
     poses: Array,
     margins: Array,
 ) -> int:
-    """Track frames until one in which a model is lost, or to the end; return the number of frames tracked.
+    """Track frames until a model is lost, or to the end; return the number of frames.
 
     points: (N, 3) the points of all frames, metres; those of frame t are `ends[t]` to `ends[t + 1] - 1`.
     begin, end: first frame, and the one after the last; backward from `end - 1` to `begin` if `backward`.
@@ -204,7 +207,7 @@ def _keep_residuals(
     placed: Array,
     bodies: BodyPoses,
 ) -> None:
-    """Update the residual of each visible marker, in the frame of its body and at most three standard deviations."""
+    """Update the residual of each visible marker in the frame of its body."""
     total, count = 0.0, 0
     for i in range(scene.first[g], scene.first[g + 1]):
         j = out.point[i]
@@ -263,9 +266,7 @@ def _exchange(
 
 
 @compiled(nogil=True)
-def _keep_markers(
-    points: Array, scene: Scene, g: int, settings: Settings, state: TrackState, out: FrameLabels
-) -> None:
+def _keep_markers(points: Array, scene: Scene, g: int, settings: Settings, state: TrackState, out: FrameLabels) -> None:
     """Update position, velocity and absence of the markers, and what the visible ones determine."""
     visible = 0
     for i in range(scene.first[g], scene.first[g + 1]):
@@ -323,7 +324,7 @@ def _check_lost(scene: Scene, g: int, settings: Settings, state: TrackState, out
 def _unusual(
     target: Array, scene: Scene, settings: Settings, state: TrackState, i: int, placed: Array, bodies: BodyPoses
 ) -> float:
-    """Return the distance of a point from the marker with its usual residual, in standard deviations."""
+    """Return the distance of a point from its usual place, in standard deviations."""
     T, e, total = bodies.T[scene.body[i]], state.residual[i], 0.0
     for r in range(3):
         x = target[r] - placed[i, r] - (T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2])

@@ -62,7 +62,7 @@ class MarkerTracker:
         self._slices = [slice(a, b) for a, b in zip(self._scene.first[:-1], self._scene.first[1:], strict=True)]
         for g, pose in enumerate(starts or ()):
             if pose is not None:
-                self.state.start(self._scene, g, pose)
+                self.state.start(self._scene, int(g), pose)
 
     @property
     def is_tracked(self) -> Mask:
@@ -92,4 +92,4 @@ class MarkerTracker:
         found = self._starter(points, tuple(self.models[g] for g in lost))
         for g, pose in zip(lost, found, strict=True):
             if pose is not None:
-                self.state.start(self._scene, g, pose)
+                self.state.start(self._scene, int(g), pose)

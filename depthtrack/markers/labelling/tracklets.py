@@ -1,4 +1,4 @@
-"""Tracklets: points linked from frame to frame without a model, only where the link is not ambiguous."""
+"""Tracklets: points linked from frame to frame where the link is not ambiguous."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ class LinkSettings(NamedTuple):
 
 
 def make_tracklets(points: PackedPoints, settings: LinkSettings) -> Index:
-    """Return the tracklet (N,) of each point, numbered from 0 in the order of their first frames."""
+    """Return the tracklet (N,) of each point, numbered from 0 by first frame."""
     previous = np.full(len(points.position), -1, np.int64)
     _link(points.position, points.ends, settings, previous)
     tracklet = np.empty(len(previous), np.int64)
