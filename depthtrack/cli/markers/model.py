@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Save a model for later captures: a rigid body from chosen markers, or a hand calibrated on the capture.
+    """Save a rigid body or a calibrated hand for later captures.
 
     A body: `--body LABEL LABEL LABEL`. A hand: `-m LAYOUT`. Its sizes and marker offsets are measured on the labels of
     the capture if those of the layout are there. Else the capture is labelled first, and again with the result.

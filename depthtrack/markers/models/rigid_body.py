@@ -1,7 +1,7 @@
 """Rigid bodies from chosen markers of a labelled capture (Maycock et al. 2015, Sec. III-A).
 
-"It is also possible to 'on the fly' create rigid models by simply selecting a set of markers that are attached to a
-rigid object and saving the configuration (the positions of all markers in the model relative to the first marker)."
+A model is the positions of all markers relative to the first one. Here they are the median of all frames, and their
+deviations from it are the spread.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.models.marker_model import MarkerModel
-from depthtrack.types import Array
+from depthtrack.types import Array, Index
 
 FEWEST_MARKERS = 3
 _FRAMES = 400
@@ -25,7 +25,7 @@ _LEAST_SPREAD = 0.0003
 def body_from_markers(
     capture: MarkerCapture, labels: Sequence[str], name: str, frame: int | None = None
 ) -> MarkerModel:
-    """Return the rigid body of some markers of a capture, positions relative to the first marker.
+    """Return the rigid body of some markers, positions relative to the first one.
 
     frame: index of the only frame used; None for the median of all frames after alignment.
 
@@ -56,16 +56,16 @@ def body_from_markers(
     )
 
 
-def _spread_frames(positions: Array) -> Array:
+def _spread_frames(positions: Array) -> Index:
     """Return frames with at least three markers, spread over the capture."""
     usable = np.flatnonzero(np.isfinite(positions).all(axis=-1).sum(axis=1) >= FEWEST_MARKERS)
     if len(usable) == 0:
         raise InputError("no frame shows three markers of the body: choose others")
-    return usable[np.linspace(0, len(usable) - 1, min(len(usable), _FRAMES)).round().astype(np.int64)]
+    return np.asarray(usable[np.linspace(0, len(usable) - 1, min(len(usable), _FRAMES)).round().astype(np.int64)])
 
 
 def _median_pattern(positions: Array) -> Array:
-    """Return the median (M, 3) of frames (T, M, 3) that are aligned with each other; NaN if never seen."""
+    """Return the median (M, 3) of aligned frames (T, M, 3); NaN if never seen."""
     most = int(np.argmax(np.isfinite(positions).all(axis=-1).sum(axis=1)))
     pattern = positions[most].copy()
     for _ in range(_ROUNDS):
@@ -76,8 +76,8 @@ def _median_pattern(positions: Array) -> Array:
 
 
 def _aligned(pattern: Array, positions: Array) -> Array:
-    """Return the frames (T, M, 3) moved onto the pattern (M, 3); NaN with fewer than three common markers."""
-    common = np.isfinite(positions).all(axis=-1) & np.isfinite(pattern).all(axis=-1)
+    """Return frames (T, M, 3) moved onto the pattern (M, 3); NaN below three markers."""
+    common = np.asarray(np.isfinite(positions).all(axis=-1) & np.isfinite(pattern).all(axis=-1))
     usable = common.sum(axis=1) >= FEWEST_MARKERS
     known = np.where(np.isfinite(pattern), pattern, 0.0)
     local = np.full_like(positions, np.nan)
