@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,42 @@ class FillScore:
     expected: float
     filled: float
     samples: int
+
+    def row(self) -> dict[str, Any]:
+        """Return JSON values, lengths in millimetres."""
+        lengths = {"median_mm": self.median, "rms_mm": self.rms, "expected_mm": self.expected}
+        return {
+            "method": self.method,
+            "markers": self.where,
+            "samples": self.samples,
+            "filled": self.filled,
+            **{name: 1000 * value if np.isfinite(value) else None for name, value in lengths.items()},
+        }
+
+
+def compare_filling(
+    captures: Sequence[LabelledCapture],
+    shortest: int,
+    longest: int,
+    seeds: Sequence[int],
+    methods: Sequence[FillMethod],
+) -> list[FillScore]:
+    """Return the scores of each method over the stretches of all captures and seeds.
+
+    shortest, longest: frames of a stretch.
+
+    Raises:
+        InputError: if the lengths are out of order, or no stretch fits a capture.
+    """
+    scores: dict[tuple[FillMethod, str], list[FillScore]] = {}
+    for whole in captures:
+        for seed in seeds:
+            cut, gaps = cut_stretches(whole, shortest, longest, seed)
+            for method in methods:
+                options = FillOptions(method=method, longest=longest / whole.capture.rate)
+                for score in score_filling(whole, cut, gaps, options):
+                    scores.setdefault((method, score.where), []).append(score)
+    return [pooled(each) for each in scores.values()]
 
 
 def cut_stretches(

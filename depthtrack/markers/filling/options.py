@@ -90,10 +90,10 @@ class FillOptions:
     method: FillMethod = option("smooth", "Method", source=f"paper: {_MAYCOCK}")
     longest: float = option(2.0, "Longer gaps stay gaps", unit="s")
     ends: bool = option(False, "Fill gaps at the start and the end of the capture too")
-    paper: PaperFillOptions = option(PaperFillOptions(), _MAYCOCK)
-    smooth: SmoothFillOptions = option(SmoothFillOptions(), "Smoothing")
-    pattern: PatternFillOptions = option(PatternFillOptions(), "Rigid pattern")
-    pca: PcaFillOptions = option(PcaFillOptions(), _GLOERSEN)
+    paper: PaperFillOptions = option(PaperFillOptions(), _MAYCOCK, advanced=True)
+    smooth: SmoothFillOptions = option(SmoothFillOptions(), "Smoothing", advanced=True)
+    pattern: PatternFillOptions = option(PatternFillOptions(), "Rigid pattern", advanced=True)
+    pca: PcaFillOptions = option(PcaFillOptions(), _GLOERSEN, advanced=True)
 
     def __post_init__(self) -> None:
         if not self.longest > 0:
