@@ -13,6 +13,7 @@ from depthtrack.markers.labelling.evidence import assign_tracklets, contested, l
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.labelling.packed import PackedPoints
 from depthtrack.markers.labelling.scene import Scene
+from depthtrack.markers.labelling.splitting import split_tracklets
 from depthtrack.markers.labelling.state import FrameLabels, Settings, TrackState
 from depthtrack.markers.labelling.step import track_frames
 from depthtrack.markers.labelling.tracker import Starter
@@ -54,6 +55,7 @@ def label_capture(
     shortest = round(chosen.offline.adopt * capture.rate)
     for _ in range(chosen.offline.rounds):
         expected = expect_markers(fitted, scene, settings)
+        tracklet = split_tracklets(points, tracklet, expected, settings, chosen.offline.split)
         evidence = tracklet_evidence(points, tracklet, expected, settings)
         open_to = contested(points, tracklet, labels, expected, settings.clutter)
         if open_to.any():

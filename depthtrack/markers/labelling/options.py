@@ -83,6 +83,7 @@ class OfflineOptions:
 
     use: bool = option(True, "Track in both directions, and decide tracklets by all of their frames")
     rounds: int = option(6, "Rounds of pose fits and assignments of tracklets, at most")
+    split: float = option(60.0, "Log-likelihood ratio from which on a tracklet of two markers is cut")
     adopt: float = option(0.1, "Shortest tracklet without a label that is tried as a marker by a fit", unit="s")
     link_gate: float = option(3.0, "Largest distance of a link between frames", unit="standard deviations")
     link_clear: float = option(2.0, "By how much farther the next best link must be", unit="standard deviations")
