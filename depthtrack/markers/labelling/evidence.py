@@ -35,7 +35,7 @@ def _add_evidence(
 
 @compiled(nogil=True)
 def frame_evidence(expected: ExpectedFrames, clutter: float, t: int, i: int, point: Array) -> float:
-    """Return the limited log-likelihood ratio of a point (3,) of frame t being marker i or clutter."""
+    """Return the log-likelihood ratio of a point (3,) of frame t being marker i or clutter."""
     if np.isnan(expected.position[t, i, 0]):
         return LEAST
     square = mahalanobis(expected.precision[t, i], expected.position[t, i], point)

@@ -16,7 +16,7 @@ from depthtrack.types import Array, Index
 def split_tracklets(
     points: PackedPoints, tracklet: Index, expected: ExpectedFrames, settings: Settings, gain: float
 ) -> Index:
-    """Return the tracklet (N,) of each point, with those cut in two that two markers explain better than one.
+    """Return the tracklet (N,) of each point; those that fit two markers better are cut.
 
     gain: least increase of the log-likelihood ratio by a cut.
     """
