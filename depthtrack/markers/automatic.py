@@ -1,16 +1,14 @@
 """Label a capture without labels: find the models in one frame, then follow them.
 
-Maycock et al. 2015, Sec. III-A and III-B. Any frame may be the first: the frames before it are labelled backward.
+Maycock et al. 2015, Sec. III-A and III-B. The start may be in any frame: those before it are labelled backward.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.initialisation.initialise import initialise
 from depthtrack.markers.initialisation.options import InitialisationOptions
@@ -19,7 +17,7 @@ from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.labelling.offline import label_capture
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.models.marker_model import MarkerModel
-from depthtrack.types import Array, Index
+from depthtrack.types import Array
 
 Progress = Callable[[str, float], None]
 """Called with the step and the share of it that is done, 0 to 1."""
@@ -57,6 +55,11 @@ def find_start(
     return best
 
 
+def sized_models(models: Sequence[MarkerModel], started: StartedModels) -> tuple[MarkerModel, ...]:
+    """Return the models with the sizes that a start found."""
+    return tuple(model if one is None else one.model for model, one in zip(models, started.models, strict=True))
+
+
 def label_from(
     capture: MarkerCapture,
     models: Sequence[MarkerModel],
@@ -65,18 +68,16 @@ def label_from(
 ) -> LabelledCapture:
     """Return the labels and poses of all frames, from the frame of a start in both directions.
 
-    models: those to label where the start found none.
-    started: as `find_start` returns it, or as it was saved from another capture of the same frame.
+    models: as `sized_models` returns them, or calibrated ones.
+    started: as `find_start` returns it, or as it was saved.
     """
-    options = options or LabellingOptions()
-    sized = [one.model if one is not None else model for model, one in zip(models, started.models, strict=True)]
     poses = [None if one is None else one.pose for one in started.models]
-    frame = started.frame
-    after = label_capture(capture.between(frame, len(capture)), sized, options, poses)
-    if frame == 0 or not options.offline.use:
-        return _joined(capture, _nothing(sized, frame), after)
-    before = label_capture(_reversed(capture.between(0, frame + 1)), sized, options, poses)
-    return _joined(capture, _reversed_labels(before), after)
+    return label_capture(capture, models, options, poses, _starter, started.frame)
+
+
+def _starter(points: Array, models: tuple[MarkerModel, ...]) -> tuple[Array | None, ...]:
+    """Return the poses of models among points (K, 3); None for one that is not found."""
+    return tuple(None if one is None else one.pose for one in initialise(points, models).models)
 
 
 def _rank(started: StartedModels) -> tuple[int, float]:
@@ -88,44 +89,3 @@ def _frames_to_try(capture: MarkerCapture, count: int) -> list[int]:
     points = np.isfinite(capture.positions).all(axis=-1).sum(axis=1)
     parts = np.array_split(np.arange(len(capture)), min(max(count - 1, 1), len(capture)))
     return list(dict.fromkeys([0, *(int(part[np.argmax(points[part])]) for part in parts)]))[:count]
-
-
-def _reversed(capture: MarkerCapture) -> MarkerCapture:
-    return replace(capture, positions=capture.positions[::-1], residuals=None)
-
-
-class Parts(NamedTuple):
-    """Columns, poses and confidence of some frames, for each model."""
-
-    columns: tuple[Index, ...]
-    poses: tuple[Array, ...]
-    confidence: tuple[Array, ...]
-
-
-def _reversed_labels(labelled: LabelledCapture) -> Parts:
-    """Return the frames in the usual order, without the last, which is that of the start."""
-    return Parts(
-        tuple(each[:0:-1] for each in labelled.columns),
-        tuple(each[:0:-1] for each in labelled.poses),
-        tuple(each[:0:-1] for each in labelled.confidence),
-    )
-
-
-def _nothing(models: Sequence[MarkerModel], frames: int) -> Parts:
-    """Return frames without labels."""
-    shapes = [(frames, len(model.labels)) for model in models]
-    return Parts(
-        tuple(np.full(shape, -1, dtype=np.int64) for shape in shapes),
-        tuple(np.full((frames, POSE_SIZE), np.nan) for _ in models),
-        tuple(np.full(shape, np.nan) for shape in shapes),
-    )
-
-
-def _joined(capture: MarkerCapture, before: Parts, after: LabelledCapture) -> LabelledCapture:
-    return LabelledCapture(
-        capture,
-        after.models,
-        tuple(np.concatenate(pair) for pair in zip(before.columns, after.columns, strict=True)),
-        tuple(np.concatenate(pair) for pair in zip(before.poses, after.poses, strict=True)),
-        tuple(np.concatenate(pair) for pair in zip(before.confidence, after.confidence, strict=True)),
-    )

@@ -1,4 +1,4 @@
-"""A labelled capture whose gaps are filled: positions, how each sample was filled, and its expected error."""
+"""A labelled capture with its gaps filled, how each sample was filled, and its error."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -56,7 +56,7 @@ class Gap(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FilledCapture:
-    """A labelled capture without the gaps that could be filled. The tuples have an entry for each model.
+    """A labelled capture with filled gaps. The tuples have an entry for each model.
 
     positions: (T, M, 3) metres, capture frame; NaN where a gap stays.
     how: (T, M) `Filling` of each sample.
@@ -94,6 +94,11 @@ def gaps_of(model: int, measured: Mask) -> Iterator[Gap]:
     for marker in range(measured.shape[1]):
         for start, stop in runs(~measured[:, marker]):
             yield Gap(model, marker, start, stop)
+
+
+def measured_samples(positions: Array) -> Mask:
+    """Return which positions (..., 3) are finite (...)."""
+    return np.asarray(np.isfinite(positions).all(axis=-1))
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:

@@ -12,7 +12,7 @@ from depthtrack.types import Array
 
 @compiled(nogil=True)
 def banded_cholesky(rows: Array) -> bool:
-    """Replace A in place by its Cholesky factor L, A = L L^T. Returns False if A is not positive definite."""
+    """Replace A by its Cholesky factor L in place. Returns False if A is not positive definite."""
     n, width = rows.shape
     for j in range(n):
         row, count = rows[j], min(width, n - j)

@@ -1,6 +1,5 @@
-"""Labelling from a start in any frame joins both directions in order."""
+"""The start of a labelling: the most certain of a few frames."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,12 +8,10 @@ import pytest
 
 from depthtrack.errors import InputError
 from depthtrack.markers import automatic
-from depthtrack.markers.automatic import find_start, label_from
+from depthtrack.markers.automatic import find_start, label_from, sized_models
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.initialisation.started import StartedModel, StartedModels
-from depthtrack.markers.labelled_capture import LabelledCapture
-from depthtrack.markers.labelling.options import LabellingOptions, OfflineOptions
-from depthtrack.markers.models.marker_model import MarkerModel
+from depthtrack.markers.labelling.options import LabellingOptions
 from tests.support.markers import body_with_markers
 
 MODEL = body_with_markers()
@@ -34,36 +31,22 @@ def started(frame: int, confidence: float = 1.0) -> StartedModels:
     return StartedModels((StartedModel(MODEL, pose, np.arange(3), 0.0, 0.0, 1.0, confidence),), frame)
 
 
-def label_by_column(
-    capture: MarkerCapture,
-    models: Sequence[MarkerModel],
-    options: LabellingOptions | None = None,
-    starts: Any = None,
-) -> LabelledCapture:
-    """Move the pose of the start as the points move, and label by columns."""
-    moved = capture.positions[:, 0, 0] - capture.positions[0, 0, 0]
-    poses = np.repeat(starts[0][None], len(capture), axis=0)
-    poses[:, 0] += moved
-    columns = np.tile(np.arange(3), (len(capture), 1))
-    return LabelledCapture(capture, tuple(models), (columns,), (poses,), (np.ones(columns.shape),))
-
-
-@pytest.mark.parametrize("frame", [0, 7, 19])
-def test_both_directions_are_joined(frame: int, capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(automatic, "label_capture", label_by_column)
-    labelled = label_from(capture, [MODEL], started(frame))
-    np.testing.assert_array_equal(labelled.poses[0][:, 0], np.arange(20))
-    assert labelled.columns[0].shape == (20, 3)
-    np.testing.assert_array_equal(labelled.positions(0), capture.positions[:, :3])
-
-
-def test_online_labels_nothing_before_the_start(capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(automatic, "label_capture", label_by_column)
-    online = LabellingOptions(offline=OfflineOptions(use=False))
-    labelled = label_from(capture, [MODEL], started(7), online)
-    assert np.all(labelled.columns[0][:7] == -1)
-    assert np.isnan(labelled.poses[0][:7]).all()
-    np.testing.assert_array_equal(labelled.poses[0][7:, 0], np.arange(7, 20))
+def test_labelling_begins_with_the_pose_and_the_frame_of_the_start(
+    capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(automatic, "label_capture", lambda *arguments: calls.append(arguments))
+    monkeypatch.setattr(automatic, "initialise", lambda points, models: StartedModels((*started(0).models, None)))
+    begin, options = started(7), LabellingOptions()
+    other = body_with_markers()
+    models = sized_models([other, other], StartedModels((*begin.models, None), 7))
+    assert models == (MODEL, other)
+    label_from(capture, models, StartedModels((*begin.models, None), 7), options)
+    ((given, found, chosen, poses, starter, frame),) = calls
+    assert (given, found, chosen, frame) == (capture, models, options, 7)
+    assert poses[0] is begin.found[0].pose
+    assert poses[1] is None
+    assert [pose is None for pose in starter(np.zeros((3, 3)), models)] == [False, True]
 
 
 def test_the_most_certain_start_is_taken(capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ class LabelCommand:
     def run(self) -> None:
         from depthtrack.cli.markers.report_text import print_report
         from depthtrack.cli.progress import percent_bar
-        from depthtrack.markers.automatic import label_from
+        from depthtrack.markers.automatic import find_start, label_from, sized_models
         from depthtrack.markers.initialisation.started import save_started
         from depthtrack.options import to_data
 
@@ -45,9 +45,10 @@ class LabelCommand:
         self.folder.check(models)
         capture = self.start.part(self.capture.read())
         with percent_bar() as show:
-            started = self.start.find(capture, models, show)
+            started = self.start.saved(models, len(capture))
+            started = started or find_start(capture, models, self.start.initialisation, progress=show)
             show("labelling", 0.3)
-            labelled = label_from(capture, models, started, options)
+            labelled = label_from(capture, sized_models(models, started), started, options)
         configuration = {"command": "label", "method": self.start.method, "labelling": to_data(options)}
         self.folder.write(labelled, self.capture.path, configuration)
         save_started(started, self.folder.out / "start.json")

@@ -1,7 +1,6 @@
 """Options that say which frames are labelled, and where the labelling starts."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +10,7 @@ from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.markers.capture import MarkerCapture
+    from depthtrack.markers.initialisation.options import InitialisationOptions
     from depthtrack.markers.initialisation.started import StartedModels
     from depthtrack.markers.models.marker_model import MarkerModel
 
@@ -27,7 +27,11 @@ class StartOptions:
     """The start.json of an earlier folder of the same frames, in place of a search for the models."""
 
     def part(self, capture: "MarkerCapture") -> "MarkerCapture":
-        """Return the chosen frames of a capture. Raises InputError if it lacks them."""
+        """Return the chosen frames of a capture.
+
+        Raises:
+            InputError: if it lacks them.
+        """
         if self.frames is None:
             return capture
         first, last = self.frames
@@ -35,27 +39,28 @@ class StartOptions:
             raise InputError(f"--frames must be from 1 to {len(capture)} and not decrease, found {first} {last}")
         return capture.between(first - 1, last)
 
-    def find(
-        self, capture: "MarkerCapture", models: "tuple[MarkerModel, ...]", show: Callable[[str, float], None]
-    ) -> "StartedModels":
-        """Return the start: the saved one, or the best of a few frames.
+    @property
+    def initialisation(self) -> "InitialisationOptions":
+        """Options of the search for the models."""
+        from depthtrack.markers.initialisation.options import InitialisationOptions
+
+        return InitialisationOptions(method="paper" if self.method == "paper" else "search")
+
+    def saved(self, models: "tuple[MarkerModel, ...]", frames: int) -> "StartedModels | None":
+        """Return the saved start; None to search for the models.
 
         Raises:
-            InputError: if no model is found, or the saved start is of other models or frames.
+            InputError: if it is of other models or frames.
         """
-        from depthtrack.markers.automatic import find_start
-        from depthtrack.markers.initialisation.options import InitialisationOptions
         from depthtrack.markers.initialisation.started import StartedModels
 
         if self.start is None:
-            options = InitialisationOptions(method="paper" if self.method == "paper" else "search")
-            return find_start(capture, models, options, progress=show)
+            return None
         saved = StartedModels.from_json(self.start)
         names = [None if one is None else one.model.name for one in saved.models]
-        if len(names) != len(models) or any(
-            name not in (None, model.name) for name, model in zip(names, models, strict=True)
-        ):
-            raise InputError(f"{self.start} must be of the models {', '.join(model.name for model in models)}")
-        if not 0 <= saved.frame < len(capture):
-            raise InputError(f"{self.start} starts in frame {saved.frame + 1}, which the capture lacks")
-        return replace(saved)
+        wanted = [model.name for model in models]
+        if len(names) != len(wanted) or any(a not in (None, b) for a, b in zip(names, wanted, strict=True)):
+            raise InputError(f"{self.start} must be of the models {', '.join(wanted)}: name them in its order")
+        if not 0 <= saved.frame < frames:
+            raise InputError(f"{self.start} starts in frame {saved.frame + 1}, but the capture has {frames} frames")
+        return saved

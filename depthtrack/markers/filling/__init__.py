@@ -1,1 +1,1 @@
-"""Gap filling: the joints of a hand bridge what the cameras did not see (Maycock et al. 2015, Sec. III-C)."""
+"""Gap filling by the joints of the hand (Maycock et al. 2015, Sec. III-C), and baselines."""

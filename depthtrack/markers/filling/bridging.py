@@ -4,22 +4,22 @@ import numpy as np
 
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, POSITION, make_pose, retract, tangent_between
-from depthtrack.markers.filled_capture import runs
+from depthtrack.markers.filled_capture import measured_samples, runs
 from depthtrack.markers.filling.interpolation import minimal_acceleration
 from depthtrack.types import Array, Mask
 
 
 def bridged(poses: Array, known: Mask) -> Array:
-    """Return the poses (T, 27) with the unknown parameters interpolated with minimal acceleration.
+    """Return the poses (T, 27) with unknown parameters interpolated.
 
     poses: (T, 27) capture frame.
     known: (T, 26) whether a frame determines a parameter of the tangent space, see `joints.determined`.
 
-    Several gaps are filled at once: every parameter bridges its own. At the start and the end of the capture, parameters
-    keep the nearest known value. All poses of a parameter that is never known stay as they are.
+    Several gaps are filled at once: every parameter bridges its own. At the start and the end of the capture,
+    parameters keep the nearest known value. All poses of a parameter that is never known stay as they are.
     """
     filled = np.array(poses)
-    known = known & np.isfinite(poses).all(axis=1)[:, None]
+    known = known & measured_samples(poses)[:, None]
     for start, stop in runs(~known[:, 0]):
         filled[start:stop, :7] = _rigid_bridge(poses, start, stop, known[:, 0])
     for j in range(20):
@@ -32,11 +32,8 @@ def _rigid_bridge(poses: Array, start: int, stop: int, known: Mask) -> Array:
     """Return position and orientation (n, 7) of the frames `start` to `stop` - 1."""
     if start == 0 and stop == len(poses):
         return poses[:, :7]
-    reference = make_pose(
-        poses[start - 1 if start > 0 else stop, POSITION],
-        poses[start - 1 if start > 0 else stop, ORIENTATION],
-        np.zeros(20),
-    )
+    nearest = poses[start - 1 if start > 0 else stop]
+    reference = make_pose(nearest[POSITION], nearest[ORIENTATION], np.zeros(20))
     neighbours = np.clip(np.arange(start - 2, stop + 2), 0, len(poses) - 1)
     steps = np.full((len(poses), 6), np.nan)
     usable = neighbours[np.isfinite(poses[neighbours]).all(axis=1)]

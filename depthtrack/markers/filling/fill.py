@@ -5,15 +5,17 @@ filled = fill_gaps(labelled, FillOptions(method="paper", longest=0.5))
 write_capture(path, filled.capture())
 """
 
+from itertools import pairwise
+
 import numpy as np
 
-from depthtrack.markers.filled_capture import FilledCapture, Filling, Gap
-from depthtrack.markers.filling.expected_error import expected_error
+from depthtrack.markers.filled_capture import FilledCapture, Filling, Gap, measured_samples
+from depthtrack.markers.filling.expected_error import error_after
 from depthtrack.markers.filling.options import FillOptions
 from depthtrack.markers.filling.paper_fill import paper_fill
 from depthtrack.markers.filling.pattern_fill import pattern_fill
 from depthtrack.markers.filling.pca_fill import pca_fill
-from depthtrack.markers.filling.prediction import Prediction, gaps_to_fill
+from depthtrack.markers.filling.prediction import Prediction, gaps_to_fill, time_to_measured
 from depthtrack.markers.filling.smooth_fill import smooth_fill
 from depthtrack.markers.filling.spline_fill import spline_fill
 from depthtrack.markers.labelled_capture import LabelledCapture
@@ -31,7 +33,7 @@ def fill_gaps(labelled: LabelledCapture, options: FillOptions | None = None) -> 
     options = options or FillOptions()
     rate = labelled.capture.rate
     measured = [labelled.positions(k) for k in range(len(labelled.models))]
-    visible = [np.isfinite(positions).all(axis=-1) for positions in measured]
+    visible = [measured_samples(positions) for positions in measured]
     gaps = [gaps_to_fill(k, seen, rate, options) for k, seen in enumerate(visible)]
     predictions = _predictions(labelled, measured, gaps, options)
     merged = [_merged(*each, rate, options) for each in zip(measured, visible, gaps, predictions, strict=True)]
@@ -64,20 +66,20 @@ def _baseline(positions: Array, poses: Array, method: str) -> Prediction:
 
 
 def _pca(labelled: LabelledCapture, measured: list[Array], gaps: list[list[Gap]], options: FillOptions) -> list[Array]:
-    """Return the gaps (T, M, 3) of each model, filled with the markers of all models and other named trajectories."""
+    """Return the gaps (T, M, 3) of each model, filled by principal components."""
     used = {int(column) for columns in labelled.columns for column in np.unique(columns)}
     others = [c for c in np.flatnonzero(labelled.capture.is_labelled) if int(c) not in used]
     everything = np.concatenate([*measured, labelled.capture.positions[:, others]], axis=1)
     ends = np.cumsum([0, *(positions.shape[1] for positions in measured)])
     shifted = [gap._replace(marker=gap.marker + int(ends[gap.model])) for some in gaps for gap in some]
     filled = pca_fill(everything, shifted, options.pca)
-    return [filled[:, start:stop] for start, stop in zip(ends[:-1], ends[1:], strict=True)]
+    return [filled[:, start:stop] for start, stop in pairwise(ends)]
 
 
 def _merged(
     measured: Array, visible: Mask, gaps: list[Gap], prediction: Prediction, rate: float, options: FillOptions
 ) -> tuple[Array, Array, Array, Array]:
-    """Return positions, how, expected error and poses of a model: measured where it was, else as predicted."""
+    """Return positions, how, expected error and poses of a model."""
     asked = np.zeros(visible.shape, dtype=np.bool_)
     for gap in gaps:
         asked[gap.start : gap.stop, gap.marker] = True
@@ -85,11 +87,8 @@ def _merged(
     filled = (asked | replaced) & np.isfinite(prediction.positions).all(axis=-1)
     how = np.where(visible, int(Filling.MEASURED), int(Filling.GAP))
     how = np.where(filled, prediction.how, how)
-    error = expected_error(prediction, visible & ~replaced, rate, options)
-    poses = np.where(asked.any(axis=1)[:, None], prediction.poses, prediction.poses)
-    return (
-        np.where(filled[..., None], prediction.positions, measured),
-        how,
-        np.where(filled, error, np.nan),
-        poses,
-    )
+    error = prediction.expected_error
+    if options.method != "smooth":
+        error = error_after(options.method, time_to_measured(visible & ~replaced, rate))
+    positions = np.where(filled[..., None], prediction.positions, measured)
+    return positions, how, np.where(filled, error, np.nan), prediction.poses

@@ -1,4 +1,4 @@
-"""Interpolation of minimal acceleration under C1 boundary constraints (Maycock et al. 2015, Sec. III-C)."""
+"""Interpolation of minimal acceleration with C1 constraints (Maycock et al. 2015, III-C)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +11,15 @@ _STENCIL = np.array([1.0, -2.0, 1.0])
 
 
 def minimal_acceleration(before: ArrayLike, after: ArrayLike, count: int) -> Array:
-    """Return the values (n, ...) between two pairs of values that minimise the sum of squared second differences.
+    """Return the values (n, ...) between two pairs of values with minimal acceleration.
 
     before: (2, ...) values at times t - 1 and t; the pair states theta and its derivative at t.
     after: (2, ...) values at times t + n + 1 and t + n + 2.
     count: n, number of missing values.
 
-    The minimum of Eq. (7), the integral of the squared acceleration, in uniform steps: one symmetric n x n system with
-    two bands beside the diagonal. In the limit of small steps it is the cubic Hermite polynomial of the constraints.
+    The squared second differences, which are the squared acceleration in uniform steps, have the least sum. That is
+    one symmetric n x n system with two bands beside the diagonal. As the steps become small, the values tend to the
+    cubic Hermite polynomial of the constraints.
     """
     if count == 0:
         return np.empty((0, *np.shape(before)[1:]))

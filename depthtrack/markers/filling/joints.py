@@ -1,4 +1,4 @@
-"""The parameters of a model that its visible markers determine (Maycock et al. 2015, Sec. III-C)."""
+"""Parameters that visible markers determine (Maycock et al. 2015, Sec. III-C)."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ POSE_MARKERS = 3
 
 
 def determined(model: MarkerModel, visible: Mask) -> Mask:
-    """Return whether the visible markers determine each parameter (..., 26) of the tangent space.
+    """Return whether visible markers determine each parameter (..., 26) of the tangent space.
 
     visible: (..., M).
 
@@ -22,9 +22,9 @@ def determined(model: MarkerModel, visible: Mask) -> Mask:
     visible = np.asarray(visible, dtype=np.bool_)
     moves = np.zeros((BODY_COUNT, 26), dtype=np.bool_)
     moves[:, 6:] = MOVES
-    found = (visible[..., :, None] & moves[model.bodies]).any(axis=-2)
+    found = np.asarray((visible[..., :, None] & moves[model.bodies]).any(axis=-2))
     found[..., :6] = (visible.sum(axis=-1) >= POSE_MARKERS)[..., None]
-    return np.asarray(found)
+    return found
 
 
 def affecting(model: MarkerModel, marker: int) -> Mask:

@@ -1,4 +1,4 @@
-"""Prior on the motion of a hand: a stationary Gaussian process of its postures, learned from the capture.
+"""Prior on a hand's motion: a Gaussian process of its postures, learned from the capture.
 
 The principal components of the angles are independent processes with the spectrum 1 / (1 + (l w)^4). That is the prior
 whose energy is the integral of x^2 + (l^2 x'')^2: postures are pulled to the mean, and accelerations are small. Its
@@ -42,7 +42,7 @@ def learn_motion_prior(poses: Array, known: Mask, rate: float, options: SmoothFi
     rate: frames a second, Hz.
     """
     usable = known.any(axis=0)
-    whole = known[:, usable].all(axis=1) & np.isfinite(poses).all(axis=1)
+    whole = np.asarray(known[:, usable].all(axis=1) & np.isfinite(poses).all(axis=1))
     mean, covariance = _postures(poses[whole, ANGLES], rate, options)
     variances, axes = np.linalg.eigh(covariance)
     constants = options.time_scale * _time_constants(poses[:, ANGLES] @ axes, whole, variances, rate, options)
@@ -57,7 +57,7 @@ def learn_motion_prior(poses: Array, known: Mask, rate: float, options: SmoothFi
 
 
 def _postures(angles: Array, rate: float, options: SmoothFillOptions) -> tuple[Array, Array]:
-    """Return mean (20,) and covariance (20, 20) of postures, with recorded ones of other hands as prior."""
+    """Return mean (20,) and covariance (20, 20) of postures; recorded ones are the prior."""
     recorded = load_synergies()
     share = len(angles) / (len(angles) + options.database_time * rate)
     mean = recorded.mean if len(angles) == 0 else share * angles.mean(axis=0) + (1 - share) * recorded.mean

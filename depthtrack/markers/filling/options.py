@@ -9,9 +9,10 @@ from depthtrack.options import option
 FillMethod = Literal["smooth", "paper", "spline", "pattern", "pca"]
 """How gaps are filled.
 
-`smooth`: the likeliest postures given the visible markers and the motion of the capture. `paper`: angles of frozen joints
-are interpolated (Maycock et al. 2015, Sec. III-C). The others are baselines: `spline`, a cubic spline per marker;
-`pattern`, the rigid motion of the neighbours; `pca`, principal components of all markers (Gloersen and Federolf 2016).
+`smooth`: the likeliest postures given the visible markers and the motion of the capture, with a regression on them.
+`paper`: angles of frozen joints are interpolated (Maycock et al. 2015, Sec. III-C). The others are baselines.
+`spline`: a cubic spline per marker. `pattern`: the rigid motion of the neighbours. `pca`: principal components of all
+markers (Gloersen and Federolf 2016).
 """
 
 _MAYCOCK = "Maycock et al. 2015, Sec. III-C"
@@ -31,6 +32,18 @@ class PaperFillOptions:
 
 
 @dataclass(frozen=True)
+class RegressionOptions:
+    """Linear regression of a missing marker on the others; see `filling.marker_regression`."""
+
+    visible_share: float = option(0.7, "A marker takes part if it is visible in at least this share of the gap")
+    fewest_seconds: float = option(2.0, "Least time of the capture to learn from", unit="s")
+    local_weight: float = option(10.0, "Weight of the frames beside the gap, relative to distant ones, less 1")
+    local_time: float = option(0.5, "Time over which that weight falls", unit="s")
+    block_time: float = option(1.5, "Time of the capture that is held out at once", unit="s")
+    end_time: float = option(0.2, "Time beside the gap whose error corrects the regression", unit="s")
+
+
+@dataclass(frozen=True)
 class SmoothFillOptions:
     """The likeliest postures of a gap; see `filling.smoothing`."""
 
@@ -42,7 +55,10 @@ class SmoothFillOptions:
     palm_acceleration: float = option(20.0, "Standard deviation of the palm's acceleration over 0.1 s", unit="m/s^2")
     palm_turn: float = option(200.0, "The same for its rotation", unit="rad/s^2")
     correction_time: float = option(0.03, "Time over which a marker's distance from the model is averaged", unit="s")
+    wander_time: float = option(0.2, "Time in which markers move on their bodies", unit="s")
     iterations: int = option(8, "Gauss-Newton steps, at most")
+    regress: bool = option(True, "Average the smoothed markers with their regression on the others")
+    regression: RegressionOptions = option(RegressionOptions(), "Regression")
 
 
 @dataclass(frozen=True)
@@ -74,10 +90,10 @@ class FillOptions:
     method: FillMethod = option("smooth", "Method", source=f"paper: {_MAYCOCK}")
     longest: float = option(2.0, "Longer gaps stay gaps", unit="s")
     ends: bool = option(False, "Fill gaps at the start and the end of the capture too")
-    paper: PaperFillOptions = option(PaperFillOptions(), _MAYCOCK)
-    smooth: SmoothFillOptions = option(SmoothFillOptions(), "Smoothing")
-    pattern: PatternFillOptions = option(PatternFillOptions(), "Rigid pattern")
-    pca: PcaFillOptions = option(PcaFillOptions(), _GLOERSEN)
+    paper: PaperFillOptions = option(PaperFillOptions(), _MAYCOCK, advanced=True)
+    smooth: SmoothFillOptions = option(SmoothFillOptions(), "Smoothing", advanced=True)
+    pattern: PatternFillOptions = option(PatternFillOptions(), "Rigid pattern", advanced=True)
+    pca: PcaFillOptions = option(PcaFillOptions(), _GLOERSEN, advanced=True)
 
     def __post_init__(self) -> None:
         if not self.longest > 0:

@@ -1,8 +1,8 @@
-"""Gap filling of the paper: frozen joints, plausible reappearance, interpolated angles (Maycock et al. 2015, Fig. 4)."""
+"""Gap filling of Maycock et al. 2015, Fig. 4."""
 
 import numpy as np
 
-from depthtrack.markers.filled_capture import Filling, runs
+from depthtrack.markers.filled_capture import Filling, measured_samples, runs
 from depthtrack.markers.filling.bridging import bridged
 from depthtrack.markers.filling.joints import affecting, determined
 from depthtrack.markers.filling.options import PaperFillOptions
@@ -20,7 +20,7 @@ def paper_fill(model: MarkerModel, measured: Array, poses: Array, options: Paper
     The joints that no visible marker determines are frozen until a marker reappears in a plausible place. Then their
     angles are interpolated from the frame before the gap to the one after it. All gaps are filled in parallel.
     """
-    visible = np.isfinite(measured).all(axis=-1)
+    visible = measured_samples(measured)
     accepted = _plausible(model, measured, poses, visible, options)
     known = determined(model, accepted) | ~determined(model, np.ones(len(model.labels), dtype=np.bool_))
     filled = bridged(poses, known)
@@ -35,8 +35,8 @@ def paper_fill(model: MarkerModel, measured: Array, poses: Array, options: Paper
 def _plausible(model: MarkerModel, measured: Array, poses: Array, visible: Mask, options: PaperFillOptions) -> Mask:
     """Return which visible markers (T, M) are accepted.
 
-    After a gap, a marker is accepted from the first frame in which its distance from the model, articulated towards it,
-    is below the mean of all markers plus a small term.
+    After a gap, a marker is accepted from the first frame in which it is near the model, articulated towards it.
+    Its distance is then at most the mean of all markers plus a small term.
     """
     distance = np.linalg.norm(measured - model.positions(poses), axis=-1)
     accepted = visible.copy()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
-from depthtrack.markers.filled_capture import Gap
+from depthtrack.markers.filled_capture import Gap, measured_samples
 from depthtrack.markers.filling.options import PatternFillOptions
 from depthtrack.types import Array, Index, Mask
 
@@ -17,7 +17,7 @@ def pattern_fill(measured: Array, gaps: list[Gap], options: PatternFillOptions) 
     least over the capture. Their rigid motion from the frame before the gap carries the marker forwards, and that from
     the frame after it backwards; the two are blended linearly.
     """
-    visible = np.isfinite(measured).all(axis=-1)
+    visible = measured_samples(measured)
     variation = _variation(measured)
     filled = np.full(measured.shape, np.nan)
     for gap in gaps:
@@ -33,7 +33,7 @@ def pattern_fill(measured: Array, gaps: list[Gap], options: PatternFillOptions) 
 
 
 def _variation(measured: Array) -> Array:
-    """Return the standard deviation (M, M) of the distances between markers, metres; NaN if never seen together."""
+    """Return the standard deviation (M, M) of the distances between markers, metres."""
     count = measured.shape[1]
     variation = np.full((count, count), np.nan)
     for m in range(count):

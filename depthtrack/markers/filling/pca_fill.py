@@ -1,8 +1,9 @@
 """Baseline: principal components of the whole marker set.
 
-Source: Gloersen and Federolf, "Predicting missing marker trajectories in human motion data using marker
-intercorrelations", PLoS ONE 11(3), 2016, after Federolf, "A novel approach to solve the missing marker problem",
-PLoS ONE 8(10), 2013.
+Sources:
+- Gloersen and Federolf, "Predicting missing marker trajectories in human motion data using marker intercorrelations",
+  PLoS ONE 11(3), 2016.
+- Federolf, "A novel approach to solve the missing marker problem", PLoS ONE 8(10), 2013.
 
 Each gap is filled by itself. A marker with gaps elsewhere is used, and the paper's removal of distal markers with gaps
 is not needed.
@@ -10,7 +11,7 @@ is not needed.
 
 import numpy as np
 
-from depthtrack.markers.filled_capture import Gap
+from depthtrack.markers.filled_capture import Gap, measured_samples
 from depthtrack.markers.filling.options import PcaFillOptions
 from depthtrack.types import Array, Index, Mask
 
@@ -27,18 +28,17 @@ def pca_fill(measured: Array, gaps: list[Gap], options: PcaFillOptions) -> Array
     Strategy R1 reconstructs all markers that are missing during the gap at once; R2 reconstructs the one marker, and
     leaves out the others that are missing.
     """
-    visible = np.isfinite(measured).all(axis=-1)
+    visible = measured_samples(measured)
     distances = _mean_distances(measured)
     filled = np.full(measured.shape, np.nan)
     for gap in gaps:
         frames = np.arange(gap.start, gap.stop)
-        present = visible[frames].all(axis=0)
-        used = present | ~present if options.strategy == "R1" else present
-        used = used & visible.any(axis=0)
+        present = np.asarray(visible[frames].all(axis=0))
+        used = np.array(visible.any(axis=0) if options.strategy == "R1" else present)
         used[gap.marker] = True
         columns = np.flatnonzero(used)
-        missing = ~present[columns]
-        training = visible[:, columns].all(axis=1)
+        missing = np.asarray(~present[columns])
+        training = np.asarray(visible[:, columns].all(axis=1))
         if missing.all() or training.sum() < _FRAMES:
             continue
         weights = _weights(distances[np.ix_(columns[missing], columns)], missing, options)
@@ -48,7 +48,7 @@ def pca_fill(measured: Array, gaps: list[Gap], options: PcaFillOptions) -> Array
 
 
 def _weights(distances: Array, missing: Mask, options: PcaFillOptions) -> Array:
-    """Return the weight (M,) of each marker: it falls with the distance from the nearest missing one.
+    """Return the weight (M,) of each marker: it falls with the distance from a missing one.
 
     distances: (K, M) metres, mean distance of the K missing markers from all.
     """
@@ -60,7 +60,7 @@ def _weights(distances: Array, missing: Mask, options: PcaFillOptions) -> Array:
 def _reconstructed(
     measured: Array, training: Mask, frames: Index, missing: Mask, weights: Array, options: PcaFillOptions
 ) -> Array:
-    """Return the positions (n, M, 3) of the frames, metres, from the markers that are not missing."""
+    """Return the positions (n, M, 3) of the frames, metres, from the markers present."""
     centre = measured[:, ~missing].mean(axis=1, keepdims=True)
     moving = measured - centre
     N = moving[training]
@@ -88,7 +88,7 @@ def _kept(values: Array, share: float) -> int:
 
 
 def _mean_distances(measured: Array) -> Array:
-    """Return the mean distance (M, M) of markers from each other, metres; NaN if never seen together."""
+    """Return the mean distance (M, M) of markers from each other, metres."""
     count = measured.shape[1]
     distances = np.full((count, count), np.nan)
     for m in range(count):

@@ -40,7 +40,7 @@ def gaps_to_fill(model: int, measured: Mask, rate: float, options: FillOptions) 
 
 
 def time_to_measured(measured: Mask, rate: float) -> Array:
-    """Return the time (T, M) to the nearest frame with the marker, seconds; infinite without one."""
+    """Return the time (T, M) to the nearest frame with the marker, seconds."""
     frames = np.arange(len(measured), dtype=np.float64)
     distance = np.full(measured.shape, np.inf)
     for m in range(measured.shape[1]):

@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from depthtrack.markers.filled_capture import Filling, Gap, runs
+from depthtrack.markers.filled_capture import Filling, Gap, measured_samples, runs
 from depthtrack.markers.filling.bridging import bridged
 from depthtrack.markers.filling.correction import marker_offsets, whole_chains
+from depthtrack.markers.filling.expected_error import averaged_error, regression_error, spread_error
 from depthtrack.markers.filling.joints import determined
+from depthtrack.markers.filling.marker_regression import regress_marker
 from depthtrack.markers.filling.motion_prior import MotionPrior, learn_motion_prior
 from depthtrack.markers.filling.options import SmoothFillOptions
-from depthtrack.markers.filling.prediction import Prediction
+from depthtrack.markers.filling.prediction import Prediction, time_to_measured
 from depthtrack.markers.filling.smoothing import Smoothed, Stretch, posterior_samples, smooth
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Mask
@@ -30,13 +32,14 @@ def smooth_fill(
     First every marker gets its place on the body, as the frames about a gap show it: the model then meets the
     measured markers at both ends. The poses of the gap are smoothed, and the places corrected by what remains.
     """
-    visible = np.isfinite(measured).all(axis=-1)
+    visible = measured_samples(measured)
     known = determined(model, visible)
     prior = learn_motion_prior(poses, known, rate, options)
     start = bridged(poses, known)
     width = max(round(options.correction_time * rate), 1)
-    whole = whole_chains(model, visible) & np.isfinite(poses).all(axis=1)[:, None]
+    whole = whole_chains(model, visible) & measured_samples(poses)[:, None]
     places = marker_offsets(model, poses, measured, whole, width)
+    wander = _wander(places, whole, time_to_measured(visible, rate), options.wander_time)
     shape = visible.shape
     result = Prediction(np.full((*shape, 3), np.nan), np.zeros(shape, np.int64), np.full(shape, np.nan), poses.copy())
     for first, last in _stretches(gaps, len(poses), round(options.border * rate)):
@@ -47,15 +50,36 @@ def smooth_fill(
         unseen = ~visible[rows].any(axis=0)
         offsets[:, unseen] = places[rows][:, unseen]
         result.positions[rows] = _positions(model, smoothed.poses, offsets)
-        result.expected_error[rows] = _spread(model, smoothed, offsets, visible[rows], stretch.size)
-        empty = ~visible[rows].all(axis=1)
-        result.poses[rows] = np.where(empty[:, None], smoothed.poses, result.poses[rows])
+        spread = np.hypot(_spread(model, smoothed, offsets, visible[rows], stretch.size), wander[rows])
+        result.expected_error[rows] = spread_error(spread)
+        empty = np.flatnonzero(~visible[rows].all(axis=1))
+        result.poses[first + empty] = smoothed.poses[empty]
+    if options.regress and not model.is_rigid:
+        _average_with_regression(model, measured, gaps, rate, options, result)
     result.how[:] = np.where(np.isfinite(result.positions).all(axis=-1), Filling.SMOOTHED, Filling.GAP)
     return result
 
 
+def _average_with_regression(
+    model: MarkerModel, measured: Array, gaps: list[Gap], rate: float, options: SmoothFillOptions, result: Prediction
+) -> None:
+    """Average the markers of gaps in `result` with those of the regression, by precision."""
+    smoothed = np.where(np.isfinite(measured), measured, result.positions)
+    for gap in gaps:
+        regressed = regress_marker(model, measured, smoothed, gap, rate, options.regression)
+        rows = slice(gap.start, gap.stop)
+        error = result.expected_error[rows, gap.marker]
+        if regressed is None or not np.isfinite(error).all():
+            continue
+        other = regression_error(regressed.error)
+        share = (error**2 / (error**2 + other**2))[:, None]
+        positions = result.positions[rows, gap.marker]
+        result.positions[rows, gap.marker] = (1 - share) * positions + share * regressed.positions
+        result.expected_error[rows, gap.marker] = averaged_error(error, other)
+
+
 def _stretches(gaps: list[Gap], frames: int, border: int) -> list[tuple[int, int]]:
-    """Return first and one past the last frame of the stretches to smooth; those that overlap are one."""
+    """Return the ends of the stretches to smooth; those that overlap are one."""
     covered = np.zeros(frames, dtype=np.bool_)
     for gap in gaps:
         covered[max(gap.start - max(border, 2), 0) : gap.stop + max(border, 2)] = True
@@ -71,6 +95,19 @@ def _stretch(
     return Stretch(model.kinematics.chain, model.bodies, places, targets, weights, prior, size)
 
 
+def _wander(places: Array, whole: Mask, time: Array, constant: float) -> Array:
+    """Return how far markers move on their bodies (T, M) in a time since they were seen, metres.
+
+    places: (T, M, 3) metres, body frames; whole: (T, M) where they were seen.
+    time: (T, M) seconds; constant: seconds in which all of the motion happens.
+    """
+    counts = np.maximum(whole.sum(axis=0), 1)[:, None]
+    seen = np.where(whole[..., None], places, 0.0)
+    mean = seen.sum(axis=0) / counts
+    variance = np.sum(np.where(whole[..., None], (places - mean) ** 2, 0.0), axis=(0, 2)) / counts[:, 0]
+    return np.asarray(np.sqrt(variance * (1 - np.exp(-2 * time / constant))))
+
+
 def _positions(model: MarkerModel, poses: Array, offsets: Array) -> Array:
     """Return the markers (T, M, 3) at offsets (T, M, 3) in the frames of their bodies."""
     T = model.kinematics.transforms(poses)[:, model.bodies]
@@ -78,7 +115,7 @@ def _positions(model: MarkerModel, poses: Array, offsets: Array) -> Array:
 
 
 def _spread(model: MarkerModel, smoothed: Smoothed, offsets: Array, visible: Mask, size: int) -> Array:
-    """Return the root mean square distance (T, M) of the markers of the posterior from the mean, metres."""
+    """Return the root mean square distance (T, M) of the posterior from its mean, metres."""
     tangents = posterior_samples(smoothed, _DRAWS, size)
     squared = np.zeros(visible.shape)
     points = _positions(model, smoothed.poses, offsets)

@@ -1,4 +1,4 @@
-"""Smoothing of a stretch of a capture: the likeliest poses given the visible markers and the prior on motion.
+"""Smoothing of a stretch of a capture: the likeliest poses.
 
 The energy is half the sum over frames of the squared distances of visible markers from the model, over their variance,
 plus that of `MotionPrior`. It is minimised by Gauss-Newton steps over all frames of the stretch at once. A frame is
@@ -54,7 +54,7 @@ class Smoothed(NamedTuple):
 
 
 def smooth(stretch: Stretch, start: Array, iterations: int) -> Smoothed:
-    """Return the likeliest poses of a stretch of three frames or more, from poses `start` (T, 27)."""
+    """Return the likeliest poses of three frames or more, from poses `start` (T, 27)."""
     poses, size = start, stretch.size
     energy, gradient, rows = _equations(stretch, poses)
     for _ in range(iterations):
@@ -80,7 +80,7 @@ def smooth(stretch: Stretch, start: Array, iterations: int) -> Smoothed:
 
 
 def posterior_samples(smoothed: Smoothed, count: int, size: int) -> Array:
-    """Return tangents (count, T, 26) drawn from the normal distribution about the smoothed poses.
+    """Return tangents (count, T, 26) drawn from the distribution about the smoothed poses.
 
     The draws are the same in every call.
     """
@@ -127,7 +127,7 @@ def _second_differences(poses: Array) -> Array:
 
 @compiled(nogil=True)
 def _banded(diagonal: Array, acceleration: Array) -> Array:
-    """Return the precision as rows of `banded_systems`: blocks (T, n, n), plus D^T D times `acceleration` (n, n).
+    """Return the precision as rows of `banded_systems`: blocks (T, n, n) plus accelerations.
 
     D (T - 2, T) takes second differences.
     """

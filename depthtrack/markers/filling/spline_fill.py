@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from depthtrack.markers.filled_capture import Gap
+from depthtrack.markers.filled_capture import Gap, measured_samples
 from depthtrack.types import Array
 
 _FRAMES = 10
@@ -15,13 +15,13 @@ def spline_fill(measured: Array, gaps: list[Gap]) -> Array:
 
     measured: (T, M, 3) metres, NaN if not measured.
 
-    The spline of a coordinate passes through the measured frames about the gap, with third derivatives that are
-    continuous at the last but one frame at either end ("not a knot"). A gap at an end of the capture stays.
+    The spline of a coordinate passes through the measured frames about the gap ("not a knot" at its ends).
+    A gap at an end of the capture stays.
     """
     filled = np.full(measured.shape, np.nan)
     for gap in gaps:
         track = measured[:, gap.marker]
-        seen = np.flatnonzero(np.isfinite(track).all(axis=-1))
+        seen = np.flatnonzero(measured_samples(track))
         before, after = seen[seen < gap.start][-_FRAMES:], seen[seen >= gap.stop][:_FRAMES]
         if len(before) > 0 and len(after) > 0:
             known = np.concatenate([before, after])

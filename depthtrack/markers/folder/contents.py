@@ -33,8 +33,8 @@ class Source:
         return cls(str(path.resolve()), _digest(path))
 
     def check(self) -> None:
-        """Raise InputError if the file is missing or has changed since."""
-        if _digest(Path(self.path)) != self.sha256:
+        """Raise InputError if the file is still there, but has changed since."""
+        if Path(self.path).exists() and _digest(Path(self.path)) != self.sha256:
             raise InputError(f"{self.path} has changed since its markers were labelled: restore it, or label it again")
 
 

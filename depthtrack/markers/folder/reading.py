@@ -74,7 +74,7 @@ class MarkerFolder:
         return cls(path, contents, labelled, FilledCapture(labelled, split(positions), how, errors, poses))
 
     def check_source(self) -> None:
-        """Raise InputError if the source of the folder is missing or has changed since."""
+        """Raise InputError if the source of the folder is still there, but has changed since."""
         if self.contents.source is not None:
             self.contents.source.check()
 

@@ -12,10 +12,10 @@ from depthtrack.markers.models.layout import find_layout
 from depthtrack.markers.models.marker_model import MarkerModel
 
 
-def choose_models(words: Sequence[str], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
+def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
     """Return the models that words name.
 
-    words: each the file of a model, or a layout after the side of its hand, such as `left:19` or `left:mine.json`.
+    words: each a model, the file of a model, or a layout after the side of its hand, such as `left:19` or `left:mine.json`.
         Without a side, a layout is worn by `hand`.
     hand: sizes of the hands; those of the average adult if None.
 
@@ -24,7 +24,8 @@ def choose_models(words: Sequence[str], hand: HandShape | None = None) -> tuple[
     """
     if not words:
         raise InputError("expected a model: name a layout such as 26 or left:16, or the file of a model")
-    models = tuple(_model(word, HandShape() if hand is None else hand) for word in words)
+    sizes = HandShape() if hand is None else hand
+    models = tuple(word if isinstance(word, MarkerModel) else _model(word, sizes) for word in words)
     names = [model.name for model in models]
     for name in names:
         if names.count(name) > 1:
