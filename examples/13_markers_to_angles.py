@@ -2,8 +2,8 @@
 
 Usage: 13_markers_to_angles.py CAPTURE.c3d MODEL FOLDER
 
-MODEL is a layout of markers on the hand, such as 26 or left:16, or a model that was calibrated on an earlier capture of
-the same subject (FOLDER/models/right.json). Markers without a label are found. FOLDER gets labels, sizes and poses.
+MODEL is a layout of markers on the hand, such as 26 or left:16. The model of an earlier capture of the same subject
+(FOLDER/models/right.json) is better. Markers without a label are found. FOLDER gets labels, sizes and poses.
 """
 
 import sys

@@ -51,6 +51,7 @@ REWRITTEN = (
     "docs/limitations.md",
     "docs/marker-formats.md",
     "docs/marker-synthesis.md",
+    "docs/markers.md",
     "docs/metrics.md",
     "docs/parameters.md",
     "docs/rigs.md",

@@ -6,7 +6,7 @@ marker positions about their layout. A calibrated model is the next layout: labe
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,12 +64,15 @@ def calibrate_markers(
 ) -> CalibratedMarkers:
     """Return the hand of model k of a labelled capture with its offsets and sizes.
 
-    Poses that the capture lacks are fitted first.
+    Poses that the capture lacks are fitted first. Samples of low confidence are left out.
 
     Raises:
         InputError: if the model is a rigid body, or too few frames show enough markers.
     """
-    return calibrate_on_positions(labelled.models[k], labelled.positions(k), labelled.poses[k], options)
+    options = options or MarkerCalibrationOptions()
+    sure = labelled.confidence[k] >= options.least_confidence
+    positions = np.where(sure[..., None], labelled.positions(k), np.nan)
+    return calibrate_on_positions(labelled.models[k], positions, labelled.poses[k], options)
 
 
 def calibrate_on_positions(
@@ -87,10 +90,12 @@ def calibrate_on_positions(
     if model.hand is None:
         raise InputError(f"'{model.name}' is a rigid body: only hands are calibrated, save it from its markers instead")
     fitter = SizedFitter(model, options.noise, PosturePrior.from_synergies(options.widening, options.residual))
-    frames = _frames(positions, options)
-    known = np.full((len(frames), 27), np.nan) if poses is None else poses[frames]
-    start = np.stack([fit_labelled_frame(fitter, positions[f], pose) for f, pose in zip(frames, known, strict=True)])
-    return _estimate(fitter, positions[frames], start, frames, options)
+    sample = _complete_frames(positions, options)
+    known = np.full((len(sample), 27), np.nan) if poses is None else poses[sample]
+    fits = [fit_labelled_frame(fitter, positions[f], pose) for f, pose in zip(sample, known, strict=True)]
+    chosen = _different_frames(positions[sample], np.array([energy for _, energy in fits]), options)
+    start = np.stack([fits[n][0] for n in chosen])
+    return _estimate(fitter, positions[sample[chosen]], start, sample[chosen], options)
 
 
 def self_calibrate(
@@ -110,17 +115,15 @@ def self_calibrate(
     labelled = label(capture, models)
     for _ in range(rounds):
         current = tuple(
-            model
-            if model.is_rigid
-            else calibrate_on_positions(model, labelled.positions(k), labelled.poses[k], options).model
+            model if model.is_rigid else calibrate_markers(replace(labelled, models=models), k, options).model
             for k, model in enumerate(models)
         )
         labelled = label(capture, current)
     return labelled.models, labelled
 
 
-def _frames(positions: Array, options: MarkerCalibrationOptions) -> Index:
-    """Return frames (F,) with most of the markers whose postures differ most."""
+def _complete_frames(positions: Array, options: MarkerCalibrationOptions) -> Index:
+    """Return frames (F,) with most of the markers, spread over the capture."""
     seen = np.isfinite(positions).all(axis=-1)
     usable = np.flatnonzero(seen.sum(axis=1) >= max(options.least_share * positions.shape[1], 4))
     if len(usable) < options.fewest:
@@ -128,14 +131,22 @@ def _frames(positions: Array, options: MarkerCalibrationOptions) -> Index:
             f"{len(usable)} frames show {options.least_share:.0%} of the markers, a calibration needs "
             f"{options.fewest}: check the labels, or fill the gaps first"
         )
-    sample = usable[np.linspace(0, len(usable) - 1, min(len(usable), options.inspected)).round().astype(int)]
-    shapes = _shape_features(positions[sample])
+    return usable[np.linspace(0, len(usable) - 1, min(len(usable), options.inspected)).round().astype(np.int64)]
+
+
+def _different_frames(positions: Array, energies: Array, options: MarkerCalibrationOptions) -> Index:
+    """Return the frames (F,) that differ most among those that a hand fits well.
+
+    Wrong labels fit no hand.
+    """
+    good = np.argsort(energies, kind="stable")[: max(options.fewest, round(options.good_share * len(energies)))]
+    shapes = _shape_features(positions[good])
     chosen = [int(np.argmin(np.isnan(shapes).sum(axis=1)))]
-    nearest = np.full(len(sample), np.inf)
-    while len(chosen) < min(options.frames, len(sample)):
+    nearest = np.full(len(good), np.inf)
+    while len(chosen) < min(options.frames, len(good)):
         nearest = np.minimum(nearest, np.nan_to_num(np.nanmean((shapes - shapes[chosen[-1]]) ** 2, axis=1)))
         chosen.append(int(np.argmax(nearest)))
-    return np.unique(sample[chosen])
+    return np.unique(good[chosen])
 
 
 def _shape_features(positions: Array) -> Array:

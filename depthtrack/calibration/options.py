@@ -104,7 +104,9 @@ class MarkerCalibrationOptions:
     """Calibration of marker offsets and hand sizes on a labelled capture."""
 
     frames: int = option(60, "Frames used, at most: those whose postures differ most", unit="frames")
-    inspected: int = option(400, "Frames that are compared for that", unit="frames")
+    inspected: int = option(200, "Frames that are fitted and compared for that", unit="frames")
+    good_share: float = option(0.7, "Share of these frames that are used at most: those that a hand fits best")
+    least_confidence: float = option(0.8, "Labels of a lower confidence are not used")
     fewest: int = option(8, "Frames below which calibration is refused", unit="frames")
     least_share: float = option(0.7, "Smallest share of the markers that a frame must show")
     noise: float = option(0.0015, "Standard deviation of a marker about the moving hand: skin motion", unit="m")

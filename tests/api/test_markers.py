@@ -1,4 +1,4 @@
-"""The functions for marker captures, on a capture with labels; the search has tests of its own."""
+"""The functions for marker captures, on a capture with labels."""
 
 from pathlib import Path
 

@@ -15,9 +15,10 @@ _FINGER_WEIGHT = 0.1
 """Weight of the markers of the fingers in the alignment of a start, against 1 of those of the palm."""
 
 
-def fit_labelled_frame(fitter: SizedFitter, points: Array, known: Array | None = None) -> Array:
-    """Return the pose (27,) that fits labelled points (M, 3), metres, NaN if not measured.
+def fit_labelled_frame(fitter: SizedFitter, points: Array, known: Array | None = None) -> tuple[Array, float]:
+    """Return the pose (27,) that fits labelled points, and its energy.
 
+    points: (M, 3) metres, NaN if not measured.
     known: (27,) pose to start from; that and typical postures compete. NaN if unknown.
     """
     seen = np.asarray(np.isfinite(points).all(axis=-1))
@@ -28,4 +29,5 @@ def fit_labelled_frame(fitter: SizedFitter, points: Array, known: Array | None =
         rest = make_pose(np.zeros(3), (1, 0, 0, 0), POSTURES[name])
         starts.append(aligned_poses(POSTURES[name], fitter.model.positions(rest), targets, weights))
     energies = [fitter.fit(pose, np.zeros(COUNT), targets, assigned)[0] for pose in starts]
-    return starts[int(np.argmin(energies))]
+    best = int(np.argmin(energies))
+    return starts[best], energies[best]
