@@ -11,8 +11,8 @@ from depthtrack.hand.kinematics import body_of
 from depthtrack.markers.filled_capture import Gap
 from depthtrack.markers.filling.fill import fill_gaps
 from depthtrack.markers.filling.options import FillMethod, FillOptions
-from depthtrack.markers.filling.refit import refitted_poses
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.markers.labelled_fit import fit_poses
 from depthtrack.types import Array, Index, Mask
 
 _MARGIN = 5
@@ -85,7 +85,7 @@ def cut_stretches(
 
     shortest, longest: frames of a stretch.
 
-    The poses of the cut frames are solved again without the cut marker.
+    All poses are fitted again, without what was cut.
     Raises InputError if the lengths are out of order, or no stretch fits.
     """
     if not 1 <= shortest <= longest:
@@ -110,15 +110,9 @@ def cut_stretches(
 
 def _without(labelled: LabelledCapture, gaps: Sequence[Gap]) -> LabelledCapture:
     columns = [np.array(each) for each in labelled.columns]
-    frames = [np.zeros(len(each), dtype=np.bool_) for each in columns]
     for gap in gaps:
         columns[gap.model][gap.start : gap.stop, gap.marker] = -1
-        frames[gap.model][gap.start : gap.stop] = True
-    cut = replace(labelled, columns=tuple(columns))
-    poses = (
-        refitted_poses(model, cut.positions(k), cut.poses[k], frames[k]) for k, model in enumerate(labelled.models)
-    )
-    return replace(cut, poses=tuple(poses))
+    return fit_poses(replace(labelled, columns=tuple(columns)))
 
 
 def score_filling(

@@ -96,7 +96,8 @@ class MarkerScene:
     def draw(self, frame: int, view: View, named: int | None = None) -> Image:
         """Return a picture (h, w, 3) of a frame in a view.
 
-        named: model whose markers have their names beside them; None for none.
+        named: model whose markers have their names beside them, and to which edges of rigid bodies are limited;
+            None for no names.
 
         Filled dots are markers that were measured, rings those that the pose or the filling puts there. Crosses are
         points without a label.
@@ -105,7 +106,7 @@ class MarkerScene:
         surface = self._rendered(frame, fine)
         image = draw_surface(blank(fine.camera.width, fine.camera.height, SURFACE), surface, _OPACITY)
         self._draw_rest(image, frame, fine)
-        dots = self._draw_markers(image, frame, fine, surface)
+        dots = self._draw_markers(image, frame, fine, surface, named)
         image = smaller(image, view.camera.width, view.camera.height)
         if named is not None:
             _draw_names(image, dots[named])
@@ -132,7 +133,9 @@ class MarkerScene:
                 ends = _fixed([x - dx, y - dy]), _fixed([x + dx, y + dy])
                 cv2.line(image, *ends, UNLABELLED_COLOUR, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
 
-    def _draw_markers(self, image: Image, frame: int, view: View, surface: RenderedSurface) -> list[list[Dot]]:
+    def _draw_markers(
+        self, image: Image, frame: int, view: View, surface: RenderedSurface, named: int | None
+    ) -> list[list[Dot]]:
         """Draw the markers; return those in the image of each model."""
         dots: list[list[Dot]] = [[] for _ in self.labelled.models]
         for k, model in enumerate(self.labelled.models):
@@ -141,7 +144,7 @@ class MarkerScene:
             measured = self.labelled.columns[k][frame] >= 0
             shown = np.where(np.isfinite(at), at, expected)
             pixels, colours = view.camera.project(shown), self.colours(k)
-            if model.is_rigid:
+            if model.is_rigid and named in (None, k):
                 _draw_edges(image, pixels, colours[0])
             hidden = _hidden(shown, pixels, surface)
             for m, pixel in enumerate(pixels):

@@ -24,7 +24,7 @@ class FoldersArgument:
 class Command:
     """Cut stretches out of visible markers, and compare how each method fills them.
 
-    One marker at a time is cut, and the poses of those frames are solved again without it.
+    One marker at a time is cut, and all poses are fitted again without what was cut.
     """
 
     labelled: tyro.conf.OmitArgPrefixes[FoldersArgument]

@@ -7,11 +7,10 @@ import numpy as np
 from depthtrack.compilation import compiled
 from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.compiled_kinematics import BodyPoses
-from depthtrack.markers.labelling.pose_fit import PoseFit, fit_pose
+from depthtrack.markers.labelling.pose_fit import PoseFit, determined_angles, fit_pose
 from depthtrack.markers.labelling.prediction import model_precision
 from depthtrack.markers.labelling.scene import Scene, place_markers
 from depthtrack.markers.labelling.state import Settings
-from depthtrack.markers.labelling.step import determined_angles
 from depthtrack.types import Array, Index, Mask
 
 

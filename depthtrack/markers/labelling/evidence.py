@@ -30,12 +30,16 @@ def _add_evidence(
     for n in range(position.shape[0]):
         t, k = frame[n], tracklet[n]
         for i in range(out.shape[1]):
-            if np.isnan(expected.position[t, i, 0]):
-                out[k, i] += LEAST
-                continue
-            square = mahalanobis(expected.precision[t, i], expected.position[t, i], position[n])
-            ratio = expected.peak[t, i] - clutter - 0.5 * square
-            out[k, i] += min(max(ratio, LEAST), MOST)
+            out[k, i] += frame_evidence(expected, clutter, t, i, position[n])
+
+
+@compiled(nogil=True)
+def frame_evidence(expected: ExpectedFrames, clutter: float, t: int, i: int, point: Array) -> float:
+    """Return the log-likelihood ratio of a point (3,) of frame t being marker i or clutter."""
+    if np.isnan(expected.position[t, i, 0]):
+        return LEAST
+    square = mahalanobis(expected.precision[t, i], expected.position[t, i], point)
+    return float(min(max(expected.peak[t, i] - clutter - 0.5 * square, LEAST), MOST))
 
 
 def contested(points: PackedPoints, tracklet: Index, labels: Index, expected: ExpectedFrames, clutter: float) -> Mask:

@@ -75,6 +75,7 @@ class LostOptions:
     least_share: float = option(0.35, "Share of labelled markers below which a model is getting lost")
     largest_error: float = option(0.012, "Mean residual above which a model is getting lost", unit="m")
     seconds: float = option(0.25, "Time in which it must recover", unit="s")
+    retry: float = option(0.1, "Time between two searches for a model that is lost", unit="s")
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class OfflineOptions:
 
     use: bool = option(True, "Track in both directions, and decide tracklets by all of their frames")
     rounds: int = option(6, "Rounds of pose fits and assignments of tracklets, at most")
+    split: float = option(60.0, "Log-likelihood ratio from which on a tracklet of two markers is cut")
     adopt: float = option(0.1, "Shortest tracklet without a label that is tried as a marker by a fit", unit="s")
     link_gate: float = option(3.0, "Largest distance of a link between frames", unit="standard deviations")
     link_clear: float = option(2.0, "By how much farther the next best link must be", unit="standard deviations")
@@ -108,8 +110,11 @@ class LabellingOptions:
             raise InputError(
                 f"probabilities must be between 0 and 1, found seen_again {a.seen_again} and reappears {a.reappears}"
             )
-        if not 1 <= f.iterations <= 1000:
-            raise InputError(f"iterations must be between 1 and 1000, found {f.iterations}")
+        if not (1 <= f.iterations <= 1000 and 1 <= self.offline.rounds <= 100):
+            raise InputError(
+                "iterations must be between 1 and 1000, and rounds between 1 and 100, "
+                f"found {f.iterations} and {self.offline.rounds}"
+            )
 
 
 PAPER_LABELLING = LabellingOptions(

@@ -14,7 +14,7 @@ from depthtrack.solver.normal_equations import NormalEquations
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.problem import Problem, SolverOptions, SolverState
 from depthtrack.solver.subspace import PostureSubspace
-from depthtrack.types import Array, Mask
+from depthtrack.types import Array, Index, Mask
 
 _LOWER, _UPPER, _FULL = np.array(LOWER), np.array(UPPER), np.eye(20)
 
@@ -70,3 +70,13 @@ def fit_pose(
     problem = Problem(chain_of(scene, g), equations, points, Prior(np.zeros((20, 20)), np.zeros(20)), space)
     options = SolverOptions(fit.iterations, fit.damping, 1e-9, fit.avoid_limits, 2e-5, 0.0, 1e-14, 6)
     solve(problem, options, bodies, SolverState(pose, coordinates, slope[:count]), np.empty(fit.iterations + 1))
+
+
+@compiled(nogil=True)
+def determined_angles(scene: Scene, g: int, point: Index, out: Mask) -> None:
+    """Write whether each angle (20,) of model g moves a marker that has a point."""
+    out[:] = False
+    for i in range(scene.first[g], scene.first[g + 1]):
+        if point[i] >= 0:
+            for a in range(20):
+                out[a] |= scene.moves[i, a]

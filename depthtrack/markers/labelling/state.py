@@ -13,6 +13,10 @@ NEVER = 1_000_000
 """Frames since a marker was seen that has not been seen yet."""
 
 
+LARGEST_MARGIN, LARGEST_MISFIT = 20.0, 8.0
+"""Limits of the features of a confidence: log-likelihood ratio, and standard deviations."""
+
+
 class TrackState(NamedTuple):
     """What the next frame is predicted from: G models with M markers in all.
 
@@ -28,6 +32,7 @@ class TrackState(NamedTuple):
     residual: (M, 3) metres, frame of the body: its distance from the model, kept while it is missing.
     missing: (M,) frames since it was seen.
     seen: (M,) frames in which it was seen.
+    run: (M,) frames in a row in which it was seen.
     outlying: (M,) frames in a row with too large a residual.
     swap: (M, M) accumulated log-likelihood ratio of an exchange.
     """
@@ -45,6 +50,7 @@ class TrackState(NamedTuple):
     residual: Array
     missing: Index
     seen: Index
+    run: Index
     outlying: Index
     swap: Array
 
@@ -69,6 +75,7 @@ class TrackState(NamedTuple):
             np.full(M, NEVER, np.int64),
             np.zeros(M, np.int64),
             np.zeros(M, np.int64),
+            np.zeros(M, np.int64),
             np.zeros((M, M)),
         )
 
@@ -81,7 +88,7 @@ class TrackState(NamedTuple):
             self.pose[g, 7:] = 0.0
         for array in (self.step, self.slope, self.error, self.failing, self.loose, self.undetermined):
             array[g] = 0
-        for array in (self.position, self.velocity, self.residual, self.seen, self.outlying, self.swap):
+        for array in (self.position, self.velocity, self.residual, self.seen, self.run, self.outlying, self.swap):
             array[rows] = 0
         self.swap[:, rows] = 0
         self.missing[rows] = NEVER
@@ -97,6 +104,7 @@ class FrameLabels(NamedTuple):
     score: (M,) log-likelihood ratio of the label against none.
     margin: (M,) by how much the next best explanation is worse.
     error: (M,) distance of the point from the fitted model, metres; NaN without a point.
+    features: (M, 4) of the confidence, see `confidence.ONLINE`; NaN without a point.
     """
 
     point: Index
@@ -106,6 +114,7 @@ class FrameLabels(NamedTuple):
     score: Array
     margin: Array
     error: Array
+    features: Array
 
     @staticmethod
     def empty(count: int) -> "FrameLabels":
@@ -118,6 +127,7 @@ class FrameLabels(NamedTuple):
             np.full(count, np.nan),
             np.full(count, np.nan),
             np.full(count, np.nan),
+            np.full((count, 4), np.nan),
         )
 
 
@@ -153,6 +163,7 @@ class Settings(NamedTuple):
     least_share: float
     largest_error: float
     lost_frames: int
+    retry_frames: int
 
     @staticmethod
     def of(options: LabellingOptions, rate: float) -> "Settings":
@@ -188,4 +199,5 @@ class Settings(NamedTuple):
             least_share=lost.least_share,
             largest_error=lost.largest_error,
             lost_frames=max(1, round(lost.seconds * rate)),
+            retry_frames=max(1, round(lost.retry * rate)),
         )

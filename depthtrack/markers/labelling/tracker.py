@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.markers.labelling.confidence import ONLINE, confidence
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.labelling.scene import Scene
 from depthtrack.markers.labelling.state import FrameLabels, Settings, TrackState
@@ -16,6 +17,9 @@ from depthtrack.types import Array, Index, Mask
 Starter = Callable[[Array, tuple[MarkerModel, ...]], tuple[Array | None, ...]]
 """Initialisation: points (K, 3), metres, and models to a pose (27,) of each one; None where it is not found."""
 
+HELD = 0.005
+"""Distance from a marker of a tracked model within which a point is not offered to others, metres."""
+
 
 @dataclass(frozen=True)
 class LabelledFrame:
@@ -24,13 +28,29 @@ class LabelledFrame:
     points: (M,) number of the point of each marker; -1 if it has none.
     poses: (G, 27) capture frame, metres and radians; NaN while a model is lost.
     errors: (M,) distance of each point from its model, metres; NaN without a point.
-    margins: (M,) log-likelihood ratio of the label and the next best one; NaN without a point.
+    confidence: (M,) probability that the label is right; NaN without a point.
     """
 
     points: tuple[Index, ...]
     poses: Array
     errors: tuple[Array, ...]
-    margins: tuple[Array, ...]
+    confidence: tuple[Array, ...]
+
+
+def restart(points: Array, scene: Scene, models: Sequence[MarkerModel], state: TrackState, starter: Starter) -> None:
+    """Track the models again that are not tracked, where a starter finds them among the points that are left.
+
+    points: (K, 3) metres. Those near the markers of tracked models are left out.
+    """
+    lost = np.flatnonzero(~state.active)
+    held = np.concatenate(
+        [np.empty((0, 3)), *(models[g].positions(state.pose[g]) for g in np.flatnonzero(state.active))]
+    )
+    distance = np.linalg.norm(points[:, None] - held, axis=-1).min(axis=1, initial=np.inf)
+    found = starter(points[distance > HELD], tuple(models[int(g)] for g in lost))
+    for g, pose in zip(lost, found, strict=True):
+        if pose is not None:
+            state.start(scene, int(g), pose)
 
 
 class MarkerTracker:
@@ -58,6 +78,7 @@ class MarkerTracker:
         self._scene = Scene.of(models)
         self._settings = Settings.of(options or LabellingOptions(), rate)
         self.state = TrackState.empty(self._scene)
+        self._frame, self._next_search = 0, 0
         self._out = FrameLabels.empty(len(self._scene.body))
         self._slices = [slice(a, b) for a, b in zip(self._scene.first[:-1], self._scene.first[1:], strict=True)]
         for g, pose in enumerate(starts or ()):
@@ -72,8 +93,10 @@ class MarkerTracker:
     def update(self, points: ArrayLike) -> LabelledFrame:
         """Label the points (K, 3) of the next frame, metres, capture frame; all finite."""
         x = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-        if self._starter is not None and not self.state.active.all():
-            self._restart(x)
+        if self._starter is not None and not self.state.active.all() and self._frame >= self._next_search:
+            restart(x, self._scene, self.models, self.state, self._starter)
+            self._next_search = self._frame + self._settings.retry_frames
+        self._frame += 1
         track_frame(x, self._scene, self._settings, self.state, self._out)
         out = self._out
         poses = np.where(self.state.active[:, None], self.state.pose, np.nan)
@@ -82,14 +105,8 @@ class MarkerTracker:
             return tuple(values[part].copy() for part in self._slices)
 
         return LabelledFrame(
-            tuple(out.point[part].copy() for part in self._slices), poses, split(out.error), split(out.margin)
+            tuple(out.point[part].copy() for part in self._slices),
+            poses,
+            split(out.error),
+            split(confidence(out.features, ONLINE)),
         )
-
-    def _restart(self, points: Array) -> None:
-        """Find the models that are not tracked among the points that no tracked model expects."""
-        lost = np.flatnonzero(~self.state.active)
-        assert self._starter is not None
-        found = self._starter(points, tuple(self.models[g] for g in lost))
-        for g, pose in zip(lost, found, strict=True):
-            if pose is not None:
-                self.state.start(self._scene, int(g), pose)

@@ -13,6 +13,7 @@ from depthtrack.types import Array, Index
 class LinkSettings(NamedTuple):
     """Limits of a link.
 
+    rate: Hz.
     noise: standard deviation of a coordinate, metres.
     acceleration: standard deviation of the change of a point's motion, m/frame.
     speed: the same for a point without a known motion, m/frame.
@@ -20,6 +21,7 @@ class LinkSettings(NamedTuple):
     clear: the next best link must be farther by this number of standard deviations of a known motion.
     """
 
+    rate: float
     noise: float
     acceleration: float
     speed: float
@@ -30,7 +32,7 @@ class LinkSettings(NamedTuple):
     def of(options: LabellingOptions, rate: float) -> "LinkSettings":
         """Return the settings for a frame rate, Hz."""
         p, o = options.prediction, options.offline
-        return LinkSettings(p.noise, p.acceleration / rate**2, o.link_speed / rate, o.link_gate, o.link_clear)
+        return LinkSettings(rate, p.noise, p.acceleration / rate**2, o.link_speed / rate, o.link_gate, o.link_clear)
 
 
 def make_tracklets(points: PackedPoints, settings: LinkSettings) -> Index:
