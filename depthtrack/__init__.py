@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from depthtrack.api.comparing import comparison_table as comparison_table
     from depthtrack.api.lifting import lift as lift
     from depthtrack.api.live import HandTracker as HandTracker
+    from depthtrack.api.markers import fill_markers as fill_markers
+    from depthtrack.api.markers import label_markers as label_markers
+    from depthtrack.api.markers import read_marker_folder as read_marker_folder
+    from depthtrack.api.markers import solve_markers as solve_markers
     from depthtrack.api.measuring import calibrate as calibrate
     from depthtrack.api.measuring import calibrate_rig as calibrate_rig
     from depthtrack.api.runs import evaluate as evaluate
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
     from depthtrack.api.runs import track as track
     from depthtrack.api.synthetic import synthesise as synthesise
     from depthtrack.calibration.calibrate import Calibration as Calibration
+    from depthtrack.calibration.marker_solution import MarkerSolution as MarkerSolution
     from depthtrack.calibration.rig_calibration import RigCalibration as RigCalibration
     from depthtrack.errors import DepthtrackError as DepthtrackError
     from depthtrack.errors import InputError as InputError
@@ -36,6 +41,14 @@ if TYPE_CHECKING:
     from depthtrack.hand.kinematics import HandModel as HandModel
     from depthtrack.hand.shape import HandShape as HandShape
     from depthtrack.hand.synergies import Synergies as Synergies
+    from depthtrack.markers.capture import MarkerCapture as MarkerCapture
+    from depthtrack.markers.filled_capture import FilledCapture as FilledCapture
+    from depthtrack.markers.filling.options import FillOptions as FillOptions
+    from depthtrack.markers.formats.registry import read_capture as read_capture
+    from depthtrack.markers.formats.registry import write_capture as write_capture
+    from depthtrack.markers.labelled_capture import LabelledCapture as LabelledCapture
+    from depthtrack.markers.labelling.options import LabellingOptions as LabellingOptions
+    from depthtrack.markers.models.marker_model import MarkerModel as MarkerModel
     from depthtrack.recording.run_folder import Run as Run
     from depthtrack.recording.sequence import Frame as Frame
     from depthtrack.recording.sequence import GroundTruth as GroundTruth
@@ -55,10 +68,12 @@ _MODULES = {
     "api.comparing": ("compare", "comparison_table"),
     "api.lifting": ("lift",),
     "api.live": ("HandTracker",),
+    "api.markers": ("fill_markers", "label_markers", "read_marker_folder", "solve_markers"),
     "api.measuring": ("calibrate", "calibrate_rig"),
     "api.runs": ("evaluate", "export_run", "joint_track", "read_run", "track"),
     "api.synthetic": ("synthesise",),
     "calibration.calibrate": ("Calibration",),
+    "calibration.marker_solution": ("MarkerSolution",),
     "calibration.rig_calibration": ("RigCalibration",),
     "errors": ("DepthtrackError", "InputError"),
     "evaluation.evaluate": ("Evaluation",),
@@ -69,6 +84,13 @@ _MODULES = {
     "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),
+    "markers.capture": ("MarkerCapture",),
+    "markers.formats.registry": ("read_capture", "write_capture"),
+    "markers.filled_capture": ("FilledCapture",),
+    "markers.filling.options": ("FillOptions",),
+    "markers.labelled_capture": ("LabelledCapture",),
+    "markers.labelling.options": ("LabellingOptions",),
+    "markers.models.marker_model": ("MarkerModel",),
     "recording.run_folder": ("Run",),
     "recording.sequence": ("Frame", "GroundTruth", "ImageKeypoints", "Sequence"),
     "recording.status": ("Status",),

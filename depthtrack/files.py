@@ -2,6 +2,8 @@
 
 import json
 import os
+import secrets
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -119,6 +121,56 @@ def write_atomic(path: Path, content: str | bytes) -> None:
     """
     with replace_atomically(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def check_replaceable(folder: Path, mark: str, what: str, overwrite: bool) -> None:
+    """Raise InputError if a folder cannot be written because something else is there.
+
+    mark: name of a file in every folder of this kind; only such folders are ever replaced.
+    what: name of the kind in errors ("a sequence folder").
+    overwrite: whether one may be replaced.
+    """
+    if not folder.is_symlink() and (not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))):
+        return
+    if not overwrite:
+        raise InputError(f"{folder} exists already: choose another name, or use --overwrite")
+    if folder.is_symlink() or not (folder / mark).is_file():
+        raise InputError(f"{folder} is not {what}, so it is not overwritten: choose another name")
+
+
+def move_folder(work: Path, folder: Path) -> None:
+    """Rename a complete folder `work` to `folder`, and delete what that replaces."""
+    if not folder.exists():
+        work.rename(folder)
+        return
+    replaced = work.with_name(work.name + "-replaced")
+    folder.rename(replaced)
+    try:
+        work.rename(folder)
+    except OSError:
+        replaced.rename(folder)
+        raise
+    shutil.rmtree(replaced)
+
+
+@contextmanager
+def new_folder(folder: Path, mark: str, what: str, overwrite: bool) -> Iterator[Path]:
+    """Yield a hidden empty folder that becomes `folder` if the block succeeds.
+
+    It is deleted if the block fails. See `check_replaceable`.
+    """
+    folder = Path(os.path.abspath(folder))
+    check_replaceable(folder, mark, what, overwrite)
+    work = folder.parent / f".{folder.name}.writing-{os.getpid()}-{secrets.token_hex(4)}"
+    try:
+        work.mkdir(parents=True)
+        yield work
+        check_replaceable(folder, mark, what, overwrite)
+        move_folder(work, folder)
+    except OSError as error:
+        raise InputError(f"cannot write {folder}: {_reason(error)}") from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
 
 
 def _reason(error: OSError) -> str:

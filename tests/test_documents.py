@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from depthtrack import __version__
+from depthtrack.markers.filling.options import FillOptions
+from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.options import parameters
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS
@@ -28,11 +30,13 @@ OTHER_OPTIONS = {"check", "help", "only"}
 def command_line_options() -> set[str]:
     """Return all options of the commands, as their dataclasses and the configurations state them."""
     found = set(OTHER_OPTIONS)
-    for path in (ROOT / "depthtrack" / "cli").glob("*.py"):
+    for path in (ROOT / "depthtrack" / "cli").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
                 found.add(node.target.id.replace("_", "-"))
-    for prefix, make in (*(("", make) for make in CONFIGURATIONS.values()), ("segmentation.", SegmentationOptions)):
+    configurations = [("", make) for make in CONFIGURATIONS.values()]
+    others = (("segmentation.", SegmentationOptions), ("labelling.", LabellingOptions), ("", FillOptions))
+    for prefix, make in (*configurations, *others):
         for each in parameters(make()):
             found |= {prefix + each.name.replace("_", "-"), prefix + each.path.replace("_", "-")}
     return found | {f"no-{name}" for name in found}

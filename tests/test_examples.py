@@ -15,7 +15,9 @@ import pytest
 import depthtrack as dt
 from depthtrack.calibration.calibrate import Measured
 from depthtrack.hand.synergies import load_synergies
+from depthtrack.markers.formats.registry import write_capture
 from depthtrack.recording.keypoints import HEADER, read_keypoints
+from depthtrack.synthesis.marker_capture import MarkerSynthesis, synthesise_markers
 
 FOLDER = Path(__file__).parent.parent / "examples"
 FILES = sorted(FOLDER.glob("*.py"))
@@ -167,6 +169,20 @@ def test_12_keypoints_of_mediapipe_are_read(recording: str, tmp_path: Path, monk
     np.testing.assert_allclose(found.pixels[1, 20], (319.5, 239.5))
     assert (found.confidence[0].max(), found.confidence[1, 0], found.side) == (0, 0.9, None)
     assert tuple(example(12).HEADER) == HEADER
+
+
+def test_13_markers_become_joint_angles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The search for the markers takes minutes, so the capture has its labels."""
+    pytest.importorskip("ezc3d", reason="ezc3d is not installed: pip install 'depthtrack[markers]'")
+    made = synthesise_markers(MarkerSynthesis(frames=40, rate=60.0, seed=3))
+    write_capture(tmp_path / "trial.c3d", made.truth.labelled())
+    angles = example(13).main(str(tmp_path / "trial.c3d"), "26", str(tmp_path / "solved"))
+    text = capsys.readouterr().out
+    assert "hand_length" in text
+    assert re.search(r"\d+ gaps filled, \d+ left", text)
+    lines = angles.read_text().splitlines()
+    assert len(lines[lines.index("endheader") + 2 :]) == 40
+    assert dt.read_marker_folder(f"{tmp_path / 'solved'}-filled").filled is not None
 
 
 def test_12_needs_nothing_of_depthtrack_and_states_what_is_missing(

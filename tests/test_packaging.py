@@ -50,6 +50,7 @@ def test_wheel_and_sdist_contain_the_data_folders(distributions: Path, tmp_path:
     assert Path(everyday).is_file()
     assert shaders == "True"
     assert (tmp_path / "site" / "depthtrack" / "report" / "page" / "report.html.jinja").is_file()
+    assert (tmp_path / "site" / "depthtrack" / "markers" / "models" / "layouts" / "26.json").is_file()
     assert (tmp_path / "site" / "depthtrack" / "py.typed").is_file()
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
 from depthtrack.calibration.options import CalibrationOptions
-from depthtrack.calibration.parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures, prior_covariance
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures, prior_covariance
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from depthtrack.calibration.options import JointFitOptions
-from depthtrack.calibration.parameters import COUNT, hand_of, prior_covariance
 from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
 from depthtrack.calibration.solid_hands import solid_step
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import Side
+from depthtrack.hand.size_parameters import COUNT, hand_of, prior_covariance
 from depthtrack.solver.shared_parameters import EliminatedPose, eliminate_pose, solve_free
 from depthtrack.types import Array
 
@@ -26,7 +26,7 @@ from depthtrack.types import Array
 class JointFit:
     """Sizes and poses that fit all views.
 
-    values: (35,) sizes, see `parameters`.
+    values: (35,) sizes, see `hand.size_parameters`.
     covariance: (35, 35) of the sizes given views and prior.
     poses: (V, 27).
     distances: (V,) metres, median distance of the points of each view to the skin.

@@ -15,11 +15,11 @@ from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.calibrate import Measured, best_views, measured_sizes, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly
 from depthtrack.calibration.options import OngoingOptions
-from depthtrack.calibration.parameters import COUNT, WIDTHS, hand_of
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import COUNT, WIDTHS, hand_of
 from depthtrack.tracking.pipeline import TrackedFrame
 from depthtrack.tracking.stretches import TrackedView
 from depthtrack.types import Array
@@ -29,7 +29,7 @@ from depthtrack.types import Array
 class OngoingSizes:
     """Sizes of a hand so far.
 
-    values: (35,) see `parameters`.
+    values: (35,) see `hand.size_parameters`.
     hand: hand of these sizes.
     measured: each length and width by name, with its standard deviation; empty before the first measurement.
     """

@@ -97,3 +97,28 @@ class RigCalibrationOptions:
     resolution: int = option(96, "Longest side of the image in which poses are searched", unit="px")
     accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
     side_margin: float = option(0.02, "Share by which the other side may fit better than that of the rig")
+
+
+@dataclass(frozen=True)
+class MarkerCalibrationOptions:
+    """Calibration of marker offsets and hand sizes on a labelled capture."""
+
+    frames: int = option(60, "Frames used, at most: those whose postures differ most", unit="frames")
+    inspected: int = option(200, "Frames that are fitted and compared for that", unit="frames")
+    good_share: float = option(0.7, "Share of these frames that are used at most: those that a hand fits best")
+    least_confidence: float = option(0.8, "Labels of a lower confidence are not used")
+    fewest: int = option(8, "Frames below which calibration is refused", unit="frames")
+    least_share: float = option(0.7, "Smallest share of the markers that a frame must show")
+    noise: float = option(0.0015, "Standard deviation of a marker about the moving hand: skin motion", unit="m")
+    kernel_scale: float = option(0.012, "Scale of the Geman-McClure kernel, against wrong labels", unit="m")
+    across: float = option(0.5, "Spread of an offset away from the skin, as a share of that along it")
+    widening: float = option(20.0, "Factor of the spread of postures along the synergies: they hardly count")
+    residual: float = option(3.0, "Standard deviation of an angle about the synergies", unit="rad")
+    iterations: int = option(20, "Largest number of Gauss-Newton steps")
+    halvings: int = option(6, "Lengths tried for a step")
+    tolerance: float = option(1e-5, "Relative decrease of the energy that ends the iterations")
+    step_spread: tuple[float, float, float] = option(
+        (0.05, 0.5, 0.5),
+        "Standard deviation of a step in translation, rotation and angles; keeps what a frame does not determine",
+        unit="m, rad, rad",
+    )

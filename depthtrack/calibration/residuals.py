@@ -12,12 +12,12 @@ import numpy as np
 from scipy.ndimage import binary_erosion, distance_transform_edt
 from scipy.spatial import cKDTree
 
-from depthtrack.calibration.parameters import COUNT, motion_of
 from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.size_parameters import COUNT, motion_of
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.rendering.triangles import rasterise

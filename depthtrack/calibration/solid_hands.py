@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from depthtrack.calibration.parameters import LENGTHS, hand_of
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
+from depthtrack.hand.size_parameters import LENGTHS, hand_of
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.types import Array
 

@@ -2,8 +2,9 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 
 from depthtrack import __version__
 from depthtrack.errors import DepthtrackError
@@ -13,7 +14,8 @@ from depthtrack.errors import DepthtrackError
 class CommandEntry:
     """Entry of the overview of commands.
 
-    module: module with a dataclass `Command` that has a method `run()`, or a function `command(arguments)`.
+    module: module with a dataclass `Command` that has a method `run()`, a function `command(arguments)`, or a group
+        of commands, `COMMANDS`.
     summary: one line of help.
     """
 
@@ -32,6 +34,7 @@ COMMANDS = {
     "compare": CommandEntry("depthtrack.cli.compare", "compare trackers on recordings: table, results, report"),
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "measure errors and time of runs"),
     "calibrate": CommandEntry("depthtrack.cli.calibrate", "measure the hand of a recording: side, scale, sizes"),
+    "markers": CommandEntry("depthtrack.cli.markers", "label, solve and fill optical marker captures of hands"),
     "synergies": CommandEntry("depthtrack.cli.synergies", "fit or show principal components of hand postures"),
     "view": CommandEntry("depthtrack.cli.view", "show a recording or a run: viewer, video, contact sheet"),
     "video": CommandEntry("depthtrack.cli.video", "write a video of a run: the tracked hand over the recording"),
@@ -40,6 +43,8 @@ COMMANDS = {
     "bench": CommandEntry("depthtrack.cli.bench", "measure the speed of scoring, fitting and segmentation"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "check the renderers of this machine"),
 }
+
+_HELP = ("-h", "--help", "help")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -85,23 +90,39 @@ def _print_error(name: str, message: str) -> None:
 
 
 def _run(name: str, arguments: list[str]) -> int:
-    if name in ("-h", "--help", "help"):
-        print(_overview())
+    if name in _HELP:
+        title = f"depthtrack {__version__}: hand tracking from RGB-D video on an ordinary CPU"
+        print(_overview(title, "depthtrack", COMMANDS))
     elif name in ("-V", "--version"):
         print(f"depthtrack {__version__}")
-    elif name in COMMANDS:
-        _parse(name, arguments).run()
     else:
-        raise DepthtrackError(f"there is no such command: choose one of {', '.join(COMMANDS)}")
+        _run_one(COMMANDS, "depthtrack", name, arguments)
     return 0
 
 
-def _parse(name: str, arguments: list[str]) -> "RunnableCommand":
+def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, arguments: list[str]) -> None:
+    """Run a command, or one of the group that the name stands for.
+
+    Raises:
+        DepthtrackError: if there is no such command, or its own error.
+    """
     from importlib import import_module
 
+    if name not in commands:
+        raise DepthtrackError(f"there is no command '{name}': choose one of {', '.join(commands)}")
+    entry, prog = commands[name], f"{prog} {name}"
+    module = import_module(entry.module)
+    if not hasattr(module, "COMMANDS"):
+        _parse(module, prog, arguments).run()
+    elif not arguments or arguments[0] in _HELP:
+        print(_overview(f"{prog}: {entry.summary}", prog, module.COMMANDS))
+    else:
+        _run_one(module.COMMANDS, prog, arguments[0], arguments[1:])
+
+
+def _parse(module: ModuleType, prog: str, arguments: list[str]) -> "RunnableCommand":
     import tyro
 
-    module, prog = import_module(COMMANDS[name].module), f"depthtrack {name}"
     if hasattr(module, "command"):
         # The options are those of configurations, which the arguments may name.
         command, default = module.command(arguments)
@@ -123,14 +144,14 @@ class RunnableCommand:
         raise NotImplementedError
 
 
-def _overview() -> str:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:<{width}}  {entry.summary}" for name, entry in COMMANDS.items()]
+def _overview(title: str, prog: str, commands: Mapping[str, CommandEntry]) -> str:
+    width = max(map(len, commands), default=0)
+    lines = [f"  {name:<{width}}  {entry.summary}" for name, entry in commands.items()]
     return "\n".join(
         [
-            f"depthtrack {__version__}: hand tracking from RGB-D video on an ordinary CPU",
+            title,
             "",
-            "usage: depthtrack COMMAND [OPTIONS]      (depthtrack COMMAND --help lists its options)",
+            f"usage: {prog} COMMAND [OPTIONS]      ({prog} COMMAND --help lists its options)",
             "",
             *lines,
         ]

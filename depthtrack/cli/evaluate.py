@@ -18,14 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Command:
-    """Evaluate runs: pose errors, E3D, E2D, silhouette IoU and timing.
+    """Evaluate runs: pose errors, E3D, E2D, silhouette IoU and timing; or markers.
 
     Pose errors need ground truth. Errors of phalanx endpoints or annotated joints are in mm, those of joint angles in
-    degrees. With --predictions, evaluate a prediction file of a public benchmark instead.
+    degrees. Marker folders are compared with true labels, positions and poses. With --predictions, evaluate a
+    prediction file of a public benchmark instead.
     """
 
     runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
-    """Run folders from `depthtrack track`."""
+    """Run folders from `depthtrack track`, marker folders from `depthtrack markers`, or capture files with linked
+    trajectories."""
     sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the runs, if it was moved, or of the predictions."""
     residuals: bool = True
@@ -37,27 +39,59 @@ class Command:
 
     predictions: Annotated[Path | None, stated_default(metavar="FILE.txt")] = None
     """Prediction file of a public benchmark: one line per frame, with u v d of each joint in pixels and millimetres."""
-    labels: Annotated[Path | None, stated_default(metavar="FILE.txt")] = None
-    """True joints of the same frames in the same format, instead of --sequence."""
+    labels: Annotated[Path | None, stated_default(metavar="FILE")] = None
+    """True joints of the same frames in the same format, instead of --sequence; or, for marker folders, a capture file
+    with true labels."""
+    truth: Annotated[Path | None, stated_default(metavar="FOLDER")] = None
+    """Marker folder with true labels and poses, or a synthetic capture (default: the one that was labelled)."""
     benchmark: Annotated[Literal["nyu", "icvl", "msra"] | None, stated_default(metavar="nyu|icvl|msra")] = None
     """Benchmark that defines the joints, their order and the camera of both files."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.cli.output_folder import check_output_folder
+        from depthtrack.markers.folder.contents import is_marker_folder
 
         if self.report is not None:
             check_output_folder(self.report, "--report")
+        if self.predictions is None and any(is_marker_folder(path) or path.is_file() for path in self.runs):
+            self._print(*self._markers())
+            return
         evaluations = self._evaluations() if self.predictions is None else []
         reports, texts = [each.to_json() for each in evaluations], list(map(_text, evaluations))
         if self.predictions is not None:
             reports, texts = self._predictions(self.predictions)
-        print(dumps(reports[0] if len(reports) == 1 else reports, indent=2) if self.json else "\n\n".join(texts))
+        self._print(reports, texts)
         if self.report is not None:
             from depthtrack.cli.comparing import write_everything
 
             write_everything(evaluations, self.report, self.sequence, quiet=self.json)
+
+    def _print(self, reports: list[dict[str, Any]], texts: list[str]) -> None:
+        from json import dumps
+
+        values = reports[0] if len(reports) == 1 else reports
+        print(dumps(values, indent=2, allow_nan=False) if self.json else "\n\n".join(texts))
+
+    def _markers(self) -> tuple[list[dict[str, Any]], list[str]]:
+        from depthtrack.cli.markers.evaluation_text import evaluation_text, trajectory_text
+        from depthtrack.evaluation.marker_evaluation import evaluate_marker_folder, evaluate_trajectories
+
+        for option in ("report", "sequence", "benchmark"):
+            if getattr(self, option) is not None:
+                raise InputError(f"--{option} is for runs: evaluate the run of a hand inside the marker folder with it")
+        reports, texts = list[dict[str, Any]](), list[str]()
+        for path in self.runs:
+            if path.is_file():
+                if self.labels is None:
+                    raise InputError(f"{path} is a file of trajectories: give the true ones as --labels FILE")
+                score = evaluate_trajectories(path, self.labels)
+                reports.append({"capture": str(path), "truth": str(self.labels), **score.to_json()})
+                texts.append(trajectory_text(str(path), score))
+            else:
+                found = evaluate_marker_folder(path, self.labels, self.truth)
+                reports.append(found.to_json())
+                texts.append(evaluation_text(found))
+        return reports, texts
 
     def _evaluations(self) -> "list[Evaluation]":
         from depthtrack.evaluation.evaluate import evaluate_run
@@ -66,6 +100,8 @@ class Command:
             raise InputError("name at least one run folder")
         if self.labels is not None or self.benchmark is not None:
             raise InputError("--labels and --benchmark need --predictions: leave them out to evaluate a run")
+        if self.truth is not None:
+            raise InputError("--truth is for marker folders: leave it out to evaluate a run")
         return [evaluate_run(folder, self.sequence, self.residuals, bar) for folder in self.runs]
 
     def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:

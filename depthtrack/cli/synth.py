@@ -1,11 +1,12 @@
 """`depthtrack synth`: synthesise a recording of a moving hand with exact ground truth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.marker_options import MarkerOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -14,11 +15,18 @@ if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
 
 
+IMAGE_RATE = 30.0
+"""Default number of images a second, Hz."""
+_OF_BOTH = {"motion", "out", "frames", "fps", "hand", "scale", "side", "seed", "marker_options", "overwrite", "threads"}
+"""Options of images and of markers."""
+
+
 @dataclass(frozen=True)
 class Command:
     """Synthesise a recording of a moving hand with exact ground truth.
 
-    The ground truth has poses, joints, hand masks and depth. The motions are everyday, grasp, other-grasps, signs, fast
+    The ground truth has poses, joints, hand masks and depth. With --markers, it is an optical marker capture instead,
+    and the ground truth has labels, positions and poses. The motions are everyday, grasp, other-grasps, signs, fast
     and random (any length), or your own motion file. The same options give the same bytes.
     """
 
@@ -46,9 +54,9 @@ class Command:
     """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
     to 7 are 75 degrees to the right, above, left."""
     frames: Annotated[int | None, stated_default(metavar="COUNT")] = None
-    """Number of frames (default: the whole motion, or 360 of the random motion)."""
-    fps: Annotated[float, tyro.conf.arg(metavar="HZ")] = 30.0
-    """Frames per second."""
+    """Number of frames (default: the whole motion; of the random one 360, or 5 s of markers)."""
+    fps: Annotated[float | None, stated_default(metavar="HZ")] = None
+    """Frames per second (default: 30, or 200 of markers)."""
 
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of the hand (default: the average adult's)."""
@@ -73,6 +81,8 @@ class Command:
     swapped_fingers: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 2.0
     """Share of the frames in which the keypoints of two neighbouring fingers are exchanged."""
 
+    marker_options: tyro.conf.OmitArgPrefixes[MarkerOptions] = field(default_factory=MarkerOptions)
+
     overwrite: bool = False
     """Replace the recording in OUT."""
     threads: int = 2
@@ -86,7 +96,19 @@ class Command:
             raise InputError(f"expected a folder to write to: use  depthtrack synth {self.motion} OUT")
         if self.threads < 1:
             raise InputError(f"--threads must be at least 1, found {self.threads}")
+        if self.marker_options.is_unused:
+            raise InputError("options of markers need a layout: give --markers, such as --markers 26")
+        if self.marker_options.markers is not None:
+            self._check_no_images()
+            print(
+                self.marker_options.write(
+                    self.motion, self.out, self._hand(), self.frames, self.fps, self.seed, self.overwrite
+                )
+            )
+        else:
+            self._write_images(self.out)
 
+    def _write_images(self, out: Path) -> None:
         from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
         from depthtrack.synthesis.keypoints import KeypointErrors
 
@@ -105,24 +127,30 @@ class Command:
             depth_noise=self.depth_noise / 1000,
             skin_flips=self.skin_flips / 100,
             frames=self.frames,
-            rate=self.fps,
+            rate=IMAGE_RATE if self.fps is None else self.fps,
             seed=self.seed,
             keypoints=errors if self.keypoints else None,
         )
         made = Synthesiser(options)
         write_recording(
             made,
-            self.out,
+            out,
             overwrite=self.overwrite,
             threads=self.threads,
             progress=lambda frames: bar(frames, total=len(made)),
         )
         camera = made.sensor.camera
         print(
-            f"{self.out}: {len(made)} frames of '{made.motion.name}', {camera.width}x{camera.height}"
-            f" at {self.fps:g} Hz, a {options.hand.side} hand {made.distance:g} m before the {self.sensor} camera\n"
-            f"show it with  depthtrack view {self.out}"
+            f"{out}: {len(made)} frames of '{made.motion.name}', {camera.width}x{camera.height}"
+            f" at {options.rate:g} Hz, a {options.hand.side} hand {made.distance:g} m before the {self.sensor} camera\n"
+            f"show it with  depthtrack view {out}"
         )
+
+    def _check_no_images(self) -> None:
+        """Raise InputError if an option of images is given, which a marker capture has none of."""
+        for option in fields(self):
+            if option.name not in _OF_BOTH and getattr(self, option.name) != option.default:
+                raise InputError(f"--{option.name.replace('_', '-')} is for images: leave it out with --markers")
 
     def _hand(self) -> "HandShape":
         from depthtrack.hand.hand_file import is_rig, load_hand

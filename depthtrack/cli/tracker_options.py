@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from depthtrack.errors import InputError
-from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER, TrackerConfig
+from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER, MarkersConfig, TrackerConfig
 
 if TYPE_CHECKING:
     from depthtrack.tracking.run_configuration import RunConfiguration
@@ -29,11 +29,14 @@ def requested_tracker(arguments: Sequence[str], run: "RunConfiguration | None") 
     """Return the configuration of the tracker in the arguments, of the run, or the default.
 
     Raises:
-        InputError: if no tracker has this name.
+        InputError: if no tracker has this name, or the run was solved from markers.
     """
     name = _value(arguments, "--tracker")
-    if run is not None and name in (None, run.tracker.name):
-        return run.tracker
+    if run is not None:
+        if isinstance(run.tracker, MarkersConfig):
+            raise InputError("--config names a run of markers, which has no images to track: name another run")
+        if name in (None, run.tracker.name):
+            return run.tracker
     if name is not None and name not in CONFIGURATIONS:
         raise InputError(f"no tracker '{name:.60}': choose one of {', '.join(CONFIGURATIONS)}")
     return CONFIGURATIONS[name or DEFAULT_TRACKER]()

@@ -21,16 +21,17 @@ MOST_FRAMES = 200
 
 @dataclass(frozen=True)
 class Command(ViewOptions):
-    """Show a recording, or a run from `depthtrack track`.
+    """Show a recording, a run from `depthtrack track`, or a folder from `depthtrack markers`.
 
     A recording is shown with depth, colour, hand mask and true skeleton. A run is shown as the tracked hand over its
-    recording, with the residual, skeletons, and energies over time.
+    recording, with the residual, skeletons, and energies over time. Labelled markers are shown with names and hands.
 
     Opens the interactive viewer if it is installed and a screen is available; otherwise writes a contact sheet. The
     options below write files instead and can be combined.
     """
 
     def run(self) -> None:
+        from depthtrack.markers.folder.contents import is_marker_folder
         from depthtrack.viewing.annotated_frame import sequence_depth_range
 
         self._check_options()
@@ -38,6 +39,11 @@ class Command(ViewOptions):
             from depthtrack.cli.view_run import view_run
 
             view_run(self)
+            return
+        if is_marker_folder(self.recording.path):
+            from depthtrack.cli.view_markers import view_markers
+
+            view_markers(self)
             return
         sequence = self.recording.open()
         near, far = self.depth_range or sequence_depth_range(sequence)

@@ -105,7 +105,7 @@ def evaluate_run(
     """Return the evaluation of the run in `folder`.
 
     sequence: path of the recording, if it was moved.
-    residuals: compute E3D, E2D and IoU, which segments every frame again.
+    residuals: compute E3D, E2D and IoU, which segments every frame again; no effect without depth images.
     progress: wraps the frames while the residuals are computed.
 
     Raises:
@@ -123,7 +123,7 @@ def evaluate(replay: Replay, residuals: bool = True, progress: FrameProgress | N
         metrics += visible_and_hidden(points, visible)
         if np.isfinite(run.spread).any():
             metrics += within_spread(points, run.spread, visible)
-    if residuals:
+    if residuals and replay.sequence.has_depth:
         replayed: Iterable[ReplayedFrame] = replay if progress is None else progress(replay)
         metrics += run_residuals(replayed, replay.surface(), len(run.index)).metrics()
     metrics.append(jitter(model.endpoints(run.poses), run.timestamps))

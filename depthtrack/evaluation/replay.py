@@ -1,12 +1,14 @@
 """Replay a run on its recording: every frame with its observation and estimate."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.hand.pose import transformed
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import open_sequence
 from depthtrack.recording.keypoints import read_keypoints
@@ -15,6 +17,7 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.tracking.configuration import MarkersConfig
 from depthtrack.tracking.pipeline import replay_frames
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.state import TrackState
@@ -34,7 +37,7 @@ class ReplayedFrame:
     row: row of the frame in the run.
     frame: frame of the recording.
     observation: segmented hand; None if there is none.
-    estimate: estimate of the run.
+    estimate: estimate of the run, its pose in the camera frame.
     """
 
     row: int
@@ -45,7 +48,10 @@ class ReplayedFrame:
 
 @dataclass(frozen=True)
 class Replay:
-    """A run and its recording, which is opened with the camera of the run."""
+    """A run and its recording, which is opened with the camera of the run.
+
+    The poses of the run are in the world frame of the recording, see `Sequence.T_camera_world`.
+    """
 
     run: Run
     configuration: RunConfiguration
@@ -69,6 +75,11 @@ class Replay:
         _check_same_recording(run, recording, path)
         return cls(run, configuration, recording, configuration.hand_shape(where))
 
+    @cached_property
+    def camera_poses(self) -> Array:
+        """Poses (T, 27) of the run in the camera frame."""
+        return transformed(self.run.poses, self.sequence.T_camera_world)
+
     def surface(self) -> HandSurface:
         """Return the surface that the tracker fitted; the rig if the hand has one.
 
@@ -90,7 +101,7 @@ class Replay:
                 frame = self.at(int(row)).frame
             except DamagedFrameError:
                 continue
-            drawn = surface.render(self.run.poses[row], frame.camera).depth
+            drawn = surface.render(self.camera_poses[row], frame.camera).depth
             both = (drawn > 0) & (frame.depth > 0)
             apart.append(np.abs(drawn - frame.depth)[both].astype(np.float64))
         distances = np.concatenate(apart)
@@ -106,21 +117,46 @@ class Replay:
         Raises:
             DamagedFrameError: if the frame is unreadable.
         """
-        return ReplayedFrame(row, self.sequence[int(self.run.index[row])], None, estimate_of(self.run, row))
+        return ReplayedFrame(row, self.sequence[int(self.run.index[row])], None, self._estimate(row))
 
     def __iter__(self) -> Iterator[ReplayedFrame]:
-        """Yield every readable frame, segmented with the options of the run and guided by its poses."""
-        options = self.configuration.tracker
-        guide = TrackState(options.thresholds, options.scoring.objective.clamp)
+        """Yield every readable frame, segmented with the options of the run and guided by its poses.
+
+        Frames without depth images have no observation.
+
+        Raises:
+            InputError: if the run was solved from markers, and the recording has depth images.
+        """
+        if not self.sequence.has_depth:
+            for row in range(len(self)):
+                yield self.at(row)
+            return
+        guide = self._guide()
         segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)
         row_of = {int(index): row for row, index in enumerate(self.run.index)}
         frames = self.sequence.frames(map(int, self.run.index))
         if self.configuration.keypoints is not None:
             keypoints = read_keypoints(Path(self.configuration.keypoints))
             frames = keypoints.attach(frames, self.sequence.timestamps)
-        known = ((frame, estimate_of(self.run, row_of[frame.index])) for frame in frames)
+        known = ((frame, self._estimate(row_of[frame.index])) for frame in frames)
         for each in replay_frames(known, guide, segmenter, self.hand):
             yield ReplayedFrame(row_of[each.frame.index], each.frame, each.observation, each.estimate)
+
+    def _estimate(self, row: int) -> Estimate:
+        """Return the estimate of one frame, its pose in the camera frame."""
+        estimate = estimate_of(self.run, row)
+        return estimate if estimate.pose is None else replace(estimate, pose=self.camera_poses[row])
+
+    def _guide(self) -> TrackState:
+        """Return the state of a track that the estimates of the run restore.
+
+        Raises:
+            InputError: if the run was solved from markers.
+        """
+        options = self.configuration.tracker
+        if isinstance(options, MarkersConfig):
+            raise InputError(f"the run {self.run.folder} was solved from markers: leave out --sequence")
+        return TrackState(options.thresholds, options.scoring.objective.clamp)
 
 
 def estimate_of(run: Run, row: int) -> Estimate:
@@ -154,7 +190,7 @@ def recorded_path(run: Run) -> Path:
     Raises:
         InputError: if `run.json` is malformed.
     """
-    return Path(RunConfiguration.of(run).sequence)
+    return run.folder / RunConfiguration.of(run).sequence
 
 
 def _check_same_recording(run: Run, sequence: Sequence, path: Path) -> None:

@@ -44,6 +44,12 @@ def _npz() -> Write:
     return write
 
 
+def _mot() -> Write:
+    from depthtrack.export.mot import write
+
+    return write
+
+
 def _benchmark(name: str) -> Write:
     from depthtrack.export.benchmark_joints import find_benchmark
     from depthtrack.export.uvd import write
@@ -54,6 +60,7 @@ def _benchmark(name: str) -> Write:
 EXPORTERS = {
     "csv": Exporter((".csv",), "a table", _csv),
     "npz": Exporter((".npz",), "numpy arrays", _npz),
+    "mot": Exporter((".mot",), "joint angles for OpenSim", _mot),
     "nyu": Exporter((".txt",), "u v d of NYU's joints", partial(_benchmark, "nyu")),
     "icvl": Exporter((".txt",), "u v d of ICVL's joints", partial(_benchmark, "icvl")),
     "msra": Exporter((".txt",), "u v d of MSRA's joints", partial(_benchmark, "msra")),

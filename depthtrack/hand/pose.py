@@ -8,7 +8,13 @@ three flexions from the palm outward. Every function broadcasts over leading axe
 import numpy as np
 from numpy.typing import ArrayLike
 
-from depthtrack.geometry.rotations import normalised, quaternion_exp, quaternion_log, quaternion_product
+from depthtrack.geometry.rotations import (
+    normalised,
+    quaternion_exp,
+    quaternion_from_matrix,
+    quaternion_log,
+    quaternion_product,
+)
 from depthtrack.types import Array
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
@@ -50,6 +56,18 @@ def retract(pose: ArrayLike, tangent: ArrayLike) -> Array:
     p, t = np.asarray(pose, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
     quaternion = quaternion_product(quaternion_exp(t[..., 3:6]), p[..., ORIENTATION])
     return make_pose(p[..., POSITION] + t[..., :3], quaternion, p[..., ANGLES] + t[..., 6:])
+
+
+def transformed(pose: ArrayLike, T_to_from: ArrayLike) -> Array:
+    """Return the pose (..., 27) in another frame; the same bits under the identity.
+
+    pose: (..., 27).
+    T_to_from: (4, 4) rigid transform from the frame of the pose to the other frame, metres.
+    """
+    p, T = np.asarray(pose, dtype=np.float64), np.asarray(T_to_from, dtype=np.float64)
+    position = p[..., POSITION] @ T[:3, :3].T + T[:3, 3]
+    quaternion = quaternion_product(quaternion_from_matrix(T[:3, :3]), p[..., ORIENTATION])
+    return np.concatenate([position, quaternion, p[..., ANGLES]], axis=-1)
 
 
 def tangent_between(start: ArrayLike, end: ArrayLike) -> Array:

@@ -9,9 +9,10 @@ from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
+from depthtrack.recording.sequences.capture import CaptureSequence
 from depthtrack.recording.sequences.tum import TumSequence
 
-FORMATS: tuple[type[BaseSequence], ...] = (TumSequence,)
+FORMATS: tuple[type[BaseSequence], ...] = (TumSequence, CaptureSequence)
 
 
 def open_sequence(path: Path | str, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> Sequence:

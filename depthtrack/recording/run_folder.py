@@ -166,7 +166,7 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
             raise InputError(f"{path}, line {number}: expected milliseconds: {error}") from error
         if len(cells) != len(header):
             raise InputError(f"{path}, line {number}: expected {len(header)} columns, found {len(cells)}")
-    columns = np.array(rows, dtype=np.float64).reshape(-1, len(header) - 1)
+    columns = np.array(rows, dtype=np.float64).reshape(len(rows), len(header) - 1)
     return {stage: columns[:, k] for k, stage in enumerate(header[1:])}
 
 

@@ -53,8 +53,10 @@ class GroundTruth:
     """The annotations of a recording; `poses` or `joints` may be absent.
 
     timestamps: (T,) of the annotated frames, seconds, increasing.
-    poses: (T, 27) of `hand`, metres, quaternion, radians, camera frame.
-    joints: (T, 21, 3) keypoints, metres, camera frame, MediaPipe order.
+    poses: (T, 27) of `hand`, metres, quaternion, radians, world frame.
+    joints: (T, 21, 3) keypoints, metres, world frame, MediaPipe order.
+
+    The world frame is that of `Sequence.T_camera_world`: the camera frame of depth cameras.
 
     Frames and annotations need not correspond one to one: `at` finds the annotation of a frame by its timestamp.
     """
@@ -72,7 +74,7 @@ class GroundTruth:
         return nearest if nearest is not None and abs(self.timestamps[nearest] - timestamp) <= tolerance else None
 
     def keypoints_at(self, timestamp: float) -> Array | None:
-        """Return the annotated keypoints (21, 3), or those of the pose; metres, camera frame."""
+        """Return the annotated keypoints (21, 3), or those of the pose; metres, world frame."""
         row = self.at(timestamp)
         if row is None:
             return None
@@ -104,6 +106,13 @@ class Sequence(Protocol):
     is its place in the recording in both cases.
     """
 
+    T_camera_world: Array
+    """Transform (4, 4), metres, to the camera frame from the frame of ground truth and runs.
+
+    It is the identity for depth cameras, whose frame both share. A motion capture has a frame of its own, and a camera
+    only for pictures.
+    """
+
     @property
     def name(self) -> str: ...
 
@@ -112,6 +121,11 @@ class Sequence(Protocol):
 
     @property
     def timestamps(self) -> Array: ...
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether the frames have depth images; those of a recording without any are empty."""
+        ...
 
     @property
     def has_colour(self) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
+from depthtrack.files import check_replaceable, move_folder
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_SIZE
@@ -148,15 +149,7 @@ class SequenceWriter:
             shutil.rmtree(self._work, ignore_errors=True)
 
     def _check_target(self) -> None:
-        if self._path.is_dir() and not any(self._path.iterdir()):
-            return
-        if not self._path.exists() and not self._path.is_symlink():
-            return
-        if not self._overwrite:
-            raise InputError(f"{self._path} exists already: choose another name, or use --overwrite")
-        # Only a folder with the files of a recording is ever deleted.
-        if self._path.is_symlink() or not (self._path / "depth.txt").is_file():
-            raise InputError(f"{self._path} is not a sequence folder, so it is not overwritten: choose another name")
+        check_replaceable(self._path, "depth.txt", "a sequence folder", self._overwrite)
 
     def _stem(self, timestamp: float) -> str:
         """Return the timestamp's text in all files, which also names the frame's images."""
@@ -235,17 +228,7 @@ class SequenceWriter:
         if self._hand is not None:
             self._write_text(HAND_FILE, self._hand.to_json())
         self._check_target()
-        if self._path.exists():
-            replaced = self._work.with_name(self._work.name + "-replaced")
-            self._path.rename(replaced)
-            try:
-                self._work.rename(self._path)
-            except OSError:
-                replaced.rename(self._path)
-                raise
-            shutil.rmtree(replaced)
-        else:
-            self._work.rename(self._path)
+        move_folder(self._work, self._path)
 
     def _write_text(self, name: str, text: str) -> None:
         (self._work / name).write_text(text, encoding="utf-8", newline="\n")

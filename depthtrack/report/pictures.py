@@ -85,7 +85,7 @@ class SideBySide:
         colour = tracker_colour(panel.series.number).rgb
         close = AnnotatedFrame(frame).cropped(self._regions[frame.index])
         image = draw_layer(close, "colour", self._height, *self._range)
-        pose = None if row is None else panel.replay.run.poses[row]
+        pose = None if row is None else panel.replay.camera_poses[row]
         if pose is not None and np.isfinite(pose).all():
             camera = close.camera.resized(self._height / close.camera.height)
             surface = self._surfaces[k].render(pose, camera)
@@ -96,7 +96,7 @@ class SideBySide:
 
     def _with_truth(self, image: Image, close: AnnotatedFrame) -> Image:
         """Draw the true skeleton in thin white lines, below the tracker's skeleton."""
-        truth = true_keypoints(self.sequence.ground_truth, close.frame.timestamp)
+        truth = true_keypoints(self.sequence, close.frame.timestamp)
         if truth is None:
             return image
         camera = close.camera.resized(self._height / close.camera.height)
@@ -116,14 +116,14 @@ class SideBySide:
         found = np.full((len(self.indices), len(self._panels) + 1, 21, 3), np.nan)
         times = self.sequence.timestamps
         for n, index in enumerate(self.indices):
-            truth = true_keypoints(self.sequence.ground_truth, float(times[index]))
+            truth = true_keypoints(self.sequence, float(times[index]))
             if truth is not None and np.isfinite(truth).all():
                 found[n, :] = truth
         row_of = {index: n for n, index in enumerate(self.indices)}
         without_truth = np.isnan(found[:, -1, 0, 0])
         for k, panel in enumerate(self._panels):
             run = panel.replay.run
-            keypoints = HandModel(panel.replay.hand).keypoints(run.poses)
+            keypoints = HandModel(panel.replay.hand).keypoints(panel.replay.camera_poses)
             keypoints[[status is Status.LOST for status in run.status]] = np.nan
             rows = np.array([row_of[int(index)] for index in run.index], dtype=np.intp)
             found[rows, k] = np.where(without_truth[rows, None, None], keypoints, found[rows, k])

@@ -20,7 +20,7 @@ from depthtrack.recording.writer import SequenceWriter
 from depthtrack.synthesis.backdrop import Backdrop
 from depthtrack.synthesis.held_object import HeldKind, HeldObject
 from depthtrack.synthesis.keypoints import KeypointErrors, detected_keypoints
-from depthtrack.synthesis.motion import MAX_DURATION, Motion, load_motion
+from depthtrack.synthesis.motion import Motion, frame_times, load_motion
 from depthtrack.synthesis.painting import Painter, SkinTone, flip_skin
 from depthtrack.synthesis.randomness import Stream, generator
 from depthtrack.synthesis.room import add_room, add_wall
@@ -34,8 +34,6 @@ from depthtrack.types import Array, Image, Mask
 BackgroundKind = Literal["none", "wall", "room"]
 SensorName = Literal["ideal", "kinect1", "kinect2", "realsense"]
 
-RANDOM_FRAMES = 360
-"""Default number of frames of a random motion."""
 _FLESH = 0.01
 """Depth of flesh before a keypoint, metres."""
 
@@ -122,7 +120,7 @@ class Synthesiser:
         self.options = options
         self.motion: Motion = load_motion(options.motion)
         self.sensor: Sensor = make_sensor(options.sensor)
-        self.timestamps: Array = np.arange(self._frame_count()) / options.rate
+        self.timestamps: Array = frame_times(self.motion, options.rate, options.frames)
         self.held = self._held_object()
         self.distance: float = self._default_distance() if options.distance is None else options.distance
         self.viewpoint = Viewpoint(options.viewpoint, self.distance)
@@ -208,16 +206,6 @@ class Synthesiser:
         elif self.options.background == "room":
             add_room(backdrop, self.distance, rng)
         return backdrop
-
-    def _frame_count(self) -> int:
-        options, duration = self.options, self.motion.duration
-        longest = round((MAX_DURATION if duration is None else duration) * options.rate)
-        count = (RANDOM_FRAMES if duration is None else longest) if options.frames is None else options.frames
-        if not 1 <= count <= longest:
-            raise InputError(
-                f"'{self.motion.name}' at {options.rate:g} Hz can have 1 to {longest} frames, found {count}"
-            )
-        return count
 
     def _poses(self) -> Array:
         return self.viewpoint.transform_poses(self._scene_poses)

@@ -17,6 +17,8 @@ from depthtrack.types import Array
 
 MAX_DURATION = 3600.0
 """Longest motion, seconds; at 30 Hz it has 108,000 frames."""
+RANDOM_FRAMES = 360
+"""Default number of frames of a random motion."""
 _MAX_KEYS = 10_000
 _SHORTEST = 0.001
 _CHANNELS = ("position", "tilt", "nod", "turn", *FINGERS)
@@ -67,6 +69,23 @@ def load_motion(name: str) -> Motion:
     if "random" in table:
         return RandomMotion.from_table(path.stem, table, str(path))
     return KeyframedMotion.from_table(path.stem, table, str(path))
+
+
+def frame_times(motion: Motion, rate: float, frames: int | None, start: float = 0.0) -> Array:
+    """Return the times (T,) of frames in a motion, seconds.
+
+    rate: Hz.
+    frames: their number; None for the whole motion, or 360 of a random motion.
+    start: time of the first frame, seconds.
+
+    Raises: InputError if the motion is too short.
+    """
+    longest = round(((MAX_DURATION if motion.duration is None else motion.duration) - start) * rate)
+    count = (RANDOM_FRAMES if motion.duration is None else longest) if frames is None else frames
+    if start < 0 or not 1 <= count <= longest:
+        part = f" from {start:g} s on" if start else ""
+        raise InputError(f"'{motion.name}' at {rate:g} Hz can have 1 to {max(longest, 0)} frames{part}, found {count}")
+    return start + np.arange(count) / rate
 
 
 @dataclass(frozen=True)

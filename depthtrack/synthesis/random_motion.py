@@ -11,6 +11,7 @@ A posture is either a named one with small variation, or sampled with the coupli
 Transitions with self-collision are rejected.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,14 +123,27 @@ class RandomMotion:
         return np.clip(known + rng.normal(0, np.radians(3), 20), LOWER, UPPER)
 
     def _wander(self, channel: int, end: float, seed: int) -> PchipInterpolator:
-        """Return a smooth random walk within the channel's range: an AR(1) process through tanh."""
-        low, high = self.ranges[channel]
-        times, values = [0.0], [0.0]
-        while len(times) < 5 or times[-3] <= end:
-            rng = generator(seed, len(times) * len(_WANDER) + channel, Stream.WANDERING)
-            times.append(times[-1] + rng.uniform(*self.wander))
-            values.append(0.6 * values[-1] + 0.8 * rng.normal())
-        return PchipInterpolator(np.array(times), (low + high) / 2 + (high - low) / 2 * np.tanh(np.array(values)))
+        def draw(step: int) -> np.random.Generator:
+            return generator(seed, step * len(_WANDER) + channel, Stream.WANDERING)
+
+        return smooth_walk(self.ranges[channel], self.wander, end, draw)
+
+
+def smooth_walk(
+    limits: ArrayLike, durations: tuple[float, float], end: float, draw: Callable[[int], np.random.Generator]
+) -> PchipInterpolator:
+    """Return a smooth random walk within limits, 0 s to `end`: an AR(1) process through tanh.
+
+    durations: shortest and longest step, seconds.
+    draw: returns the random numbers of a step.
+    """
+    low, high = np.asarray(limits)
+    times, values = [0.0], [0.0]
+    while len(times) < 5 or times[-3] <= end:
+        rng = draw(len(times))
+        times.append(times[-1] + rng.uniform(*durations))
+        values.append(0.6 * values[-1] + 0.8 * rng.normal())
+    return PchipInterpolator(np.array(times), (low + high) / 2 + (high - low) / 2 * np.tanh(np.array(values)))
 
 
 def coupled_posture(rng: np.random.Generator) -> Array:

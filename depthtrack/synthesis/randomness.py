@@ -28,6 +28,13 @@ class Stream(IntEnum):
     DEPTH_NOISE = 10
     KEYPOINTS = 11
     HELD = 12
+    SUBJECT = 13
+    DROPOUTS = 14
+    GHOSTS = 15
+    MARKERS = 16
+    SHUFFLE = 17
+    RIGID_BODY = 18
+    RIGID_MOTION = 19
 
 
 def generator(seed: int, frame: int, stream: Stream) -> np.random.Generator:

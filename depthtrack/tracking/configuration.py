@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from depthtrack.errors import InputError
 from depthtrack.options import check_seed, option
 from depthtrack.rendering.options import ScoringOptions
-from depthtrack.solver.options import PAPER_ICP, LiftOptions, SurfaceFitOptions, SwarmOptions
+from depthtrack.solver.options import PAPER_ICP, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 from depthtrack.tracking.options import (
     BranchOptions,
     FingerOptions,
@@ -278,6 +278,16 @@ class LiftConfig:
         check_seed(self.seed)
 
 
+@dataclass(frozen=True)
+class MarkersConfig:
+    """Poses solved from an optical marker capture; `markers.json` states how."""
+
+    name: ClassVar[str] = "markers"
+
+    surface: SurfaceName = option("skin", "Surface that pictures show")
+    seed: int = option(0, "Seed of the random numbers, which labelling does not use")
+
+
 DEFAULT_TRACKER = "hybrid"
 
 TrackerConfig = HybridConfig | PsoConfig | IkConfig | Oikonomidis2011Config | Schroeder2014Config | LiftConfig
@@ -290,3 +300,8 @@ CONFIGURATIONS: dict[str, type[TrackerConfig]] = {
     "schroeder2014": Schroeder2014Config,
     "lift": LiftConfig,
 }
+"""The trackers of recordings with depth images."""
+
+RunConfig = TrackerConfig | MarkersConfig
+RUN_CONFIGURATIONS: dict[str, type[RunConfig]] = {**CONFIGURATIONS, "markers": MarkersConfig}
+"""All that writes run folders."""

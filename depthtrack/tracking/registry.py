@@ -7,7 +7,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.options import with_options
-from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.configuration import CONFIGURATIONS, MarkersConfig, RunConfig, TrackerConfig
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import StageTracker
 
@@ -37,7 +37,7 @@ def tracker_config(name: str, **options: Any) -> TrackerConfig:
 
 
 def create_tracker(
-    config: TrackerConfig, hand: HandShape, threads: int = 1, synergies: Synergies | None = None
+    config: RunConfig, hand: HandShape, threads: int = 1, synergies: Synergies | None = None
 ) -> StageTracker:
     """Return a tracker of a hand.
 
@@ -45,8 +45,11 @@ def create_tracker(
     synergies: synergies in place of those that the configuration names.
 
     Raises:
-        InputError: if a file of synergies cannot be read, or no skin fits the sizes of the hand.
+        InputError: if a file of synergies cannot be read, or no skin fits the sizes of the hand. A run of markers has
+            no tracker.
     """
+    if isinstance(config, MarkersConfig):
+        raise InputError("a run of markers has no images to track: name another tracker")
     chosen = getattr(config, "synergies", None)
     if synergies is None and chosen is not None and chosen.synergies is not None:
         synergies = load_synergies(chosen.synergies)

@@ -20,11 +20,12 @@ from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.solver.options import SurfaceName
 from depthtrack.tracking.configuration import (
-    CONFIGURATIONS,
+    RUN_CONFIGURATIONS,
     HybridConfig,
+    MarkersConfig,
     Oikonomidis2011Config,
     PsoConfig,
-    TrackerConfig,
+    RunConfig,
 )
 from depthtrack.tracking.earlier_runs import upgraded
 
@@ -41,7 +42,7 @@ Start = Literal["auto", "truth"]
 class RunConfiguration:
     """Recording, hand, tracker with its options, and settings of a run.
 
-    sequence: path of the recording.
+    sequence: path of the recording, absolute or from the run folder.
     camera, hand: contents of `camera.json` and `hand.json`.
     keypoints: path of a file of keypoints, see `recording.keypoints`; None for none.
     frames: number of frames to track; None for all.
@@ -51,7 +52,7 @@ class RunConfiguration:
     sequence: str
     camera: Mapping[str, Any]
     hand: Mapping[str, Any]
-    tracker: TrackerConfig
+    tracker: RunConfig
     segmentation: SegmentationOptions = field(default_factory=SegmentationOptions)
     start: Start = "auto"
     frames: int | None = None
@@ -75,6 +76,8 @@ class RunConfiguration:
         options = self.tracker
         if isinstance(options, HybridConfig):
             return options.surface_choice.surfaces
+        if isinstance(options, MarkersConfig):
+            return (options.surface,)
         if isinstance(options, PsoConfig):
             return (options.final_fit.surface,) if options.refine else ("primitives",)
         return ("primitives",) if isinstance(options, Oikonomidis2011Config) else (options.fit.surface,)
@@ -111,8 +114,8 @@ class RunConfiguration:
         if fields["format"] != FORMAT:
             raise InputError(f"{where}: expected format {FORMAT}, found {fields['format']!r:.40}: update depthtrack")
         name = fields.get("tracker")
-        if name not in CONFIGURATIONS:
-            raise InputError(f"{where}: no tracker {name!r:.60}: expected one of {', '.join(CONFIGURATIONS)}")
+        if name not in RUN_CONFIGURATIONS:
+            raise InputError(f"{where}: no tracker {name!r:.60}: expected one of {', '.join(RUN_CONFIGURATIONS)}")
         for entry, kind in (("sequence", str), ("camera", dict), ("hand", dict)):
             if not isinstance(fields.get(entry), kind):
                 raise InputError(f"{where}: expected an entry '{entry}', found {fields.get(entry)!r:.40}")
@@ -128,7 +131,7 @@ class RunConfiguration:
                 raise InputError(f"{where}: expected a path as {entry}, found {path[:80]!r}")
         return cls(
             **known,
-            tracker=from_data(CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),
+            tracker=from_data(RUN_CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),
             segmentation=from_data(SegmentationOptions, fields.get("segmentation", {}), f"{where}: segmentation"),
             context=rest,
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.recording.sequence import Frame, GroundTruth, Sequence
+from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.types import Array, Mask
 from depthtrack.viewing.depth_colours import depth_range
 
@@ -40,7 +40,7 @@ class AnnotatedFrame:
         """
         true_mask = sequence.hand_mask(frame.index)
         mask = true_mask if true_mask is not None or estimate is None else estimate(frame)
-        return cls(frame, mask, true_mask is not None, true_keypoints(sequence.ground_truth, frame.timestamp))
+        return cls(frame, mask, true_mask is not None, true_keypoints(sequence, frame.timestamp))
 
     @property
     def camera(self) -> Camera:
@@ -87,9 +87,11 @@ def annotated_frames(
         yield AnnotatedFrame.of(sequence, frame, estimate)
 
 
-def true_keypoints(truth: GroundTruth | None, timestamp: float) -> Array | None:
+def true_keypoints(sequence: Sequence, timestamp: float) -> Array | None:
     """Return the true keypoints (21, 3) at a time, metres, camera frame; None if unknown."""
-    return None if truth is None else truth.keypoints_at(timestamp)
+    truth, T = sequence.ground_truth, sequence.T_camera_world
+    keypoints = None if truth is None else truth.keypoints_at(timestamp)
+    return None if keypoints is None else keypoints @ T[:3, :3].T + T[:3, 3]
 
 
 def evenly_spaced(length: int, count: int) -> list[int]:

@@ -38,7 +38,7 @@ class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
         super().__init__(
             f"{replay.run.folder.resolve().name} on {replay.sequence.name}", replay.sequence.camera, near, far
         )
-        self._surface, self._truth = replay.surface(), replay.sequence.ground_truth
+        self._surface, self._sequence = replay.surface(), replay.sequence
         points = evaluate(replay, residuals=False).points
         self._error = None if points is None else points.mean().values
 
@@ -52,7 +52,7 @@ class RerunRunViewer(AnnotatedFrameStream[ReplayedFrame]):
         rendered = np.zeros(frame.camera.shape) if surface is None else surface.depth
         stream.log(f"{CAMERA}/residual", jpeg(rr, residual_to_rgb(frame.depth, rendered, annotated.mask), -7))
         self._log_or_clear("world/hypothesis", None if surface is None else self._points(surface))
-        truth = true_keypoints(self._truth, frame.timestamp)
+        truth = true_keypoints(self._sequence, frame.timestamp)
         in_pixels = None if truth is None else frame.camera.project(truth)
         self._log_or_clear("world/true_skeleton", bones(rr.LineStrips3D, truth, 0.0008, FINGER_TRUTH))
         self._log_or_clear(f"{CAMERA}/true_skeleton", bones(rr.LineStrips2D, in_pixels, 0.8, FINGER_TRUTH))

@@ -26,24 +26,28 @@ from depthtrack.viewing.timeline import Timeline
 RunLayer = Literal["recording", "overlay", "hypothesis", "residual", "skeleton"]
 LAYERS: tuple[RunLayer, ...] = ("recording", "hypothesis", "residual", "skeleton")
 """Views of `RunPainter.picture`."""
+LAYERS_WITHOUT_DEPTH: tuple[RunLayer, ...] = ("hypothesis", "skeleton")
+"""Those of a recording without depth images."""
 
 
 class RunPainter:
     """Pictures of one run's frames in one size and colour scale; a view is `height` pixels high."""
 
     def __init__(self, replay: Replay, height: int = 360) -> None:
-        run, camera = replay.run, replay.sequence.camera
+        camera = replay.sequence.camera
         self._replay, self._surface, self._height = replay, replay.surface(), height
-        keypoints = HandModel(replay.hand).keypoints(run.poses)
+        keypoints = HandModel(replay.hand).keypoints(replay.camera_poses)
         self._regions = close_up_regions(camera, keypoints, _trusted(replay))
         self._near, self._far = hand_depth_range(replay)
         self._scene_near, self._scene_far = hand_depth_range(replay, margin=0.5)
+        self._layers = LAYERS if replay.sequence.has_depth else LAYERS_WITHOUT_DEPTH
         self._timeline: Timeline | None = None
 
     def picture(self, replayed: ReplayedFrame) -> Image:
-        """Return all four views of a frame (h, w, 3) with status, energy and timeline."""
-        views = {layer: self.view(replayed, layer) for layer in LAYERS}
-        _draw_scale(views["residual"])
+        """Return all views of a frame (h, w, 3) with status, energy and timeline."""
+        views = {layer: self.view(replayed, layer) for layer in self._layers}
+        if "residual" in views:
+            _draw_scale(views["residual"])
         tiles = [captioned(view, *self._caption(replayed, layer)) for layer, view in views.items()]
         grid = tile_grid(tiles, columns=2)
         if self._timeline is None:
@@ -99,7 +103,7 @@ class RunPainter:
         camera = close.camera.resized(self._height / close.camera.height)
         image = dimmed(draw_layer(close, "colour", self._height, self._near, self._far), 0.6)
         image = draw_occluder(image, close)
-        truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
+        truth = true_keypoints(self._replay.sequence, replayed.frame.timestamp)
         if truth is not None:
             image = draw_skeleton(image, camera, truth, thickness=1, colours=FINGER_TRUTH)
         if close.keypoints is None:
@@ -116,20 +120,23 @@ class RunPainter:
         if layer == "recording":
             return "recording", f"frame {replayed.frame.index}  ·  {replayed.frame.timestamp:.2f} s"
         if layer == "hypothesis":
-            return "hypothesis over depth", "" if replayed.estimate.pose is not None else "no pose"
+            name = "hypothesis over depth" if self._replay.sequence.has_depth else "hypothesis"
+            return name, "" if replayed.estimate.pose is not None else "no pose"
         if layer == "residual":
             observation = replayed.observation
             with_object = observation is not None and observation.occluder is not None
             rest = "green object" if with_object else "magenta not covered"
             return "residual", f"red nearer, blue farther, {rest}"
-        truth = true_keypoints(self._replay.sequence.ground_truth, replayed.frame.timestamp)
+        truth = true_keypoints(self._replay.sequence, replayed.frame.timestamp)
         return "skeleton", "grey: hidden" if truth is None else "grey: hidden, thin: ground truth"
 
     def _headline(self, replayed: ReplayedFrame, width: int) -> Image:
         bar, estimate = blank(width, 34), replayed.estimate
         tracker = str(self._replay.run.configuration.get("tracker", "track"))[:20]
         put_text(bar, f"{self._replay.sequence.name[:40]}  ·  {tracker}", (4, 17), 20)
-        values = f"energy {estimate.energy:.2f}  ·  agreement {estimate.agreement:.2f}"
+        values = f"energy {estimate.energy:.2f}"
+        if np.isfinite(estimate.agreement):
+            values += f"  ·  agreement {estimate.agreement:.2f}"
         if np.isfinite(estimate.confidence):
             values += f"  ·  confidence {100 * estimate.confidence:.0f} %"
         values = "" if estimate.pose is None else values
@@ -153,7 +160,7 @@ def annotated_run_frame(replayed: ReplayedFrame, model: HandModel) -> AnnotatedF
 
 def hand_depth_range(replay: Replay, margin: float = 0.06) -> tuple[float, float]:
     """Return near and far (metres) of the tracked hand, with `margin` metres behind it."""
-    return keypoint_depth_range(HandModel(replay.hand).keypoints(replay.run.poses[_trusted(replay)]), margin)
+    return keypoint_depth_range(HandModel(replay.hand).keypoints(replay.camera_poses[_trusted(replay)]), margin)
 
 
 def _trusted(replay: Replay) -> Mask:

@@ -10,7 +10,7 @@ from depthtrack.types import Image
 from depthtrack.viewing.contact_sheet import framed
 from depthtrack.viewing.panels import beside, blank, captioned, smaller, stacked, tile_grid
 from depthtrack.viewing.residual_colours import LARGEST, UNCOVERED, UNREAD, residual_scale
-from depthtrack.viewing.run_pictures import RunPainter
+from depthtrack.viewing.run_pictures import LAYERS_WITHOUT_DEPTH, RunLayer, RunPainter
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.theme import FAINT_TEXT, OCCLUDER, STATUS_COLOURS
 from depthtrack.viewing.timeline import Timeline
@@ -25,10 +25,11 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
     Raises: InputError if none of the frames can be read.
     """
     painter, tiles, has_object = RunPainter(replay, 2 * height), [], False
-    last = max(rows, default=-1)
+    with_depth, last = replay.sequence.has_depth, max(rows, default=-1)
+    layers: tuple[RunLayer, ...] = ("overlay", "residual") if with_depth else LAYERS_WITHOUT_DEPTH
     for replayed in replay:
         if replayed.row in rows:
-            views = [painter.view(replayed, layer) for layer in ("overlay", "residual")]
+            views = [painter.view(replayed, layer) for layer in layers]
             small = [smaller(view, view.shape[1] // 2, height) for view in views]
             status, observation = replayed.estimate.status, replayed.observation
             has_object |= observation is not None and observation.occluder is not None
@@ -42,8 +43,8 @@ def run_sheet(replay: Replay, rows: Collection[int], height: int = 200, columns:
         raise InputError(f"the run {replay.run.folder} has no frame to show: choose another run")
     grid = tile_grid(tiles, min(columns, len(tiles)))
     timeline = Timeline(replay.run.energy, replay.run.status, grid.shape[1])
-    legend = _legend(grid.shape[1], has_object)
-    return framed(stacked([_title(replay, grid.shape[1]), grid, legend, timeline.image], gap=12))
+    legend = [_legend(grid.shape[1], has_object)] if with_depth else []
+    return framed(stacked([_title(replay, grid.shape[1]), grid, *legend, timeline.image], gap=12))
 
 
 def _legend(width: int, has_object: bool) -> Image:

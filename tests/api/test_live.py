@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import depthtrack as dt
-from depthtrack.calibration.parameters import COUNT, measures
 from depthtrack.cli import main
+from depthtrack.hand.size_parameters import COUNT, measures
 from depthtrack.recording.keypoints import HEADER, keypoint_cells
 from depthtrack.tracking.configuration import CONFIGURATIONS
 from depthtrack.tracking.pipeline import NoTracker

@@ -9,7 +9,7 @@ from depthtrack.benchmarks.crossmodel import evidence
 from depthtrack.benchmarks.crossmodel import measure as measuring
 from depthtrack.benchmarks.crossmodel.experiment import EXPERIMENT, compare, tabulate
 from depthtrack.benchmarks.crossmodel.measure import _longest, measure
-from depthtrack.benchmarks.crossmodel.recordings import MOTIONS, made_recording, random_hand, recording_cells
+from depthtrack.benchmarks.crossmodel.recordings import MOTIONS, made_recording, recording_cells
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.benchmarks.papers.plot import draw_png
 from depthtrack.calibration.calibrate import Calibration
@@ -41,13 +41,6 @@ def test_cells_are_drawn_once_for_each_motion_and_seed() -> None:
     assert all(0.8 <= cell["scale"] <= 1.2 for cell in cells)
     tuned = recording_cells(ExperimentOptions(repetitions=3, split="tuning"))
     assert not {cell["seed"] for cell in cells} & {cell["seed"] for cell in tuned}
-
-
-def test_hands_are_drawn_from_the_prior_and_differ() -> None:
-    one, other = random_hand("left", 1.1, 1), random_hand("left", 1.1, 2)
-    assert (one.side, one.scale) == ("left", 1.1)
-    assert not np.allclose(one.lengths, other.lengths)
-    assert one == random_hand("left", 1.1, 1)
 
 
 def test_the_recording_of_a_cell_has_exact_truth() -> None:

@@ -9,16 +9,6 @@ import pytest
 from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly
 from depthtrack.calibration.options import CalibrationOptions
-from depthtrack.calibration.parameters import (
-    COUNT,
-    KNUCKLES,
-    LENGTHS,
-    SCALE,
-    hand_of,
-    measures,
-    motion_of,
-    prior_covariance,
-)
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise
 from depthtrack.calibration.solid_hands import is_solid, nearest_solid, solid_step
 from depthtrack.calibration.views import choose_views, finger_area
@@ -31,6 +21,16 @@ from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import (
+    COUNT,
+    KNUCKLES,
+    LENGTHS,
+    SCALE,
+    hand_of,
+    measures,
+    motion_of,
+    prior_covariance,
+)
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.rendering.triangles import rasterise

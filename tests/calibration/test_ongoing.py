@@ -14,9 +14,9 @@ from depthtrack.calibration import ongoing_pipeline
 from depthtrack.calibration.ongoing import KeptViews, OngoingSizes, measure
 from depthtrack.calibration.ongoing_pipeline import OngoingPipeline
 from depthtrack.calibration.options import OngoingOptions
-from depthtrack.calibration.parameters import COUNT, hand_of
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import COUNT, hand_of
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation

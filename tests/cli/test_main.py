@@ -8,6 +8,7 @@ import pytest
 
 from depthtrack import __version__
 from depthtrack.cli import COMMANDS, main
+from depthtrack.cli.markers import COMMANDS as MARKER_COMMANDS
 
 _HEAVY = ("cv2", "numba", "scipy", "trimesh", "matplotlib", "rerun", "OpenGL")
 
@@ -24,10 +25,20 @@ def test_the_overview_names_every_command(capsys: pytest.CaptureFixture[str]) ->
         assert entry.summary in text
 
 
-@pytest.mark.parametrize("command", [None, *COMMANDS])
+def test_the_overview_of_a_group_names_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["markers"], ["markers", "--help"]):
+        assert main(arguments) == 0
+        text = capsys.readouterr().out
+        assert "usage: depthtrack markers COMMAND" in text
+        assert all(entry.summary in text for entry in MARKER_COMMANDS.values())
+    assert main(["markers", "dance"]) == 2
+    assert "no command 'dance'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [None, *COMMANDS, *(f"markers {name}" for name in MARKER_COMMANDS)])
 def test_help_imports_nothing_heavy(command: str | None) -> None:
     """The imported modules decide how fast `--help` is; a clock would be unreliable."""
-    arguments = ["--help"] if command is None else [command, "--help"]
+    arguments = ["--help"] if command is None else [*command.split(), "--help"]
     code = (
         "import sys\nfrom depthtrack.cli import main\n"
         f"try:\n    main({arguments!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"

@@ -16,7 +16,9 @@ from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.export.benchmark_joints import BENCHMARKS
 from depthtrack.export.csv_table import HEADER
+from depthtrack.export.mot import palm_rotations
 from depthtrack.export.uvd import read_uvd, write_uvd
+from depthtrack.geometry.rotations import quaternion_exp, rotation_matrix
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.hand.shape import HandShape
@@ -184,6 +186,46 @@ def test_benchmark_joints_have_their_documented_positions() -> None:
     assert np.linalg.norm(wrist - found["nyu"]["palm"]) == pytest.approx(0.088, abs=0.002)
     nearer_thumb = np.linalg.norm(found["nyu"]["wrist_radial"] - keypoints["thumb_cmc"])
     assert nearer_thumb < np.linalg.norm(found["nyu"]["wrist_ulnar"] - keypoints["thumb_cmc"])
+
+
+# OpenSim
+
+
+def read_mot(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of a motion, read as OpenSim's storage: header lines, names, numbers."""
+    lines = path.read_text().splitlines()
+    head = dict(line.split("=") for line in lines[1 : lines.index("endheader")])
+    names, *rows = [line.split("\t") for line in lines[lines.index("endheader") + 1 :]]
+    assert (head["version"], head["inDegrees"]) == ("1", "yes")
+    assert (int(head["nRows"]), int(head["nColumns"])) == (len(rows), len(names))
+    return dict(zip(names, np.array(rows, dtype=np.float64).T, strict=True))
+
+
+def test_a_motion_for_opensim_holds_the_poses_in_degrees(run: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run), "-o", str(tmp_path / "out.mot")]) == 0
+    columns, loaded = read_mot(tmp_path / "out.mot"), Run.load(run)
+    posed = np.isfinite(loaded.poses).all(axis=1)
+    assert posed.sum() == 4
+    np.testing.assert_allclose(columns["time"], loaded.timestamps[posed], rtol=1e-9)
+    for k, name in enumerate(POSE_NAMES[7:], start=7):
+        np.testing.assert_allclose(np.radians(columns[name]), loaded.poses[posed, k], atol=1e-9)
+    np.testing.assert_allclose(columns["palm_tz"], loaded.poses[posed, 2], rtol=1e-9)
+    about = [rotation_about(axis, np.radians(columns[f"palm_r{'xyz'[axis]}"])) for axis in range(3)]
+    expected = rotation_matrix(loaded.poses[posed, 3:7])
+    np.testing.assert_allclose(about[0] @ about[1] @ about[2], expected, atol=1e-8)
+
+
+def rotation_about(axis: int, angles: np.ndarray) -> np.ndarray:
+    vectors = np.zeros((len(angles), 3))
+    vectors[:, axis] = angles
+    return rotation_matrix(quaternion_exp(vectors))
+
+
+def test_rotations_of_the_palm_do_not_jump() -> None:
+    angle = np.linspace(0, 4 * np.pi, 200)
+    poses = np.zeros((200, 27))
+    poses[:, 3], poses[:, 6] = np.cos(angle / 2), np.sin(angle / 2)
+    np.testing.assert_allclose(palm_rotations(poses)[:, 2], np.degrees(angle), atol=1e-6)
 
 
 # Errors

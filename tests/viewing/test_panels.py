@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -50,11 +52,17 @@ def test_annotated_frames_have_mask_and_joints_of_their_own_frame(tmp_path: Path
 def test_true_keypoints_are_computed_from_the_pose_without_joints() -> None:
     hand, pose = HandShape(side="left", scale=0.9), make_pose([0.0, 0.1, 0.5], [1.0, 0.2, 0.0, 0.1], np.full(20, 0.1))
     truth = GroundTruth(np.array([0.5, 1.0]), poses=np.stack([pose, pose + 0.01]), hand=hand)
-    found = true_keypoints(truth, 0.5)
+    recording: Any = SimpleNamespace(ground_truth=truth, T_camera_world=np.eye(4))
+    found = true_keypoints(recording, 0.5)
     assert found is not None
     np.testing.assert_allclose(found, HandModel(hand).keypoints(pose))
-    assert true_keypoints(truth, 0.7) is None
-    assert true_keypoints(GroundTruth(np.array([0.5]), poses=pose[None]), 0.5) is None
+    assert true_keypoints(recording, 0.7) is None
+    recording.T_camera_world = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 2], [0, 0, 0, 1]])
+    turned = true_keypoints(recording, 0.5)
+    assert turned is not None
+    np.testing.assert_allclose(turned, np.stack([-found[:, 1], found[:, 0], found[:, 2] + 2], axis=-1))
+    recording.ground_truth = GroundTruth(np.array([0.5]), poses=pose[None])
+    assert true_keypoints(recording, 0.5) is None
 
 
 def test_masks_are_estimated_only_without_a_true_mask(tmp_path: Path) -> None:

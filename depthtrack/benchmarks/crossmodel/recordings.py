@@ -13,14 +13,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
-from depthtrack.calibration.parameters import SCALE, hand_of, prior_covariance
-from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.rows import Cell
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import Sequence
 from depthtrack.synthesis.generate import SensorName, Synthesis, Synthesiser, write_recording
+from depthtrack.synthesis.random_hand import random_hand
 
 MOTIONS = ("everyday", "signs", "grasp", "other-grasps", "fast", "random")
 SENSORS: tuple[SensorName, ...] = ("kinect1", "kinect2", "realsense")
@@ -89,19 +88,6 @@ def made_recording(
         path = Path(folder) / f"{motion}-{seed}"
         write_recording(made, path)
         yield open_sequence(path)
-
-
-def random_hand(side: Side, scale: float, seed: int) -> HandShape:
-    """Return a hand of a scale, with other sizes drawn from their prior."""
-    draw = np.random.Generator(np.random.Philox(key=[seed, 1 << 32]))
-    for _ in range(100):
-        values = draw.multivariate_normal(np.zeros(len(prior_covariance())), prior_covariance())
-        values[SCALE] = np.log(scale)
-        try:
-            return hand_of(values, side, f"drawn from the prior, seed {seed}")
-        except InputError:
-            continue
-    raise InputError(f"no hand of scale {scale} was drawn with seed {seed}: choose another seed")
 
 
 def _scaled(rig: str, side: Side, scale: float) -> HandShape:

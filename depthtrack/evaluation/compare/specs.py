@@ -10,7 +10,7 @@ from typing import Any
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.options import parameters
-from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
+from depthtrack.tracking.configuration import CONFIGURATIONS, RUN_CONFIGURATIONS, RunConfig, TrackerConfig
 from depthtrack.tracking.registry import tracker_config
 
 
@@ -46,9 +46,9 @@ def read_specs(texts: Sequence[str]) -> list[TrackerSpec]:
     return found
 
 
-def label_of(config: TrackerConfig) -> str:
+def label_of(config: RunConfig) -> str:
     """Return the name of a tracker and its options that differ from the defaults, without seed."""
-    defaults = {each.path: each.default for each in parameters(CONFIGURATIONS[config.name]())}
+    defaults = {each.path: each.default for each in parameters(RUN_CONFIGURATIONS[config.name]())}
     changed = [each for each in parameters(config) if each.default != defaults[each.path] and each.path != "seed"]
     return " ".join([config.name.upper(), *(f"{each.name}={each.default}" for each in changed)])
 

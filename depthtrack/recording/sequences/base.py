@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
@@ -24,6 +26,8 @@ class BaseSequence(ABC):
 
     camera: Camera
     timestamps: Array
+    T_camera_world: Array = np.eye(4)
+    has_depth: bool = True
     has_colour: bool = False
     hand: HandShape | None = None
     ground_truth: GroundTruth | None = None

@@ -42,23 +42,31 @@ def hand_of(values: Array, side: Side, source: str = "") -> HandShape:
     Raises:
         InputError: if a size is outside the range of hands.
     """
-    average = HandShape()
+    return resized(HandShape(), values).with_(side=side, source=source)
+
+
+def resized(hand: HandShape, values: Array) -> HandShape:
+    """Return a hand with its sizes changed by `values` (35,).
+
+    They refer to this hand as those of `hand_of` refer to the average one.
+
+    Raises:
+        InputError: if a size is outside the range of hands.
+    """
     breadth, length, thickness = np.exp(values[PALM])
-    bases = average.bases * [breadth, length, 1.0]
+    bases = hand.bases * [breadth, length, 1.0]
     bases[1:, :2] += values[KNUCKLES].reshape(4, 2)
     bases[0] += values[THUMB_BASE]
-    return HandShape(
-        side=side,
-        scale=float(np.exp(values[0])),
-        lengths=average.lengths * np.exp(values[LENGTHS]).reshape(5, 3),
-        radii=average.radii * np.exp(values[WIDTHS])[:, None],
+    return hand.with_(
+        scale=hand.scale * float(np.exp(values[0])),
+        lengths=hand.lengths * np.exp(values[LENGTHS]).reshape(5, 3),
+        radii=hand.radii * np.exp(values[WIDTHS])[:, None],
         bases=bases,
-        palm_breadth=average.palm_breadth * float(breadth),
-        palm_length=average.palm_length * float(length),
-        palm_thickness=average.palm_thickness * float(thickness),
-        wrist_breadth=average.wrist_breadth * float(breadth),
-        wrist_thickness=average.wrist_thickness * float(thickness),
-        source=source,
+        palm_breadth=hand.palm_breadth * float(breadth),
+        palm_length=hand.palm_length * float(length),
+        palm_thickness=hand.palm_thickness * float(thickness),
+        wrist_breadth=hand.wrist_breadth * float(breadth),
+        wrist_thickness=hand.wrist_thickness * float(thickness),
     )
 
 
@@ -114,13 +122,15 @@ def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Ar
     return J
 
 
-def measures(values: Array) -> dict[str, tuple[float, Array]]:
+def measures(values: Array, reference: HandShape | None = None) -> dict[str, tuple[float, Array]]:
     """Return each length and width (m), and the gradient (35,) of its logarithm, by name.
 
     The hand length is from the wrist to the tip of the middle finger, a finger length from base joint to tip. A width
     is the diameter of the middle joint, or of the last joint of the thumb.
+
+    reference: hand that the sizes refer to; the average one if None.
     """
-    hand, table = hand_of(values, "right"), {}
+    hand, table = resized(reference or HandShape(), values), {}
     lengths = hand.lengths * hand.scale
     palm = (hand.palm_length / 2 + hand.bases[2, 1]) * hand.scale
     whole = np.eye(COUNT)[0]

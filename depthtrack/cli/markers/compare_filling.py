@@ -1,0 +1,80 @@
+"""`depthtrack markers compare-filling`: compare filling methods on cut stretches."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast, get_args
+
+import tyro
+
+from depthtrack.errors import InputError
+
+if TYPE_CHECKING:
+    from depthtrack.evaluation.gap_comparison import FillScore
+
+
+@dataclass(frozen=True)
+class FoldersArgument:
+    """Folders of labelled markers."""
+
+    paths: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(name="folders", metavar="FOLDER ...")]
+    """Folders that `markers label` or `markers solve` wrote."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """Cut stretches out of visible markers, and compare how each method fills them.
+
+    One marker at a time is cut, and all poses are fitted again without what was cut.
+    """
+
+    labelled: tyro.conf.OmitArgPrefixes[FoldersArgument]
+    frames: Annotated[tuple[int, int], tyro.conf.arg(metavar="FRAMES FRAMES")] = (100, 200)
+    """Shortest and longest stretch."""
+    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="SEED ...")] = (1000, 1001, 1002)
+    """Seeds of the places; each cuts the whole capture once."""
+    methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = (
+        "smooth",
+        "paper",
+        "spline",
+        "pattern",
+        "pca",
+    )
+    """Methods to compare: smooth, paper, spline, pattern, pca."""
+    json: bool = False
+    """Print figures as JSON instead of a table."""
+
+    def run(self) -> None:
+        from json import dumps
+
+        from depthtrack.cli.progress import percent_bar
+        from depthtrack.evaluation.gap_comparison import compare_filling
+        from depthtrack.markers.filling.options import FillMethod
+        from depthtrack.markers.folder.reading import MarkerFolder
+        from depthtrack.options import check_seed
+
+        unknown = [method for method in self.methods if method not in get_args(FillMethod)]
+        if unknown:
+            raise InputError(f"there is no method '{unknown[0][:40]}': choose among {', '.join(get_args(FillMethod))}")
+        if not self.labelled.paths or not self.methods or not self.seeds:
+            raise InputError("a comparison needs a folder, a method and a seed at least")
+        for seed in self.seeds:
+            check_seed(seed)
+        captures = [MarkerFolder.load(path).labelled for path in self.labelled.paths]
+        methods = cast("tuple[FillMethod, ...]", self.methods)
+        with percent_bar() as show:
+            scores = compare_filling(captures, *self.frames, self.seeds, methods, show)
+        if self.json:
+            print(dumps([score.row() for score in scores], indent=2, allow_nan=False))
+        else:
+            self._print(scores)
+
+    def _print(self, scores: "list[FillScore]") -> None:
+        print(f"stretches of {self.frames[0]} to {self.frames[1]} frames, one marker at a time")
+        print(f"  {'method':9}{'markers':12}{'samples':>9}{'filled':>9}{'median':>11}{'rms':>11}{'expected':>11}")
+        for score in scores:
+            row = score.row()
+            figures = "".join(
+                f"{'-' if row[name] is None else f'{row[name]:.2f} mm':>11}"
+                for name in ("median_mm", "rms_mm", "expected_mm")
+            )
+            print(f"  {score.method:9}{score.where:12}{score.samples:>9}{100 * score.filled:>7.1f} %{figures}")

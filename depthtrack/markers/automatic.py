@@ -1,0 +1,91 @@
+"""Label a capture without labels: find the models in one frame, then follow them.
+
+Maycock et al. 2015, Sec. III-A and III-B. The start may be in any frame: those before it are labelled backward.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from depthtrack.errors import InputError
+from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.initialisation.initialise import initialise
+from depthtrack.markers.initialisation.options import InitialisationOptions
+from depthtrack.markers.initialisation.started import StartedModels
+from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.markers.labelling.offline import label_capture
+from depthtrack.markers.labelling.options import LabellingOptions
+from depthtrack.markers.models.marker_model import MarkerModel
+from depthtrack.types import Array
+
+Progress = Callable[[str, float], None]
+"""Called with the step and the share of it that is done, 0 to 1."""
+SURE = 0.99
+"""Probability of a right assignment at which no further frame is tried."""
+
+
+def find_start(
+    capture: MarkerCapture,
+    models: Sequence[MarkerModel],
+    options: InitialisationOptions | None = None,
+    frames: int = 8,
+    progress: Progress | None = None,
+) -> StartedModels:
+    """Return the models with their most certain start in a few frames, sized by the points.
+
+    frames: number of frames that are tried at most: the first, and those with the most points in equal parts.
+
+    Raises:
+        InputError: if no model is found in any of them.
+    """
+    best = StartedModels((None,) * len(models))
+    tried = _frames_to_try(capture, frames)
+    for number, frame in enumerate(tried):
+        if progress is not None:
+            progress("finding the models", number / len(tried))
+        found = replace(initialise(capture.points(frame)[0], models, options), frame=frame)
+        if _rank(found) > _rank(best):
+            best = found
+        if best.confidence >= SURE:
+            break
+    if not best.found:
+        names = ", ".join(model.name for model in models)
+        raise InputError(f"none of the models {names[:80]} is found in {len(tried)} frames: check models and unit")
+    return best
+
+
+def sized_models(models: Sequence[MarkerModel], started: StartedModels) -> tuple[MarkerModel, ...]:
+    """Return the models with the sizes that a start found."""
+    return tuple(model if one is None else one.model for model, one in zip(models, started.models, strict=True))
+
+
+def label_from(
+    capture: MarkerCapture,
+    models: Sequence[MarkerModel],
+    started: StartedModels,
+    options: LabellingOptions | None = None,
+) -> LabelledCapture:
+    """Return the labels and poses of all frames, from the frame of a start in both directions.
+
+    models: as `sized_models` returns them, or calibrated ones.
+    started: as `find_start` returns it, or as it was saved.
+    """
+    poses = [None if one is None else one.pose for one in started.models]
+    return label_capture(capture, models, options, poses, _starter, started.frame)
+
+
+def _starter(points: Array, models: tuple[MarkerModel, ...]) -> tuple[Array | None, ...]:
+    """Return the poses of models among points (K, 3); None for one that is not found."""
+    return tuple(None if one is None else one.pose for one in initialise(points, models).models)
+
+
+def _rank(started: StartedModels) -> tuple[int, float]:
+    return len(started.found), started.confidence
+
+
+def _frames_to_try(capture: MarkerCapture, count: int) -> list[int]:
+    """Return the first frame, then of each equal part the frame with the most points."""
+    points = np.isfinite(capture.positions).all(axis=-1).sum(axis=1)
+    parts = np.array_split(np.arange(len(capture)), min(max(count - 1, 1), len(capture)))
+    return list(dict.fromkeys([0, *(int(part[np.argmax(points[part])]) for part in parts)]))[:count]

@@ -1,0 +1,1 @@
+"""Files of optical marker captures: one module a format, chosen by content."""

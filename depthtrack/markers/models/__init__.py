@@ -1,0 +1,1 @@
+"""Models of what carries markers: articulated hands and rigid bodies."""

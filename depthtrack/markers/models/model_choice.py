@@ -1,0 +1,52 @@
+"""Models by the words of a command: an included layout, a layout file or a model file."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+from depthtrack.errors import InputError
+from depthtrack.files import read_text
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.markers.models.layout import find_layout
+from depthtrack.markers.models.marker_model import MarkerModel
+
+
+def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
+    """Return the models that words name.
+
+    words: each a model, the file of a model, or a layout after the side of its hand, such as `left:19` or `left:mine.json`.
+        Without a side, a layout is worn by `hand`.
+    hand: sizes of the hands; those of the average adult if None.
+
+    Raises:
+        InputError: if there is no word, a word names neither model nor layout, or two models have one name.
+    """
+    if not words:
+        raise InputError("expected a model: name a layout such as 26 or left:16, or the file of a model")
+    sizes = HandShape() if hand is None else hand
+    models = tuple(word if isinstance(word, MarkerModel) else _model(word, sizes) for word in words)
+    names = [model.name for model in models]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two models are named '{name[:64]}': give hands different sides, or rename one")
+    return models
+
+
+def _model(word: str, hand: HandShape) -> MarkerModel:
+    side, _, layout = word.partition(":")
+    for known in get_args(Side):
+        if side == known:
+            return find_layout(layout).on(hand.with_(side=known))
+    if word.endswith(".json") and not _is_layout(Path(word)):
+        return MarkerModel.from_json(Path(word))
+    return find_layout(word).on(hand)
+
+
+def _is_layout(path: Path) -> bool:
+    """Return whether a JSON file is a layout; its reader states what else is wrong with it."""
+    try:
+        fields = json.loads(read_text(path))
+        return "like" in fields or "bone" in fields["markers"][0]
+    except (InputError, ValueError, RecursionError, TypeError, KeyError, IndexError):
+        return False
