@@ -49,7 +49,7 @@ class Command:
     held_size: Annotated[float, tyro.conf.arg(metavar="MM")] = 60.0
     """Size of that object: the diameter of a sphere, the longest side of a box, 1.4 diameters of a cylinder."""
     distance: Annotated[float | None, stated_default(metavar="METRES")] = None
-    """Camera-to-hand distance (default: 0.5, or 0.65 for kinect2, or farther to keep the hand in the sensor's range)."""
+    """Camera-to-hand distance (default: 0.5, 0.65 for kinect2, or farther to keep the hand in the sensor's range)."""
     viewpoint: Annotated[int, tyro.conf.arg(metavar="0..7")] = 0
     """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
     to 7 are 75 degrees to the right, above, left."""
