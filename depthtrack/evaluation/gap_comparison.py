@@ -1,6 +1,6 @@
 """Comparison of filling methods on stretches that are cut out of visible markers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -59,22 +59,26 @@ def compare_filling(
     longest: int,
     seeds: Sequence[int],
     methods: Sequence[FillMethod],
+    progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> list[FillScore]:
     """Return the scores of each method over the stretches of all captures and seeds.
 
     shortest, longest: frames of a stretch.
+    progress: called with the current step and the share of the work that is done.
 
     Raises:
         InputError: if the lengths are out of order, or no stretch fits a capture.
     """
     scores: dict[tuple[FillMethod, str], list[FillScore]] = {}
-    for whole in captures:
-        for seed in seeds:
-            cut, gaps = cut_stretches(whole, shortest, longest, seed)
-            for method in methods:
-                options = FillOptions(method=method, longest=longest / whole.capture.rate)
-                for score in score_filling(whole, cut, gaps, options):
-                    scores.setdefault((method, score.where), []).append(score)
+    rounds = [(whole, seed) for whole in captures for seed in seeds]
+    for number, (whole, seed) in enumerate(rounds):
+        progress("fitting poses", number / len(rounds))
+        cut, gaps = cut_stretches(whole, shortest, longest, seed)
+        for k, method in enumerate(methods):
+            progress(method, (number + (k + 1) / (len(methods) + 1)) / len(rounds))
+            options = FillOptions(method=method, longest=longest / whole.capture.rate)
+            for score in score_filling(whole, cut, gaps, options):
+                scores.setdefault((method, score.where), []).append(score)
     return [pooled(each) for each in scores.values()]
 
 
