@@ -28,10 +28,12 @@ class MarkerSolution:
 
     labelled: labels, calibrated models and poses.
     calibrated: the calibration of each hand by its name; empty if the models were used as they are.
+    started: start of the labelling; None if the labels of the capture were used.
     """
 
     labelled: LabelledCapture
     calibrated: Mapping[str, CalibratedMarkers]
+    started: StartedModels | None = None
 
     def sizes(self) -> dict[str, dict[str, tuple[float, float]]]:
         """Return the lengths and widths of each hand by name.
@@ -67,7 +69,9 @@ def solve_capture(
         raise InputError(
             f"the capture lacks labels of {', '.join(model.name for model in models)[:80]}: label it first"
         )
-    if named is None:
+    if named is not None:
+        started = None
+    else:
         started = started or find_start(capture, models, initialisation, progress=show)
         show("labelling", 0.2)
         named = label_from(capture, sized_models(models, started), started, labelling)
@@ -82,4 +86,4 @@ def solve_capture(
         return MarkerSolution(fit_poses(replace(named, models=final), labelling), calibrated)
     if calibrated:
         named = label_from(capture, final, started, labelling)
-    return MarkerSolution(named, calibrated)
+    return MarkerSolution(named, calibrated, started)

@@ -25,24 +25,28 @@ class _Benchmark:
     """Also write the JSON to a file."""
 
     def _measure(self, benchmark: "ModuleType", plan: Any) -> None:
-        """Run a benchmark and print its report.
+        print_measured(benchmark, plan, self.json, self.out)
 
-        benchmark: module with `run(plan, progress) -> report` and `as_text(report) -> str`. The report is a dataclass
-            with `rows`.
 
-        Raises:
-            DepthtrackError: if the report has no rows.
-        """
-        from dataclasses import asdict
-        from json import dumps
+def print_measured(benchmark: "ModuleType", plan: Any, json: bool, out: Path | None) -> None:
+    """Run a benchmark and print its report.
 
-        report = benchmark.run(plan, lambda rows: bar(rows, "row", plan.row_count))
-        text = dumps(asdict(report), indent=2)
-        if self.out is not None:
-            write_atomic(self.out, text + "\n")
-        print(text if self.json else benchmark.as_text(report))
-        if not report.rows:
-            raise DepthtrackError("none of the requested backends runs here: the reasons are above")
+    benchmark: module with `run(plan, progress) -> report` and `as_text(report) -> str`. The report is a dataclass with
+        `rows`.
+
+    Raises:
+        DepthtrackError: if the report has no rows.
+    """
+    from dataclasses import asdict
+    from json import dumps
+
+    report = benchmark.run(plan, lambda rows: bar(rows, "row", plan.row_count))
+    text = dumps(asdict(report), indent=2)
+    if out is not None:
+        write_atomic(out, text + "\n")
+    print(text if json else benchmark.as_text(report))
+    if not report.rows:
+        raise DepthtrackError("none of the requested backends runs here: the reasons are above")
 
 
 @dataclass(frozen=True)
@@ -105,14 +109,44 @@ class Markers(_Benchmark):
 
 
 @dataclass(frozen=True)
+class Starts:
+    """Measure how often the markers of hands are found in a single frame of points.
+
+    A row has the share of right starts, the same among the sure ones, and that of the method of Maycock et al. 2015.
+    """
+
+    layouts: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LAYOUT ...")] = ("13", "16", "19", "26")
+    """Layouts of the synthetic frames."""
+    trials: int = 36
+    """Frames a row: of synthetic motions, or spread over the capture."""
+    seed: int = 1000
+    """Seed of the first frame."""
+    capture: Annotated[Path | None, stated_default(metavar="CAPTURE")] = None
+    """Labelled capture to use without its labels, in place of synthetic frames."""
+    models: Annotated[tuple[str, ...], tyro.conf.arg(aliases=("-m",), metavar="MODEL ...")] = ()
+    """Models to find in the capture: layouts such as left:16, or files from `markers model`."""
+    json: bool = False
+    """Print JSON instead of a table."""
+    out: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
+    """Also write the JSON to a file."""
+
+    def run(self) -> None:
+        from depthtrack.benchmarks import marker_starts
+
+        plan = marker_starts.plan(self.layouts, self.trials, self.seed, self.capture, self.models)
+        print_measured(marker_starts, plan, self.json, self.out)
+
+
+@dataclass(frozen=True)
 class Command:
-    """Measure speed on this machine."""
+    """Measure speed, or the share of right starts, on this machine."""
 
     what: tyro.conf.OmitSubcommandPrefixes[
         Annotated[Score, tyro.conf.subcommand("score")]
         | Annotated[Ik, tyro.conf.subcommand("ik")]
         | Annotated[Segment, tyro.conf.subcommand("segment")]
         | Annotated[Markers, tyro.conf.subcommand("markers")]
+        | Annotated[Starts, tyro.conf.subcommand("starts")]
     ]
 
     def run(self) -> None:

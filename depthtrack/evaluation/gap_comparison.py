@@ -1,6 +1,6 @@
 """Comparison of filling methods on stretches that are cut out of visible markers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +11,8 @@ from depthtrack.hand.kinematics import body_of
 from depthtrack.markers.filled_capture import Gap
 from depthtrack.markers.filling.fill import fill_gaps
 from depthtrack.markers.filling.options import FillMethod, FillOptions
-from depthtrack.markers.filling.refit import refitted_poses
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.markers.labelled_fit import fit_poses
 from depthtrack.types import Array, Index, Mask
 
 _MARGIN = 5
@@ -59,22 +59,26 @@ def compare_filling(
     longest: int,
     seeds: Sequence[int],
     methods: Sequence[FillMethod],
+    progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> list[FillScore]:
     """Return the scores of each method over the stretches of all captures and seeds.
 
     shortest, longest: frames of a stretch.
+    progress: called with the current step and the share of the work that is done.
 
     Raises:
         InputError: if the lengths are out of order, or no stretch fits a capture.
     """
     scores: dict[tuple[FillMethod, str], list[FillScore]] = {}
-    for whole in captures:
-        for seed in seeds:
-            cut, gaps = cut_stretches(whole, shortest, longest, seed)
-            for method in methods:
-                options = FillOptions(method=method, longest=longest / whole.capture.rate)
-                for score in score_filling(whole, cut, gaps, options):
-                    scores.setdefault((method, score.where), []).append(score)
+    rounds = [(whole, seed) for whole in captures for seed in seeds]
+    for number, (whole, seed) in enumerate(rounds):
+        progress("fitting poses", number / len(rounds))
+        cut, gaps = cut_stretches(whole, shortest, longest, seed)
+        for k, method in enumerate(methods):
+            progress(method, (number + (k + 1) / (len(methods) + 1)) / len(rounds))
+            options = FillOptions(method=method, longest=longest / whole.capture.rate)
+            for score in score_filling(whole, cut, gaps, options):
+                scores.setdefault((method, score.where), []).append(score)
     return [pooled(each) for each in scores.values()]
 
 
@@ -85,7 +89,7 @@ def cut_stretches(
 
     shortest, longest: frames of a stretch.
 
-    The poses of the cut frames are solved again without the cut marker.
+    All poses are fitted again, without what was cut.
     Raises InputError if the lengths are out of order, or no stretch fits.
     """
     if not 1 <= shortest <= longest:
@@ -110,15 +114,9 @@ def cut_stretches(
 
 def _without(labelled: LabelledCapture, gaps: Sequence[Gap]) -> LabelledCapture:
     columns = [np.array(each) for each in labelled.columns]
-    frames = [np.zeros(len(each), dtype=np.bool_) for each in columns]
     for gap in gaps:
         columns[gap.model][gap.start : gap.stop, gap.marker] = -1
-        frames[gap.model][gap.start : gap.stop] = True
-    cut = replace(labelled, columns=tuple(columns))
-    poses = (
-        refitted_poses(model, cut.positions(k), cut.poses[k], frames[k]) for k, model in enumerate(labelled.models)
-    )
-    return replace(cut, poses=tuple(poses))
+    return fit_poses(replace(labelled, columns=tuple(columns)))
 
 
 def score_filling(

@@ -1,6 +1,5 @@
 """Evaluate a marker folder against true labels, positions and poses."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from depthtrack.markers.folder.contents import is_marker_folder
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.formats.registry import read_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.markers.named_labels import places_by_name
 from depthtrack.synthesis.marker_folder import COMPLETE_FILE, TRUTH
 from depthtrack.types import Array, Index
 
@@ -160,7 +160,7 @@ def evaluate_labelled(
     frames = len(labelled.capture)
     if len(truth.samples) != frames:
         raise InputError(f"{truth.name} must have the {frames} frames that were labelled, found {len(truth.samples)}")
-    labels, expected = labelled.labelled().labels, _expected(labelled, truth.samples.labels)
+    labels, expected = labelled.labelled().labels, np.concatenate(places_by_name(truth.samples.labels, labelled.models))
     if np.all(expected < 0):
         raise InputError(
             f"{truth.name} has none of the labels, such as '{labels[0]}', but '{truth.samples.labels[0]}': "
@@ -207,23 +207,3 @@ def _angles(
         if model.name in truth.poses and model.hand is not None:
             measured = np.asarray(labelled.columns[k] >= 0)
             yield model.name, AngleErrors.between(poses[k], truth.poses[model.name], measured, model.bodies)
-
-
-def _expected(labelled: LabelledCapture, true_labels: tuple[str, ...]) -> Index:
-    """Return the index (M,) of each marker among true labels; -1 if it is not there.
-
-    A label is compared after the name of its model, and alone if only one model has it. Case and punctuation are
-    ignored: `L:A1` is `L-A1`.
-    """
-    column = {_key(label): n for n, label in enumerate(true_labels)}
-    plain = [label for model in labelled.models for label in model.labels]
-    found = []
-    for model in labelled.models:
-        for label in model.labels:
-            names = (f"{model.name}:{label}", *([label] if plain.count(label) == 1 else []))
-            found.append(next((column[_key(name)] for name in names if _key(name) in column), -1))
-    return np.array(found, dtype=np.int64)
-
-
-def _key(label: str) -> str:
-    return re.sub(r"[\W_]", "", label).lower()

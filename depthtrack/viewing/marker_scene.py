@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
-from typing import NamedTuple, Self
+from typing import Self
 
-import cv2
 import numpy as np
 
 from depthtrack.errors import InputError
@@ -17,31 +15,25 @@ from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.rendering.hand_surface import HandSurface
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Image, Mask
+from depthtrack.viewing.marker_marks import (
+    SUPERSAMPLING,
+    NamedDot,
+    draw_cross,
+    draw_dot,
+    draw_edges,
+    draw_names,
+    draw_offset,
+)
 from depthtrack.viewing.panels import blank, smaller
 from depthtrack.viewing.shading import draw_surface
-from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.text_placement import place_names
-from depthtrack.viewing.theme import FINGER_COLOURS, OCCLUDER, OUTLINE, PALM, SURFACE, TEXT, Rgb
+from depthtrack.viewing.theme import FINGER_COLOURS, OCCLUDER, PALM, SURFACE, Rgb
 
 RIGID_COLOURS: tuple[Rgb, ...] = (OCCLUDER, (250, 204, 21), (45, 212, 191), (244, 114, 182))
 """Colours of rigid bodies, again from the first after the last."""
-_SUPERSAMPLING = 2
 _OPACITY = 0.6
 UNLABELLED_COLOUR: Rgb = (251, 146, 60)
 _BEHIND = 0.012
 """Depth of a marker below the drawn skin from which it is hidden, metres."""
-_RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))
-"""Offsets of the dark rim of a name, pixels."""
-_FIXED_POINT = 4
-"""Bits of a pixel's fraction in OpenCV's drawing functions."""
-
-
-class Dot(NamedTuple):
-    """A drawn marker: its name, pixel (2,) and colour."""
-
-    name: str
-    pixel: Array
-    colour: Rgb
 
 
 @dataclass(frozen=True)
@@ -96,19 +88,20 @@ class MarkerScene:
     def draw(self, frame: int, view: View, named: int | None = None) -> Image:
         """Return a picture (h, w, 3) of a frame in a view.
 
-        named: model whose markers have their names beside them; None for none.
+        named: model whose markers have their names beside them, and to which edges of rigid bodies are limited;
+            None for no names.
 
         Filled dots are markers that were measured, rings those that the pose or the filling puts there. Crosses are
         points without a label.
         """
-        fine = view.resized(_SUPERSAMPLING)
+        fine = view.resized(SUPERSAMPLING)
         surface = self._rendered(frame, fine)
         image = draw_surface(blank(fine.camera.width, fine.camera.height, SURFACE), surface, _OPACITY)
         self._draw_rest(image, frame, fine)
-        dots = self._draw_markers(image, frame, fine, surface)
+        dots = self._draw_markers(image, frame, fine, surface, named)
         image = smaller(image, view.camera.width, view.camera.height)
         if named is not None:
-            _draw_names(image, dots[named])
+            draw_names(image, dots[named])
         return image
 
     def _rendered(self, frame: int, view: View) -> RenderedSurface:
@@ -123,34 +116,30 @@ class MarkerScene:
         return nearest
 
     def _draw_rest(self, image: Image, frame: int, view: View) -> None:
-        for x, y in _in_view(view.camera, view.points(self.rest[frame])):
-            size = 3 * _SUPERSAMPLING
-            for dx, dy in ((size, size), (size, -size)):
-                ends = _fixed([x - dx, y - dy]), _fixed([x + dx, y + dy])
-                cv2.line(image, *ends, OUTLINE, 3 * _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
-            for dx, dy in ((size, size), (size, -size)):
-                ends = _fixed([x - dx, y - dy]), _fixed([x + dx, y + dy])
-                cv2.line(image, *ends, UNLABELLED_COLOUR, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
+        for pixel in _in_view(view.camera, view.points(self.rest[frame])):
+            draw_cross(image, pixel, UNLABELLED_COLOUR)
 
-    def _draw_markers(self, image: Image, frame: int, view: View, surface: RenderedSurface) -> list[list[Dot]]:
+    def _draw_markers(
+        self, image: Image, frame: int, view: View, surface: RenderedSurface, named: int | None
+    ) -> list[list[NamedDot]]:
         """Draw the markers; return those in the image of each model."""
-        dots: list[list[Dot]] = [[] for _ in self.labelled.models]
+        dots: list[list[NamedDot]] = [[] for _ in self.labelled.models]
         for k, model in enumerate(self.labelled.models):
             expected = view.points(model.positions(self.labelled.poses[k][frame]))
             at = view.points(self.positions[k][frame])
             measured = self.labelled.columns[k][frame] >= 0
             shown = np.where(np.isfinite(at), at, expected)
             pixels, colours = view.camera.project(shown), self.colours(k)
-            if model.is_rigid:
-                _draw_edges(image, pixels, colours[0])
+            if model.is_rigid and named in (None, k):
+                draw_edges(image, pixels, colours[0])
             hidden = _hidden(shown, pixels, surface)
             for m, pixel in enumerate(pixels):
                 if not np.isfinite(pixel).all():
                     continue
-                _draw_offset(image, pixel, view.camera.project(expected[m]), colours[m])
-                _draw_dot(image, pixel, colours[m], bool(measured[m]), bool(hidden[m]))
+                draw_offset(image, pixel, view.camera.project(expected[m]), colours[m])
+                draw_dot(image, pixel, colours[m], bool(measured[m]), bool(hidden[m]))
                 if 0 <= pixel[0] < view.camera.width and 0 <= pixel[1] < view.camera.height:
-                    dots[k].append(Dot(model.labels[m], pixel / _SUPERSAMPLING, colours[m]))
+                    dots[k].append(NamedDot(model.labels[m], pixel / SUPERSAMPLING, colours[m]))
         return dots
 
     def colours(self, k: int) -> list[Rgb]:
@@ -185,49 +174,3 @@ def _hidden(points: Array, pixels: Array, surface: RenderedSurface) -> Mask:
             depth = surface.depth[int(y), int(x)]
             out[m] = 0 < depth < points[m, 2] - _BEHIND
     return out
-
-
-def _draw_dot(image: Image, pixel: Array, colour: Rgb, measured: bool, hidden: bool) -> None:
-    radius, rim = 4 * _SUPERSAMPLING << _FIXED_POINT, (3 * _SUPERSAMPLING << _FIXED_POINT) // 2
-    centre = _fixed(pixel)
-    shade = tuple(int(0.45 * part) for part in colour) if hidden else colour
-    cv2.circle(image, centre, radius + rim, OUTLINE, -1, cv2.LINE_AA, _FIXED_POINT)
-    if measured:
-        cv2.circle(image, centre, radius, shade, -1, cv2.LINE_AA, _FIXED_POINT)
-    else:
-        cv2.circle(image, centre, radius, shade, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
-
-
-def _draw_offset(image: Image, pixel: Array, expected: Array, colour: Rgb) -> None:
-    """Draw a line from a marker to the place that the pose gives it."""
-    if np.isfinite(expected).all():
-        cv2.line(image, _fixed(pixel), _fixed(expected), OUTLINE, 3 * _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
-        cv2.line(image, _fixed(pixel), _fixed(expected), colour, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
-
-
-def _draw_edges(image: Image, pixels: Array, colour: Rgb) -> None:
-    """Draw lines between the markers of a rigid body."""
-    known = pixels[np.isfinite(pixels).all(axis=1)]
-    for a, b in combinations(known[:8], 2):
-        cv2.line(image, _fixed(a), _fixed(b), colour, _SUPERSAMPLING, cv2.LINE_AA, _FIXED_POINT)
-
-
-def _draw_names(image: Image, dots: list[Dot]) -> None:
-    size = 12
-    pixels = np.array([dot.pixel for dot in dots]).reshape(-1, 2)
-    boxes = np.array([[text_width(dot.name, size), size] for dot in dots], dtype=np.float64).reshape(-1, 2)
-    corners = place_names(pixels, boxes, image.shape[:2], clearance=8)
-    for dot, corner, box in zip(dots, corners, boxes, strict=True):
-        nearest = np.clip(dot.pixel, corner, corner + box)
-        if np.linalg.norm(nearest - dot.pixel) > 14:
-            cv2.line(image, _fixed(dot.pixel), _fixed(nearest), dot.colour, 1, cv2.LINE_AA, _FIXED_POINT)
-    for dot, corner in zip(dots, corners, strict=True):
-        x, y = round(corner[0]), round(corner[1] + size / 2)
-        for dx, dy in _RIM:
-            put_text(image, dot.name, (x + dx, y + dy), size, OUTLINE)
-        put_text(image, dot.name, (x, y), size, TEXT)
-
-
-def _fixed(pixel: "Array | list[float]") -> tuple[int, int]:
-    x, y = np.rint(np.clip(np.asarray(pixel), -1e5, 1e5) * (1 << _FIXED_POINT)).astype(int)
-    return int(x), int(y)

@@ -52,7 +52,8 @@ def test_an_experiment_writes_rows_table_summary_and_figure(name: str, tmp_path:
     rows = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
     assert len(rows) == done.cells == len(few.cells(options))
     assert len({tuple(row) for row in rows}) == 1
-    assert {"figure", "version", "error_mm", "seconds"} < set(rows[0])
+    assert {"figure", "version", "seconds"} < set(rows[0])
+    assert {"error_mm", "error_deg"} & set(rows[0])
     assert done.cell_seconds == pytest.approx(sum(row["seconds"] for row in rows), abs=1e-3)
     assert json.loads((tmp_path / "summary.json").read_text()) == json.loads(json.dumps(done.to_json()))
     with (tmp_path / "table.csv").open() as file:

@@ -48,6 +48,7 @@ def test_found_labels_are_found_again_with_the_calibrated_models(
     assert used[0] == made.models
     assert used[1][0] is found.calibrated["right"].model
     assert used[1][1] is made.truth.models[1]
+    assert found.started is started
     assert steps == ["labelling", "sizes of right", "poses"]
 
 

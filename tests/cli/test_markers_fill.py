@@ -8,6 +8,7 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.markers.filled_capture import Filling
+from depthtrack.markers.folder.contents import Source
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.folder.writing import write_marker_folder
 from tests.markers.filling.captures import cut, hand, labelled, poses
@@ -47,6 +48,17 @@ def test_an_unusable_option_gives_one_sentence(
     assert main(["markers", "fill", str(folder), "-o", str(tmp_path / "no"), "--longest", "-1"]) == 2
     assert "longest gap" in capsys.readouterr().err
     assert main(["markers", "fill", str(tmp_path / "nothing"), "-o", str(tmp_path / "no")]) == 2
+
+
+def test_a_folder_whose_source_has_changed_is_not_filled(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "capture.csv"
+    source.write_text("one")
+    write_marker_folder(tmp_path / "labelled", MarkerFolder.load(folder).labelled, Source.of(source))
+    source.write_text("two")
+    assert main(["markers", "fill", str(tmp_path / "labelled"), "-o", str(tmp_path / "filled")]) == 2
+    assert "has changed since" in capsys.readouterr().err
 
 
 def test_methods_are_compared(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

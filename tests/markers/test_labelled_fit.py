@@ -68,5 +68,15 @@ def test_a_label_of_two_models_needs_its_model() -> None:
     assert labels_by_name(named.selected(named.labels[:13]), labelled.models) is None
 
 
+def test_labels_may_begin_with_the_side_of_the_hand() -> None:
+    labelled = labelled_hands(sides=("right", "left"))
+    named = labelled.labelled()
+    short = tuple(label.replace("right:", "R-").replace("left:", "L-").replace("box:", "") for label in named.labels)
+    found = labels_by_name(replace(named, labels=short), labelled.models)
+    assert found is not None
+    for k in range(3):
+        np.testing.assert_array_equal(found.positions(k), labelled.positions(k))
+
+
 def test_an_unlabelled_capture_has_no_labels_by_name(truth: LabelledCapture) -> None:
     assert labels_by_name(truth.capture, truth.models) is None

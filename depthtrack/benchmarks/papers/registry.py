@@ -21,6 +21,7 @@ EXPERIMENTS = {
     "schroeder-10": f"{_HERE}.schroeder_10",
     "schroeder-11": f"{_HERE}.schroeder_11",
     "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
+    "maycock-6": f"{_HERE}.maycock_6",
     "crossmodel": "depthtrack.benchmarks.crossmodel.experiment",
 }
 """Modules with an `EXPERIMENT`; those of papers by the first author and the figure or section."""
@@ -43,7 +44,7 @@ def load_experiment(name: str) -> Experiment:
 
 
 def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
-    """Return experiments by full name, short name, author, or `all` of the papers.
+    """Return experiments by full or short name, by author, or `all` of the papers.
 
     Raises:
         InputError: if a name is unknown.
@@ -51,6 +52,7 @@ def chosen_experiments(names: Sequence[str]) -> list[Experiment]:
     found: list[str] = []
     for name in names:
         full = SHORT_NAMES.get(name, name)
+        full = next((each for each in _FIGURES if each.replace("-", "") == name), full)
         if name == "all" or name in PAPERS:
             found += [each for each in _FIGURES if name == "all" or each.startswith(f"{name}-")]
         elif full in EXPERIMENTS:

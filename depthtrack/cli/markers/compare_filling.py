@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import tyro
 
@@ -24,7 +24,7 @@ class FoldersArgument:
 class Command:
     """Cut stretches out of visible markers, and compare how each method fills them.
 
-    One marker at a time is cut, and the poses of those frames are solved again without it.
+    One marker at a time is cut, and all poses are fitted again without what was cut.
     """
 
     labelled: tyro.conf.OmitArgPrefixes[FoldersArgument]
@@ -46,6 +46,7 @@ class Command:
     def run(self) -> None:
         from json import dumps
 
+        from depthtrack.cli.progress import percent_bar
         from depthtrack.evaluation.gap_comparison import compare_filling
         from depthtrack.markers.filling.options import FillMethod
         from depthtrack.markers.folder.reading import MarkerFolder
@@ -59,7 +60,9 @@ class Command:
         for seed in self.seeds:
             check_seed(seed)
         captures = [MarkerFolder.load(path).labelled for path in self.labelled.paths]
-        scores = compare_filling(captures, *self.frames, self.seeds, self.methods)  # type: ignore[arg-type]
+        methods = cast("tuple[FillMethod, ...]", self.methods)
+        with percent_bar() as show:
+            scores = compare_filling(captures, *self.frames, self.seeds, methods, show)
         if self.json:
             print(dumps([score.row() for score in scores], indent=2, allow_nan=False))
         else:

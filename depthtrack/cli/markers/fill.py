@@ -49,12 +49,11 @@ class FillCommand:
         from depthtrack.viewing.marker_gaps import gap_pages
 
         options, given = self.filling, MarkerFolder.load(self.labelled.path)
+        given.check_source()
         self.folder.check(given.labelled.models)
         filled = fill_gaps(given.labelled, options)
         configuration = {**given.contents.configuration, "command": "fill", "filling": to_data(options)}
-        source = given.contents.source
-        read = self.labelled.path / given.contents.labelled if source is None else Path(source.path)
-        self.folder.write(given.labelled, read, configuration, filled)
+        self.folder.write(given.labelled, given.contents.source, configuration, filled)
         if self.folder.pictures:
             for number, page in enumerate(gap_pages(filled, self.labelled.path.name), start=1):
                 write_atomic(self.folder.out / f"gaps-{number}.png", page)

@@ -8,6 +8,7 @@ import tyro
 
 if TYPE_CHECKING:
     from depthtrack.markers.filled_capture import FilledCapture
+    from depthtrack.markers.folder.contents import Source
     from depthtrack.markers.labelled_capture import LabelledCapture
     from depthtrack.markers.models.marker_model import MarkerModel
     from depthtrack.viewing.marker_scene import MarkerScene
@@ -37,13 +38,13 @@ class FolderOptions:
     def write(
         self,
         labelled: "LabelledCapture",
-        source: Path,
+        source: "Path | Source | None",
         configuration: dict[str, Any],
         filled: "FilledCapture | None" = None,
     ) -> None:
         """Write the folder, with the true poses of a synthetic capture, and the pictures.
 
-        source: file of the capture.
+        source: file of the capture; as an earlier folder states it, or its path.
 
         Raises:
             InputError: if a file cannot be written.
@@ -53,12 +54,13 @@ class FolderOptions:
         from depthtrack.markers.folder.writing import write_marker_folder
         from depthtrack.viewing.marker_scene import MarkerScene
 
-        write_marker_folder(
-            self.out, labelled, Source.of(source), configuration, truth_beside(source), f".{self.format}", filled
-        )
+        if isinstance(source, Path):
+            source = Source.of(source)
+        truth = None if source is None else truth_beside(Path(source.path))
+        write_marker_folder(self.out, labelled, source, configuration, truth, f".{self.format}", filled)
         if self.pictures:
             scene = MarkerScene.of(labelled) if filled is None else MarkerScene.of_filled(filled)
-            self._draw(scene, source.name)
+            self._draw(scene, self.out.name if source is None else Path(source.path).name)
 
     def _draw(self, scene: "MarkerScene", title: str) -> None:
         from depthtrack.files import write_atomic

@@ -42,6 +42,7 @@ class SolveCommand:
         from depthtrack.calibration.marker_solution import solve_capture
         from depthtrack.cli.markers.report_text import print_report
         from depthtrack.cli.progress import percent_bar
+        from depthtrack.markers.initialisation.started import save_started
         from depthtrack.options import to_data
 
         models = self.chosen.load()
@@ -71,6 +72,8 @@ class SolveCommand:
             "sizes": sizes,
         }
         self.folder.write(solution.labelled, self.capture.path, configuration)
+        if solution.started is not None:
+            save_started(solution.started, self.folder.out / "start.json")
         print_report(self.folder.out, solution.labelled, self.json, sizes=sizes)
 
 

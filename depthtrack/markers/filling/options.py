@@ -55,6 +55,7 @@ class SmoothFillOptions:
     palm_acceleration: float = option(20.0, "Standard deviation of the palm's acceleration over 0.1 s", unit="m/s^2")
     palm_turn: float = option(200.0, "The same for its rotation", unit="rad/s^2")
     correction_time: float = option(0.03, "Time over which a marker's distance from the model is averaged", unit="s")
+    piece: float = option(20.0, "Time that is smoothed at once; longer stretches are cut into pieces", unit="s")
     wander_time: float = option(0.2, "Time in which markers move on their bodies", unit="s")
     iterations: int = option(8, "Gauss-Newton steps, at most")
     regress: bool = option(True, "Average the smoothed markers with their regression on the others")

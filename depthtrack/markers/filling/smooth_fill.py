@@ -1,5 +1,8 @@
 """Gap filling by smoothing the joints over the whole gap, with what the other markers show."""
 
+from collections.abc import Iterator
+from itertools import pairwise
+
 import numpy as np
 
 from depthtrack.markers.filled_capture import Filling, Gap, measured_samples, runs
@@ -42,18 +45,19 @@ def smooth_fill(
     wander = _wander(places, whole, time_to_measured(visible, rate), options.wander_time)
     shape = visible.shape
     result = Prediction(np.full((*shape, 3), np.nan), np.zeros(shape, np.int64), np.full(shape, np.nan), poses.copy())
-    for first, last in _stretches(gaps, len(poses), round(options.border * rate)):
-        rows = slice(first, last)
+    border, piece = max(round(options.border * rate), 2), max(round(options.piece * rate), 3)
+    for first, last, rows in _stretches(gaps, len(poses), border, piece) if measured_samples(start).any() else ():
         stretch = _stretch(model, measured[rows], visible[rows], places[rows], prior, options)
         smoothed = smooth(stretch, start[rows], options.iterations)
         offsets = marker_offsets(model, smoothed.poses, measured[rows], visible[rows], width)
         unseen = ~visible[rows].any(axis=0)
         offsets[:, unseen] = places[rows][:, unseen]
-        result.positions[rows] = _positions(model, smoothed.poses, offsets)
         spread = np.hypot(_spread(model, smoothed, offsets, visible[rows], stretch.size), wander[rows])
-        result.expected_error[rows] = spread_error(spread)
-        empty = np.flatnonzero(~visible[rows].all(axis=1))
-        result.poses[first + empty] = smoothed.poses[empty]
+        kept, inside = slice(first, last), slice(first - rows.start, last - rows.start)
+        result.positions[kept] = _positions(model, smoothed.poses, offsets)[inside]
+        result.expected_error[kept] = spread_error(spread)[inside]
+        empty = first + np.flatnonzero(~visible[kept].all(axis=1))
+        result.poses[empty] = smoothed.poses[empty - rows.start]
     if options.regress and not model.is_rigid:
         _average_with_regression(model, measured, gaps, rate, options, result)
     result.how[:] = np.where(np.isfinite(result.positions).all(axis=-1), Filling.SMOOTHED, Filling.GAP)
@@ -78,12 +82,23 @@ def _average_with_regression(
         result.expected_error[rows, gap.marker] = averaged_error(error, other)
 
 
-def _stretches(gaps: list[Gap], frames: int, border: int) -> list[tuple[int, int]]:
-    """Return the ends of the stretches to smooth; those that overlap are one."""
-    covered = np.zeros(frames, dtype=np.bool_)
+def _stretches(gaps: list[Gap], frames: int, border: int, piece: int) -> Iterator[tuple[int, int, slice]]:
+    """Yield the ends of the stretches to smooth, and the frames that take part.
+
+    Stretches that overlap are one, and a long one is cut into pieces. Frames beside a piece take part too: as many as
+    the longest gap has, so that no gap is smoothed without its ends.
+    """
+    covered, reach = np.zeros(frames, dtype=np.bool_), border
     for gap in gaps:
-        covered[max(gap.start - max(border, 2), 0) : gap.stop + max(border, 2)] = True
-    return [(first, last) for first, last in runs(covered) if last - first >= 3]
+        covered[max(gap.start - border, 0) : gap.stop + border] = True
+        reach = max(reach, gap.length + border)
+    for start, stop in runs(covered):
+        if stop - start < 3:
+            continue
+        count = max(round((stop - start) / piece), 1)
+        cuts = np.linspace(start, stop, count + 1).astype(int).tolist()
+        for first, last in pairwise(cuts):
+            yield first, last, slice(max(first - reach, start), min(last + reach, stop))
 
 
 def _stretch(

@@ -1,4 +1,4 @@
-"""Trajectories without models: tracklets, joined over gaps by their own motion and that of their neighbours.
+"""Trajectories without models: tracklets, joined over gaps.
 
 A marker that reappears is expected where its own velocity leads, and where the rigid motion of its neighbours does. The
 more likely of the two counts. All ends and beginnings are assigned at once, again and again, since joined trajectories
@@ -47,7 +47,7 @@ class LinkingOptions:
 
 
 def link_capture(capture: MarkerCapture, options: LinkingOptions | None = None) -> MarkerCapture:
-    """Return the points of a capture in trajectories `*1`, `*2`, ..., whatever their trajectories were.
+    """Return the points of a capture in new trajectories `*1`, `*2`, ...
 
     Trajectories are in the order of their first frames.
     """
@@ -78,7 +78,7 @@ def _capture_of(capture: MarkerCapture, points: PackedPoints, member: Index) -> 
 
 
 def _join(points: PackedPoints, member: Index, options: LinkingOptions, dt: float, longest: int) -> Index:
-    """Return the trajectory (N,) of each point after a round of joining over gaps of at most `longest` frames."""
+    """Return the trajectory (N,) of each point, joined over at most `longest` frames."""
     count = int(member.max(initial=-1)) + 1
     tracks = np.full((len(points.ends) - 1, count, 3), np.nan)
     tracks[points.frame, member] = points.position
@@ -109,7 +109,7 @@ def _join(points: PackedPoints, member: Index, options: LinkingOptions, dt: floa
 def _candidates(
     tracks: Array, first: Index, last: Index, options: LinkingOptions, dt: float, longest: int
 ) -> Iterator[tuple[int, int, int]]:
-    """Yield each end and beginning within the longest gap and a reachable distance, and the frames between."""
+    """Yield each end and beginning that may be joined, and the frames between."""
     order = np.argsort(first, kind="stable")
     for a in range(len(first)):
         low, high = np.searchsorted(first[order], [last[a] + 1, last[a] + longest + 1])

@@ -57,7 +57,7 @@ def predict(scene: Scene, settings: Settings, state: TrackState, poses: Array, p
 
 @compiled(nogil=True)
 def residual_share(settings: Settings, state: TrackState, i: int) -> float:
-    """Return the share of a marker's mean residual in its expected one; the model's own place has the rest."""
+    """Return the share of a marker's mean residual in its expected one; the rest is zero."""
     return state.seen[i] / (state.seen[i] + settings.familiar)
 
 

@@ -103,8 +103,31 @@ def test_a_rigid_body_is_exact_with_three_markers_left() -> None:
     assert np.abs(filled.positions[0] - whole).max() < 1e-4
 
 
+def test_pieces_join_to_the_whole() -> None:
+    gaps = [(label, t, t + 40) for t, label in enumerate(hand().labels[3:], 1) for t in range(10 + 23 * t, 340, 60)]
+    given = labelled(cut(hand().positions(poses()), *gaps), poses())
+    whole, pieces = (
+        fill_gaps(given, FillOptions(smooth=SmoothFillOptions(piece=piece, regress=False))) for piece in (20.0, 1.0)
+    )
+    assert np.isfinite(pieces.positions[0]).all()
+    apart = np.linalg.norm(whole.positions[0] - pieces.positions[0], axis=-1)
+    assert 0 < apart.max() < 0.002
+    assert np.median(apart[apart > 0]) < 1e-4
+
+
+def test_a_hand_that_is_lost_everywhere_stays_lost() -> None:
+    given = labelled(cut(hand().positions(poses()), ("ring_tip", 50, 90)), np.full_like(poses(), np.nan))
+    filled = fill_gaps(given, FillOptions(smooth=SmoothFillOptions(regress=False)))
+    assert (filled.how[0][50:90, hand().labels.index("ring_tip")] == Filling.GAP).all()
+
+
 def test_the_same_capture_gives_the_same_bits() -> None:
     given = labelled(cut(hand().positions(poses()), ("ring_tip", 50, 90)), poses())
     first, second = fill_gaps(given), fill_gaps(given)
     assert np.array_equal(first.positions[0], second.positions[0])
     assert np.array_equal(first.expected_error[0], second.expected_error[0], equal_nan=True)
+
+
+def test_a_gap_of_the_longest_length_is_filled() -> None:
+    given = labelled(cut(hand().positions(poses()), ("ring_tip", 50, 107)), poses())
+    assert np.isfinite(fill_gaps(given, FillOptions(method="pattern", longest=57 / RATE)).positions[0]).all()
