@@ -96,6 +96,19 @@ class Segment(_Benchmark):
 
 
 @dataclass(frozen=True)
+class Markers(_Benchmark):
+    """Measure frames per second of the online labelling of markers, from points to labels and poses, on one core.
+
+    The scenes are a hand of 26 markers, and two hands of 13 with three rigid bodies of 3.
+    """
+
+    def run(self) -> None:
+        from depthtrack.benchmarks.speed import markers
+
+        self._measure(markers, markers.plan(self.seconds))
+
+
+@dataclass(frozen=True)
 class Starts:
     """Measure how often the markers of hands are found in a single frame of points.
 
@@ -132,6 +145,7 @@ class Command:
         Annotated[Score, tyro.conf.subcommand("score")]
         | Annotated[Ik, tyro.conf.subcommand("ik")]
         | Annotated[Segment, tyro.conf.subcommand("segment")]
+        | Annotated[Markers, tyro.conf.subcommand("markers")]
         | Annotated[Starts, tyro.conf.subcommand("starts")]
     ]
 

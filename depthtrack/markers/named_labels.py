@@ -18,8 +18,8 @@ LEAST_SHARE = 0.5
 def places_by_name(labels: Sequence[str], models: Sequence[MarkerModel]) -> tuple[Index, ...]:
     """Return the place (M,) among labels of each marker of each model; -1 if it is not there.
 
-    A label is compared after the name of its model, after the side of a hand or its first letter, and alone if no other
-    model has it. Case and punctuation are ignored: `right:A1` is `R-A1`.
+    A label is compared after the name of its model, and after the side of a hand or its first letter. It is compared
+    alone if no other model has it. Case and punctuation are ignored: `right:A1` is `R-A1`.
     """
     place = {_key(label): n for n, label in enumerate(labels)}
     plain = [label for model in models for label in model.labels]

@@ -21,6 +21,7 @@ from depthtrack.markers.initialisation.palms import (
     palms_of_triples,
     spread_quaternions,
 )
+from depthtrack.markers.initialisation.rigid_bodies import _fitted
 from depthtrack.markers.initialisation.search import initialise_by_search
 from depthtrack.markers.models.layout import load_layout
 from depthtrack.markers.models.marker_model import MarkerModel
@@ -105,6 +106,14 @@ def test_body_starts_with_missing_markers() -> None:
     started = initialise(points, [body(PATTERN)]).found[0]
     assert started.points.tolist() == [place[0], -1, *place[1:4].tolist()]
     np.testing.assert_allclose(started.model.positions(started.pose), places, atol=1e-9)
+
+
+def test_places_without_points_are_no_hypothesis() -> None:
+    fitter = SizedFitter(body(PATTERN), 0.001, PosturePrior.from_synergies(2, 0.35))
+    assert _fitted(fitter, PATTERN + 0.1, PATTERN, 11.0) is None
+    found = _fitted(fitter, PATTERN + 0.001, PATTERN, 11.0)
+    assert found is not None
+    assert found.points.tolist() == list(range(5))
 
 
 def test_mirrored_body_does_not_start() -> None:

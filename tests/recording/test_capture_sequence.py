@@ -13,6 +13,7 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import POSITION
 from depthtrack.markers.folder.writing import write_marker_folder
+from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.recording import image_size, open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.viewing.run_pictures import RunPainter
@@ -75,6 +76,23 @@ def test_errors_are_those_against_true_poses_and_nothing_is_segmented(folder: Pa
     assert "e3d_mm" not in values
     assert evaluation.lost_frames == 4
     assert evaluation.ms_per_frame.statistics()["mean"] is None
+
+
+def test_the_truth_of_a_part_belongs_to_its_frames(tmp_path: Path) -> None:
+    whole = labelled_hands()
+    part = LabelledCapture(
+        whole.capture.between(30, 50),
+        whole.models,
+        tuple(each[30:50] for each in whole.columns),
+        tuple(each[30:50] for each in whole.poses),
+        tuple(each[30:50] for each in whole.confidence),
+    )
+    write_marker_folder(tmp_path / "out", part, truth=whole)
+    truth = open_sequence(tmp_path / "out" / "right" / "recording").ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    np.testing.assert_array_equal(truth.poses, whole.poses[0][30:50])
+    assert evaluate_run(tmp_path / "out" / "right").metrics[0].statistics()["max"] == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize(

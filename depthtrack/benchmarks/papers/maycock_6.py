@@ -30,7 +30,7 @@ MOTIONS = ("grasp", "other-grasps")
 TRIALS, QUICK_TRIALS = 200, 6
 RATE, FRAMES, QUICK_FRAMES = 200.0, 1000, 200
 FIRST_SEED = {"tuning": 0, "report": 1000}
-SCENES = {"hand": "one hand of 26 markers", "scene": "two hands of 13, three rigid bodies of 3"}
+SCENES = {"hand": "one hand of 26 markers", "scene": "two hands and three rigid bodies"}
 PAPER_DEG, PAPER_SD_DEG = 0.085, 0.12
 PAPER_HERTZ = {"hand": 75, "scene": 35}
 _LEAST_DEG = 1e-4
@@ -138,7 +138,9 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         PaperComparison("standard deviation of the trials", f"{PAPER_SD_DEG:g} deg", of(np.std, error), "deg"),
         PaperComparison("median of the trials", "not given", of(np.median, error), "deg"),
         PaperComparison("difference, fingers without dropped markers", "not given", of(np.mean, seen), "deg"),
-        PaperComparison("right labels", "not given", of(np.mean, 100 * _trials(rows, "right_labels")), "%"),
+        PaperComparison(
+            "samples with a wrong or no label", "not given", of(np.mean, 100 - 100 * _trials(rows, "right_labels")), "%"
+        ),
         *(
             PaperComparison(f"frames per second, {words}", f"{PAPER_HERTZ[scene]:g}", of(np.median, hertz[scene]), "Hz")
             for scene, words in SCENES.items()

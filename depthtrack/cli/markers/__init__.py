@@ -11,6 +11,7 @@ COMMANDS: dict[str, CommandEntry] = {
     "compare-filling": CommandEntry(
         "depthtrack.cli.markers.compare_filling", "compare filling methods on stretches that are cut out"
     ),
+    "link": CommandEntry("depthtrack.cli.markers.link", "join points to trajectories without models"),
     "shuffle": CommandEntry("depthtrack.cli.markers.shuffle", "strip the labels of a capture, to test the labelling"),
     "cut": CommandEntry("depthtrack.cli.markers.cut", "cut stretches out of trajectories, to test the gap filling"),
 }

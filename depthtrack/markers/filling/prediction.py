@@ -33,7 +33,7 @@ def gaps_to_fill(model: int, measured: Mask, rate: float, options: FillOptions) 
     return [
         gap
         for gap in gaps_of(model, measured)
-        if gap.length <= options.longest * rate
+        if gap.length <= round(options.longest * rate)
         and gap.length < frames
         and (options.ends or (gap.start > 0 and gap.stop < frames))
     ]

@@ -7,6 +7,7 @@ import numpy as np
 
 from depthtrack.files import compact_json, write_atomic
 from depthtrack.hand.pose import FINGERS
+from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.virtual_camera import virtual_camera
 from depthtrack.recording.branches import BRANCH_COLUMNS
@@ -41,7 +42,7 @@ def write_hand_run(
     capture = CaptureDescription(name, labelled.capture.rate, len(labelled.capture), camera, T)
     write_atomic(recording / CAPTURE_FILE, capture.to_json())
     if truth is not None:
-        _write_truth(recording, truth, model.name)
+        _write_truth(recording, truth, model.name, labelled.capture)
     rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, run_rows(labelled, k)))
     indices = [[str(index)] for index in range(len(labelled.capture))]
     rewrite_table(folder / "timings.csv", ("index",), indices)
@@ -95,12 +96,19 @@ def _visibility(measured: Mask, finger: Index) -> Array:
     return out
 
 
-def _write_truth(recording: Path, truth: LabelledCapture, name: str) -> None:
-    """Write the true sizes and poses of the hand of this name, if it is among the true ones."""
+def _write_truth(recording: Path, truth: LabelledCapture, name: str, capture: MarkerCapture) -> None:
+    """Write the true sizes and poses of the hand of this name, if it is among the true ones.
+
+    capture: may have a part of the true frames; numbers of frames count.
+    """
+    skipped = capture.first_frame - truth.capture.first_frame
     for model, poses in zip(truth.models, truth.poses, strict=True):
-        if model.name == name and model.hand is not None:
+        if model.name == name and model.hand is not None and skipped >= 0:
+            part = poses[skipped : skipped + len(capture)]
+            if not np.isfinite(part).all(axis=1).any():
+                continue
             write_atomic(recording / HAND_FILE, model.hand.to_json())
-            rewrite_table(recording / POSES_FILE, POSES_HEADER, _pose_cells(truth.capture.times, poses))
+            rewrite_table(recording / POSES_FILE, POSES_HEADER, _pose_cells(capture.times[: len(part)], part))
 
 
 def _pose_cells(times: Array, poses: Array) -> Sequence[list[str]]:

@@ -58,11 +58,12 @@ def _fitted(fitter: SizedFitter, places: Array, points: Array, missing: float) -
     for _ in range(_ROUNDS):
         square = np.square(places[:, None] - points).sum(axis=-1)
         changed = assign_within(0.5 * fitter.weights[:, None] * square, missing)
-        if np.array_equal(changed, assigned):
-            break
-        assigned, seen = changed, changed >= 0
+        seen = changed >= 0
         if seen.sum() < 3:
             return None
+        if np.array_equal(changed, assigned):
+            break
+        assigned = changed
         R, t = rigid_alignment(model.offsets[seen], points[assigned[seen]], fitter.weights[seen])
         places = model.offsets @ R.T + t
     seen = assigned >= 0

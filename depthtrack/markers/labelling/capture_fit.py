@@ -107,7 +107,7 @@ def _fit_frames(
     targets, weights, placed = np.zeros((M, 3)), np.zeros(M), np.empty((M, 3))
     frozen, slope = np.zeros(20, np.bool_), np.zeros((G, 20))
     bodies = BodyPoses(np.empty((16, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
-    fit = PoseFit(2 * settings.iterations, settings.damping, settings.avoid_limits)
+    fit = PoseFit(5 * settings.iterations, settings.damping, settings.avoid_limits)
     for t in range(labels.shape[0]):
         for g in range(G):
             pose = poses[t, g]

@@ -32,7 +32,7 @@ class PredictionOptions:
     residual_gain: float = option(
         0.03, "Share of a new residual in the residual that is kept while a marker is missing"
     )
-    familiar: int = option(5, "Frames after which a marker's own residual is used instead of its spread on the model")
+    familiar: int = option(20, "Frames after which a marker's own residual counts as much as its place on the model")
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class FitOptions:
 
     iterations: int = option(4, "Gauss-Newton steps per frame, at most", source=f"{_MAYCOCK}: 5 to 10")
     damping: float = option(2e-7, "Damping of each finger angle", unit="m^2/rad^2", source=f"{_MAYCOCK}, Eq. (4)")
-    avoid_limits: bool = option(True, "Increase the damping towards joint limits", source="Chan and Dubey 1995")
+    avoid_limits: bool = option(False, "Increase the damping towards joint limits", source="Chan and Dubey 1995")
     freeze: bool = option(True, "Hold the joints that move no visible marker", source=f"{_MAYCOCK}, Sec. III-C")
     least_spread: float = option(0.0015, "Least standard deviation of a marker about its place on the body", unit="m")
     robust: float = option(
@@ -120,7 +120,7 @@ class LabellingOptions:
 PAPER_LABELLING = LabellingOptions(
     PredictionOptions(kind="model"),
     AssignmentOptions(padded=True),
-    FitOptions(iterations=10, damping=1e-6, robust=0.0),
+    FitOptions(iterations=10, damping=1e-6, avoid_limits=True, robust=0.0),
     offline=OfflineOptions(use=False),
 )
 """Maycock et al. 2015, Sec. III-B."""

@@ -34,12 +34,13 @@ def predict(scene: Scene, settings: Settings, state: TrackState, poses: Array, p
             if state.missing[i] == 0 and not settings.from_model:
                 for r in range(3):
                     out.expected[i, r] = state.position[i, r] + state.velocity[i, r]
-                out.peak[i] = isotropic(4 * settings.noise**2 + settings.acceleration**2, out.precision[i])
+                change = settings.acceleration if state.run[i] > 2 else settings.acceleration + settings.palm_drift
+                out.peak[i] = isotropic(4 * settings.noise**2 + change**2, out.precision[i])
                 continue
             T, e = bodies.T[scene.body[i]], state.residual[i]
+            share = 0.0 if settings.from_model else residual_share(settings, state, i)
             for r in range(3):
-                kept = 0.0 if settings.from_model else T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2]
-                out.expected[i, r] = placed[i, r] + kept
+                out.expected[i, r] = placed[i, r] + share * (T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2])
             out.peak[i] = model_precision(
                 scene,
                 settings,
@@ -55,11 +56,16 @@ def predict(scene: Scene, settings: Settings, state: TrackState, poses: Array, p
 
 
 @compiled(nogil=True)
+def residual_share(settings: Settings, state: TrackState, i: int) -> float:
+    """Return the share of a marker's mean residual in its expected one; the rest is zero."""
+    return state.seen[i] / (state.seen[i] + settings.familiar)
+
+
+@compiled(nogil=True)
 def residual_spread(scene: Scene, settings: Settings, state: TrackState, i: int) -> float:
-    """Return the standard deviation of a marker's residual about the one that is kept, metres."""
-    if state.seen[i] >= settings.familiar:
-        return settings.least_spread
-    return max(scene.spread[i], settings.least_spread)
+    """Return the standard deviation of a marker's residual about the expected one, metres."""
+    unknown = (1 - residual_share(settings, state, i)) * max(scene.spread[i], settings.least_spread) ** 2
+    return float(np.sqrt(settings.least_spread**2 + unknown))
 
 
 @compiled(nogil=True)

@@ -5,7 +5,7 @@ import numpy as np
 from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.markers.labelling.pose_fit import determined_angles
-from depthtrack.markers.labelling.prediction import residual_spread
+from depthtrack.markers.labelling.prediction import residual_share, residual_spread
 from depthtrack.markers.labelling.scene import Scene
 from depthtrack.markers.labelling.state import LARGEST_MARGIN, LARGEST_MISFIT, FrameLabels, Settings, TrackState
 from depthtrack.types import Array
@@ -16,7 +16,10 @@ NEIGHBOUR = 0.05
 
 @compiled(nogil=True)
 def keep_pose(scene: Scene, g: int, state: TrackState, pose: Array) -> None:
-    """Store the pose and its change since the last frame."""
+    """Store the pose and its change since the last frame.
+
+    A correction is no motion: what was not determined in the last frame has no change.
+    """
     old, step = state.pose[g], state.step[g]
     for r in range(3):
         step[r] = pose[r] - old[r]
@@ -29,7 +32,9 @@ def keep_pose(scene: Scene, g: int, state: TrackState, pose: Array) -> None:
     step[4] = sign * (w * c - x * d + y * a + z * b)
     step[5] = sign * (w * d + x * c - y * b + z * a)
     for a in range(20):
-        step[6 + a] = pose[7 + a] - old[7 + a]
+        step[6 + a] = pose[7 + a] - old[7 + a] if state.undetermined[g, a] == 0 else 0.0
+    if state.loose[g] > 0:
+        step[:6] = 0.0
     old[:] = pose
 
 
@@ -179,7 +184,7 @@ def misfit(
     target: Array, scene: Scene, settings: Settings, state: TrackState, i: int, placed: Array, bodies: BodyPoses
 ) -> float:
     """Return the distance of a point from its usual place, in standard deviations."""
-    T, e, total = bodies.T[scene.body[i]], state.residual[i], 0.0
+    T, e, total = bodies.T[scene.body[i]], residual_share(settings, state, i) * state.residual[i], 0.0
     for r in range(3):
         x = target[r] - placed[i, r] - (T[r, 0] * e[0] + T[r, 1] * e[1] + T[r, 2] * e[2])
         total += x * x

@@ -38,14 +38,13 @@ class LabelledFrame:
 
 
 def restart(points: Array, scene: Scene, models: Sequence[MarkerModel], state: TrackState, starter: Starter) -> None:
-    """Track the models again that are not tracked, where a starter finds them among the points that are left.
+    """Start the models that are not tracked where a starter finds them in the other points.
 
     points: (K, 3) metres. Those near the markers of tracked models are left out.
     """
     lost = np.flatnonzero(~state.active)
-    held = np.concatenate(
-        [np.empty((0, 3)), *(models[g].positions(state.pose[g]) for g in np.flatnonzero(state.active))]
-    )
+    tracked = [model.positions(pose) for model, pose, on in zip(models, state.pose, state.active, strict=True) if on]
+    held = np.concatenate([np.empty((0, 3)), *tracked])
     distance = np.linalg.norm(points[:, None] - held, axis=-1).min(axis=1, initial=np.inf)
     found = starter(points[distance > HELD], tuple(models[int(g)] for g in lost))
     for g, pose in zip(lost, found, strict=True):

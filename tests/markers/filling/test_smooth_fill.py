@@ -126,3 +126,8 @@ def test_the_same_capture_gives_the_same_bits() -> None:
     first, second = fill_gaps(given), fill_gaps(given)
     assert np.array_equal(first.positions[0], second.positions[0])
     assert np.array_equal(first.expected_error[0], second.expected_error[0], equal_nan=True)
+
+
+def test_a_gap_of_the_longest_length_is_filled() -> None:
+    given = labelled(cut(hand().positions(poses()), ("ring_tip", 50, 107)), poses())
+    assert np.isfinite(fill_gaps(given, FillOptions(method="pattern", longest=57 / RATE)).positions[0]).all()

@@ -54,7 +54,8 @@ def test_visible_markers_go_on_and_missing_ones_follow_the_model() -> None:
     state, out = TrackState.empty(SCENE), FrameLabels.empty(26)
     state.start(SCENE, 0, pose_of(0.2))
     state.missing[0], state.position[0], state.velocity[0] = 0, [1.0, 2, 3], [0.01, 0, 0]
-    state.missing[1], state.residual[1] = 3, [0, 0, 0.002]
+    state.missing[1], state.residual[1] = 3, [0, 0, 0.004]
+    state.seen[1] = SETTINGS.familiar
     predict(SCENE, SETTINGS, state, np.empty((1, 27)), np.empty((26, 3)), out)
     np.testing.assert_allclose(out.expected[0], [1.01, 2, 3])
     body = MODEL.kinematics.transforms(pose_of(0.2))[MODEL.bodies[1]]

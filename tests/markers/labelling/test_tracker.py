@@ -91,7 +91,7 @@ def test_a_ghost_near_a_missing_marker_is_rejected_by_the_model() -> None:
         points, numbers = made.capture.points(t)
         hidden = numbers == made.columns[0][t, marker]
         if t > 20:
-            points[hidden] += [0.008, 0.0, 0.008]
+            points[hidden] += [0.014, 0.0, 0.014]
         frame = tracker.update(points)
     assert frame.points[0][marker] == -1
 
