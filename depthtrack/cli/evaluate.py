@@ -98,6 +98,9 @@ class Command:
 
         if not self.runs:
             raise InputError("name at least one run folder")
+        for path in self.runs:
+            if not path.exists():
+                raise InputError(f"there is no run at {path}: no such folder")
         if self.labels is not None or self.benchmark is not None:
             raise InputError("--labels and --benchmark need --predictions: leave them out to evaluate a run")
         if self.truth is not None:

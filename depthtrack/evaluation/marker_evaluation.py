@@ -78,6 +78,25 @@ class MarkerTruth:
         }
         return cls(str(path), samples, positions.selected(samples.labels), poses)
 
+    def during(self, capture: MarkerCapture) -> "MarkerTruth":
+        """Return the truth about the frames of a part of the same recording, by the numbers of frames.
+
+        Raises:
+            InputError: if it lacks some of them.
+        """
+        count, first = len(capture), capture.first_frame - self.samples.first_frame
+        if len(self.samples) == count:
+            return self
+        if not 0 <= first <= len(self.samples) - count:
+            raise InputError(
+                f"{self.name} must have the {count} frames from {capture.first_frame} on that were labelled, "
+                f"found {len(self.samples)} from {self.samples.first_frame} on"
+            )
+        chosen = slice(first, first + count)
+        poses = {name: rows[chosen] for name, rows in self.poses.items()}
+        samples, positions = (each.between(chosen.start, chosen.stop) for each in (self.samples, self.positions))
+        return MarkerTruth(self.name, samples, positions, poses)
+
 
 @dataclass(frozen=True, eq=False)
 class MarkerEvaluation:
@@ -129,7 +148,7 @@ def evaluate_marker_folder(path: Path, labels: Path | None = None, truth: Path |
         beside = None if source is None else Path(source.path).parent
         if beside is None or not is_marker_folder(beside / TRUTH):
             raise InputError(f"the truth about {path} is unknown: give --labels FILE or --truth FOLDER")
-        known = MarkerTruth.of_folder(beside)
+        known = MarkerTruth.of_folder(beside / TRUTH)
     return evaluate_labelled(folder.labelled, known, str(path), folder.filled)
 
 
@@ -157,9 +176,7 @@ def evaluate_labelled(
     Raises:
         InputError: if the truth has other frames, none of the markers, or none of the points.
     """
-    frames = len(labelled.capture)
-    if len(truth.samples) != frames:
-        raise InputError(f"{truth.name} must have the {frames} frames that were labelled, found {len(truth.samples)}")
+    frames, truth = len(labelled.capture), truth.during(labelled.capture)
     labels, expected = labelled.labelled().labels, np.concatenate(places_by_name(truth.samples.labels, labelled.models))
     if np.all(expected < 0):
         raise InputError(

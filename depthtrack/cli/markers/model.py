@@ -49,9 +49,16 @@ class Command:
         from json import dumps
 
         from depthtrack.files import write_atomic
+        from depthtrack.markers.folder.contents import check_names
 
         if bool(self.body) == bool(self.chosen.models):
             raise InputError("give either the markers of a rigid body (--body) or the layout of a hand (-m)")
+        if self.name is not None:
+            check_names([self.name])
+        if self.out.is_dir() or not self.out.parent.is_dir():
+            raise InputError(
+                f"{self.out} must be a file in an existing folder: create the folder, or name another file"
+            )
         capture = self.capture.read()
         model, figures = self._body(capture) if self.body else self._hand(capture)
         write_atomic(self.out, model.to_json())

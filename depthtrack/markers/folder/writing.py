@@ -88,13 +88,13 @@ def write_marker_folder(
 
 
 def check_unused(folder: Path) -> None:
-    """Raise InputError if the folder holds markers, a run or a recording already, or is a file."""
+    """Raise InputError if the folder holds anything already, or is a file."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} must be a folder, found a file: choose another name")
     if is_marker_folder(folder):
         raise InputError(f"{folder} already holds labelled markers: choose another folder")
-    if any((folder / name).exists() for name in ("run.json", "depth.txt")):
-        raise InputError(f"{folder} must not be the folder of a run or a recording: choose another name")
+    if folder.exists() and any(folder.iterdir()):
+        raise InputError(f"{folder} must be a new or an empty folder, found files in it: choose another name")
 
 
 def check_output(folder: Path, names: tuple[str, ...], suffix: str = ".csv") -> None:
