@@ -45,8 +45,20 @@ class IcpOptions:
     )
     damping: float = option(1e-4, "Damping of the finger angles, per 3000 points", unit="m^2/rad^2", source="Eq. (4)")
     temporal_weight: float = option(
-        5e-5, "Weight of the prior that holds angles at those of the last frame, per 3000 points", unit="m^2/rad^2"
+        5e-5,
+        "Weight of the prior that holds each angle where it was, per 3000 points; used if posture_weight is 0",
+        unit="m^2/rad^2",
     )
+    posture_weight: float = option(
+        1e-4,
+        "Weight of the prior that moves angles together as in common postures, per 3000 points; 0 uses none",
+        unit="m^2",
+        source="tuning seeds of the cross-model benchmark, as the two options below",
+    )
+    posture_memory: float = option(
+        5.0, "Time after which 37 % remain of an unobserved posture's distance from the mean posture", unit="s"
+    )
+    search_share: float = option(0.3, "Share of that distance that the prior of a search without a last pose keeps")
     synergy_weight: float = option(
         3e-7, "Weight of the prior towards postures that the synergies make likely", unit="m^2"
     )
@@ -72,6 +84,11 @@ class IcpOptions:
                 "keypoint_weight must be at least 0 and keypoint_scale positive, "
                 f"found {self.keypoint_weight} and {self.keypoint_scale}"
             )
+        if not (self.posture_weight >= 0 and self.posture_memory > 0 and 0 <= self.search_share <= 1):
+            raise InputError(
+                "posture_weight must be at least 0, posture_memory positive and search_share from 0 to 1, "
+                f"found {self.posture_weight}, {self.posture_memory} and {self.search_share}"
+            )
         for name in ("icp_iterations", "gn_iterations"):
             if not 1 <= getattr(self, name) <= 1000:
                 raise InputError(f"{name} must be between 1 and 1000, found {getattr(self, name)}")
@@ -93,6 +110,7 @@ PAPER_ICP = IcpOptions(
     min_normal_cosine=(0.0, 0.0),
     damping=1e-6,
     temporal_weight=0.0,
+    posture_weight=0.0,
     synergy_weight=0.0,
     keypoint_weight=0.0,
     avoid_limits=True,

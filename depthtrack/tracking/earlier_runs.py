@@ -2,7 +2,7 @@
 
 Those without a format version hold flat options of the trackers pso and ik. Those of format 2 count the memory of a
 track in frames. Before format 4, trackers followed no branches; before format 5, a lost hand was not located anew.
-Before format 6, an arm that points at the camera was no special case.
+Before format 6, an arm that points at the camera was no special case, and fits held each angle alone.
 """
 
 import dataclasses
@@ -49,15 +49,36 @@ def upgraded(fields: Mapping[str, Any], where: str) -> Mapping[str, Any]:
         fields = _without_branches(fields)
     if fields["format"] == 4:
         fields = _without_relocation(fields)
-    return _without_foreshortened_wrist(fields) if fields["format"] == 5 else fields
+    return _without_posture_prior(fields) if fields["format"] == 5 else fields
 
 
-def _without_foreshortened_wrist(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the contents of format 5 whose segmentation finds the wrist of every arm alike."""
-    segmentation = fields.get("segmentation") or {}
+def _without_posture_prior(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the contents of format 5 whose fits hold each angle alone.
+
+    Its segmentation finds the wrist of every arm alike.
+    """
+    options, name, segmentation = fields.get("options"), fields.get("tracker"), fields.get("segmentation") or {}
+    if isinstance(options, dict) and isinstance(name, str) and name in CONFIGURATIONS:
+        options = _unweighted(options, to_data(CONFIGURATIONS[name]()))
     if isinstance(segmentation, dict):
         segmentation = {**segmentation, "foreshortened_wrist": {"least_cosine": 1.0}}
-    return {**fields, "format": 6, "segmentation": segmentation}
+    return {**fields, "format": 6, "options": options, "segmentation": segmentation}
+
+
+def _unweighted(options: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options whose fits have no prior on the posture.
+
+    defaults: all options of the tracker; those of its fits have a `posture_weight`.
+    """
+    changed = dict(options)
+    for name, value in defaults.items():
+        if name == "posture_weight":
+            changed[name] = 0.0
+        elif isinstance(value, dict) and isinstance(options.get(name, {}), dict):
+            group = _unweighted(options.get(name, {}), value)
+            if group:
+                changed[name] = group
+    return changed
 
 
 def _without_relocation(fields: Mapping[str, Any]) -> dict[str, Any]:

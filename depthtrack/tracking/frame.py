@@ -1,5 +1,6 @@
 """The frame that a tracker works on, and the renderers and fitters that its stages share."""
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.lifting import Lifter
-from depthtrack.solver.options import LiftOptions, SurfaceFitOptions, SurfaceName
+from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.state import TrackState
@@ -119,6 +120,12 @@ class FrameContext:
     def motion(self) -> Array:
         """Predicted step (26,) from the last pose to this frame, in the tangent space."""
         return self.state.motion_until(self.observation.timestamp)
+
+    def posture_kept(self, options: IcpOptions) -> float:
+        """Return the share of the last posture's distance from the mean one that a prior keeps."""
+        if self.state.pose is None:
+            return options.search_share
+        return math.exp(-max(self.observation.timestamp - self.state.time, 0.0) / options.posture_memory)
 
     @property
     def clamp(self) -> float:

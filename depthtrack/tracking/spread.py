@@ -6,7 +6,6 @@ synergies. The sum is the matrix of Gauss-Newton (Schroeder et al. 2014, Eq. 4).
 common postures that share their visible parts.
 """
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +13,10 @@ import numpy as np
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel, body_of
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
-from depthtrack.hand.synergies import load_synergies
 from depthtrack.rendering.target import Target
 from depthtrack.rendering.visibility import points_in_view
-from depthtrack.solver.prior import Prior, prior_energy
+from depthtrack.solver.prior import prior_energy
+from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.types import Array, Depth, Mask
 
 MEASURED = 0.004
@@ -28,8 +27,6 @@ OWN_FLESH = 0.003
 """Metres: depth below the rendered surface, beyond the radius of its bone, of a point that other parts hide."""
 CLIPPED = 0.04
 """Metres: depth difference at which a pixel disagrees completely, d_M of Oikonomidis et al. 2011, Eq. (2)."""
-POSTURE_SPREAD = np.radians(14.0)
-"""Standard deviation of an angle from its reconstruction by the synergies, rad."""
 _BODIES = np.repeat([body_of(finger, bone) for finger in range(5) for bone in range(3)], 2)
 _PALM = np.array([0, 1, 5, 9, 13, 17])
 """Keypoints that no finger moves: the wrist and the bases of the fingers."""
@@ -56,12 +53,6 @@ class BonesInView(NamedTuple):
     def finger_visibility(self) -> Array:
         """Visible share (5,) of each finger."""
         return np.asarray(self.visible.mean(axis=(1, 2)))
-
-
-@cache
-def common_postures() -> Prior:
-    """Return the normal distribution of the finger angles."""
-    return Prior.from_synergies(load_synergies(), 1.0, POSTURE_SPREAD)
 
 
 def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target) -> BonesInView:

@@ -139,7 +139,9 @@ def test_runs_of_earlier_versions_are_read() -> None:
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
-    expected = with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True, "interval": 0.0})
+    given = {"particles": 16, "seed": 3, "refine": True, "interval": 0.0}
+    alone = {f"{fit}.icp.posture_weight": 0.0 for fit in ("final_fit", "swarm_search.fit")}
+    expected = with_options(CONFIGURATIONS["pso"](), given | alone)
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}
@@ -237,3 +239,12 @@ def test_a_run_of_format_5_finds_the_wrist_of_every_arm_alike(segmentation: Any)
     found = RunConfiguration.from_fields(fields | {"segmentation": segmentation}, "run.json").segmentation
     assert found.foreshortened_wrist.least_cosine == 1
     assert found.wrist_margin == (segmentation or {}).get("wrist_margin", 0)
+
+
+@pytest.mark.parametrize("options", [{}, {"seed": 4}, {"fit": {"icp": {"icp_iterations": 7}}}])
+def test_a_run_of_format_5_holds_each_angle_alone(options: dict[str, Any]) -> None:
+    fields = {"format": 5, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": options}
+    tracker = RunConfiguration.from_fields(fields, "run.json").tracker
+    assert isinstance(tracker, IkConfig)
+    assert tracker.fit.icp.posture_weight == 0
+    assert tracker.fit.icp.icp_iterations == options.get("fit", {}).get("icp", {}).get("icp_iterations", 5)

@@ -12,13 +12,13 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesiser
+from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.spread import (
     CLIPPED,
     MEASURED,
     BonesInView,
     bones_in_view,
-    common_postures,
     depth_differences,
     keypoint_spread,
 )

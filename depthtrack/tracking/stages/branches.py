@@ -14,10 +14,10 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.recording.branches import Branch
 from depthtrack.solver.options import SurfaceFitOptions
-from depthtrack.solver.prior import Prior
 from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.options import BranchOptions
+from depthtrack.tracking.posture_prior import prior_near
 from depthtrack.tracking.proposals.global_ import mixed_angles, orientation_proposals
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.types import Array
@@ -67,9 +67,10 @@ class CarryBranches:
         if not branches or last is None:
             return []
         fitter, followed = frame.fitter(self.fit), []
+        kept = frame.posture_kept(self.fit.icp)
         for branch in branches:
             ahead = frame.evaluate(np.stack([branch.pose, moved_along(branch.pose, last, best.pose)]))[0].pose
-            prior = Prior.towards(branch.pose[ANGLES], self.fit.icp.temporal_weight)
+            prior = prior_near(branch.pose[ANGLES], kept, self.fit.icp)
             found = frame.evaluate(fitter.fit(ahead, prior=prior)[None])[0]
             followed.append((branch.compared(found.pose, found.energy, best.energy), found))
         return followed

@@ -17,11 +17,11 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
-from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.candidate import Candidate, evaluate, poses_of
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.options import FitRound
+from depthtrack.tracking.posture_prior import prior_near
 from depthtrack.tracking.proposals.global_ import synergy_angles
 from depthtrack.tracking.random import frame_generator
 from depthtrack.types import Array
@@ -76,26 +76,34 @@ def estimate_single_frame(
     distinct = _distinct_postures(
         poses_of(starts)[:, ANGLES], coarse_to_fine.min_difference, coarse_to_fine.rounds[0].keep
     )
-    return run_rounds(fitter, scorer, [starts[i] for i in distinct], tools.synergies, coarse_to_fine.rounds)[0]
+    kept, chosen = fit.icp.search_share, [starts[i] for i in distinct]
+    return run_rounds(fitter, scorer, chosen, tools.synergies, coarse_to_fine.rounds, kept)[0]
 
 
 def run_rounds(
-    fitter: IcpFitter, scorer: Scorer, starts: list[Candidate], synergies: Synergies, rounds: Sequence[FitRound]
+    fitter: IcpFitter,
+    scorer: Scorer,
+    starts: list[Candidate],
+    synergies: Synergies,
+    rounds: Sequence[FitRound],
+    kept: float,
 ) -> list[Candidate]:
     """Return candidates, best first, after all rounds from `starts`, best first.
+
+    kept: share of a posture's distance from the mean one that the prior of a round keeps.
 
     A round of all angles holds the angles that the observation does not constrain near where the synergies led.
     """
     for each in rounds:
-        poses = [fit_in_synergies(fitter, start.pose, synergies, each) for start in starts[: each.keep]]
+        poses = [fit_in_synergies(fitter, start.pose, synergies, each, kept) for start in starts[: each.keep]]
         starts = evaluate(scorer, np.stack(poses))
     return starts
 
 
-def fit_in_synergies(fitter: IcpFitter, pose: Array, synergies: Synergies, options: FitRound) -> Array:
+def fit_in_synergies(fitter: IcpFitter, pose: Array, synergies: Synergies, options: FitRound, kept: float) -> Array:
     """Return `pose` (27,) fitted in the synergies, or in all angles, of one round."""
     subspace = posture_subspace(synergies, options.synergies)
-    prior = Prior.towards(pose[ANGLES], fitter.options.temporal_weight) if subspace.full else None
+    prior = prior_near(pose[ANGLES], kept, fitter.options) if subspace.full else None
     return fitter.fit(pose, subspace, options.icp_iterations, prior, options.coarse)
 
 

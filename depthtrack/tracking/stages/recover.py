@@ -9,10 +9,10 @@ from depthtrack.hand.pose import ANGLES, POSITION
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
-from depthtrack.solver.prior import Prior
 from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.options import FingerOptions, GlobalSearchOptions, RecoveryOptions
+from depthtrack.tracking.posture_prior import prior_near
 from depthtrack.tracking.proposals.fingers import finger_shift_proposals, search_one_finger
 from depthtrack.tracking.proposals.local import local_proposals
 from depthtrack.tracking.stages.searches import Search, search_globally
@@ -90,8 +90,8 @@ class RefineFingers:
         assert self.refit is not None
         if found.energy >= self.recovery.accept_finger * scorer.score(best.pose[None])[0]:
             return best
-        # The prior holds the angles that no correspondence constrains where the search found them.
-        prior = Prior.towards(found.pose[ANGLES], self.refit.icp.temporal_weight)
+        # The prior holds the angles that no correspondence constrains near where the search found them.
+        prior = prior_near(found.pose[ANGLES], frame.posture_kept(self.refit.icp), self.refit.icp)
         fitted = frame.fitter(self.refit).fit(found.pose, prior=prior)
         return self._accepted(best, frame.evaluate(fitted[None])[0])
 

@@ -94,8 +94,8 @@ class FitSearch:
         starts, keep = frame.evaluate(poses), self.options.rounds[0].keep
         if min_angle > 0:
             starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
-        fitter = frame.fitter(self.surface)
-        return run_rounds(fitter, frame.tools.scorer, starts, frame.tools.synergies, self.options.rounds)
+        tools, kept = frame.tools, frame.posture_kept(self.surface.icp)
+        return run_rounds(frame.fitter(self.surface), tools.scorer, starts, tools.synergies, self.options.rounds, kept)
 
     def fitter(self, frame: FrameContext) -> IcpFitter | None:
         return frame.fitter(self.surface)

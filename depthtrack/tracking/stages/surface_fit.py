@@ -10,6 +10,7 @@ from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.posture_prior import prior_near
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class SurfaceFit:
     """Fit the hand's surface to the point cloud from the best candidate.
 
     prior: pull on the angles.
-    hold_last: without `prior`, hold the angles at those of the last frame.
+    hold_last: without `prior`, hold the angles near those of the last frame, or of the candidate if there is none.
     subspace: posture parameters that are solved for.
     align: first move the hand as a rigid body.
     effort: multiple of the usual ICP iterations.
@@ -37,9 +38,11 @@ class SurfaceFit:
     def fitted(self, frame: FrameContext, candidates: list[Candidate], effort: int | None = None) -> list[Candidate]:
         """Return all candidates fitted, best first."""
         fitter, prior = frame.fitter(self.options), self.prior
-        if prior is None and self.hold_last and frame.state.pose is not None:
-            prior = Prior.towards(frame.state.pose[ANGLES], self.options.icp.temporal_weight)
-        iterations = (effort or self.effort) * self.options.icp.icp_iterations
+        icp, last = self.options.icp, frame.state.pose
+        if prior is None and self.hold_last and (last is not None or icp.posture_weight > 0):
+            before = candidates[0].pose if last is None else last
+            prior = prior_near(before[ANGLES], frame.posture_kept(icp), icp)
+        iterations = (effort or self.effort) * icp.icp_iterations
         poses = [
             fitter.fit(candidate.pose, self.subspace, iterations, prior, align=self.align) for candidate in candidates
         ]

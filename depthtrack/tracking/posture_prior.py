@@ -1,0 +1,36 @@
+"""The prior of a fit on the finger angles: they move together as in common postures.
+
+Depth alone does not place hidden fingers. They follow the visible ones as in recorded postures (Schroeder et al. 2014,
+Sec. V), and return slowly to the mean posture. The points of visible fingers outweigh the prior.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from depthtrack.hand.synergies import load_synergies
+from depthtrack.solver.options import IcpOptions
+from depthtrack.solver.prior import Prior
+from depthtrack.types import Array
+
+POSTURE_SPREAD = np.radians(14.0)
+"""Standard deviation of an angle from its reconstruction by the synergies, rad."""
+
+
+@cache
+def common_postures() -> Prior:
+    """Return the normal distribution of the finger angles."""
+    return Prior.from_synergies(load_synergies(), 1.0, POSTURE_SPREAD)
+
+
+def prior_near(angles: Array, kept: float, options: IcpOptions) -> Prior:
+    """Return the prior near angles (20,), rad.
+
+    kept: share that is kept of their distance from the mean posture, as in an Ornstein-Uhlenbeck process.
+
+    Without a `posture_weight` each angle is held alone.
+    """
+    if options.posture_weight == 0:
+        return Prior.towards(angles, options.temporal_weight)
+    common = common_postures()
+    return Prior(options.posture_weight * common.precision, common.mean + kept * (angles - common.mean))
