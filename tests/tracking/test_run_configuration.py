@@ -46,6 +46,8 @@ def _other(parameter: Parameter) -> Any:
     value = parameter.default
     if parameter.path in NEW:
         return NEW[parameter.path]
+    if parameter.name.endswith("resolution") and value is None:
+        return 64
     if isinstance(value, bool):
         return not value
     if get_origin(parameter.kind) is Literal:
@@ -139,7 +141,8 @@ def test_runs_of_earlier_versions_are_read() -> None:
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
-    expected = with_options(CONFIGURATIONS["pso"](), {"particles": 16, "seed": 3, "refine": True, "interval": 0.0})
+    named = {"particles": 16, "seed": 3, "interval": 0.0}
+    expected = with_options(CONFIGURATIONS["pso"](), {**named, "refine": True, "surface_choice.surfaces": ("skin",)})
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}
