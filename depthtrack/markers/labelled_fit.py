@@ -33,7 +33,8 @@ _LEAST_SPREAD = 0.001
 def fit_poses(labelled: LabelledCapture, options: LabellingOptions | None = None) -> LabelledCapture:
     """Return the capture with the poses that fit its labels.
 
-    Angles of joints without a marker are interpolated. A frame with fewer than three markers of a model has the interpolated pose if it lies between others, else none.
+    Angles of joints without a marker are interpolated. With fewer than three markers in a frame, the pose of a model is
+    interpolated between other frames, or absent.
     """
     options = options or LabellingOptions()
     starts = [_frame_poses(model, labelled.positions(k)) for k, model in enumerate(labelled.models)]

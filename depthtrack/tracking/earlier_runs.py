@@ -143,6 +143,7 @@ def _nested(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
             _set(options, path, fields[flat])
     if fields.get("finish") == "skin" and "refine" in options:
         options["refine"] = True
+        _set(options, ("surface_choice", "surfaces"), ["skin"])
     rest = {key: value for key, value in fields.items() if key not in _REPLACED}
     segmentation = {"skin_model": fields.get("skin_model")}
     return {**rest, "format": 3, "tracker": name, "options": options, "segmentation": segmentation}

@@ -79,7 +79,7 @@ class RunConfiguration:
         if isinstance(options, MarkersConfig):
             return (options.surface,)
         if isinstance(options, PsoConfig):
-            return (options.final_fit.surface,) if options.refine else ("primitives",)
+            return options.surface_choice.surfaces if options.refine else ("primitives",)
         return ("primitives",) if isinstance(options, Oikonomidis2011Config) else (options.fit.surface,)
 
     def to_fields(self) -> dict[str, Any]:

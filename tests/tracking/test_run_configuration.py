@@ -46,6 +46,8 @@ def _other(parameter: Parameter) -> Any:
     value = parameter.default
     if parameter.path in NEW:
         return NEW[parameter.path]
+    if parameter.name.endswith("resolution") and value is None:
+        return 64
     if isinstance(value, bool):
         return not value
     if get_origin(parameter.kind) is Literal:
@@ -139,9 +141,9 @@ def test_runs_of_earlier_versions_are_read() -> None:
     }
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
-    given = {"particles": 16, "seed": 3, "refine": True, "interval": 0.0}
+    named = {"particles": 16, "seed": 3, "interval": 0.0, "refine": True, "surface_choice.surfaces": ("skin",)}
     alone = {f"{fit}.icp.posture_weight": 0.0 for fit in ("final_fit", "swarm_search.fit")}
-    expected = with_options(CONFIGURATIONS["pso"](), given | alone)
+    expected = with_options(CONFIGURATIONS["pso"](), named | alone)
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}

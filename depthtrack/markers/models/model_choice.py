@@ -15,8 +15,8 @@ from depthtrack.markers.models.marker_model import MarkerModel
 def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
     """Return the models that words name.
 
-    words: each a model, the file of a model, or a layout after the side of its hand, such as `left:19` or `left:mine.json`.
-        Without a side, a layout is worn by `hand`.
+    words: each a model, the file of a model, or a layout after the side of its hand, such as `left:19`. Without a side,
+        a layout is worn by `hand`.
     hand: sizes of the hands; those of the average adult if None.
 
     Raises:

@@ -70,17 +70,3 @@ class RetryPredictions:
         if candidates[0].energy <= satisfied:
             return candidates
         return by_energy([*candidates, *self.fit.fitted(frame, candidates[:1], effort=2)])
-
-
-@dataclass(frozen=True)
-class Refine:
-    """Fit the best candidate to the surface, with its own angles as prior."""
-
-    options: SurfaceFitOptions
-    name: str = "refine"
-
-    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
-        pose = candidates[0].pose
-        prior = Prior.towards(pose[ANGLES], self.options.icp.temporal_weight)
-        fitted = frame.fitter(self.options).fit(pose, FULL, prior=prior)
-        return frame.evaluate(fitted[None])

@@ -11,7 +11,8 @@ from depthtrack.tracking.stages.predict import GivenPose
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, Reinitialise, SearchGlobally
 from depthtrack.tracking.stages.searches import SwarmSearch
 from depthtrack.tracking.stages.stage import Stage
-from depthtrack.tracking.stages.surface_fit import Refine
+from depthtrack.tracking.stages.surface_choice import FitChosenSurface
+from depthtrack.tracking.stages.surface_fit import SurfaceFit
 from depthtrack.tracking.stages.swarm import Swarm, SwarmAround
 
 
@@ -27,12 +28,14 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
     doubt, routine = SwarmSearch(config.doubt_search), SwarmSearch(config.routine_search)
     start: list[Stage] = [SearchGlobally(search, config.search), keypoints, fingers]
     elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), keypoints, fingers]
-    refine: list[Stage] = [Refine(config.final_fit)] if config.refine else []
+    refine: list[Stage] = (
+        [FitChosenSurface(config.surface_choice, SurfaceFit(config.final_fit))] if config.refine else []
+    )
     return Stages(
         follow=[
             Swarm(config.swarm, config.spread, widen=config.widen),
             keypoints,
-            RecoverLocally(doubt, config.recovery, routine=routine),
+            RecoverLocally(search, config.recovery, routine=routine),
             fingers,
             *refine,
             CarryBranches(config.branches, config.swarm_search.fit),

@@ -56,14 +56,18 @@ def test_tracks_noisy_readings() -> None:
     assert errors_mm(noisy, estimates, frames).mean() < 4
 
 
-def test_the_skin_fit_halves_the_error_of_the_swarm(everyday_skin: Synthesiser) -> None:
-    frames = range(100, 115)
+@pytest.mark.parametrize("shown", ["skin", "primitives"])
+def test_the_surface_fit_reduces_the_error_of_the_swarm(
+    shown: str, made: Synthesiser, everyday_skin: Synthesiser
+) -> None:
+    """It fits the surface that the camera sees, which it is not given."""
+    frames, recording = range(100, 115), everyday_skin if shown == "skin" else made
     errors = {}
     for refine in (False, True):
         tracker = create_tracker(tracker_config("pso", refine=refine), HandShape())
-        errors[refine] = errors_mm(everyday_skin, follow(everyday_skin, tracker, frames), frames).mean()
+        errors[refine] = errors_mm(recording, follow(recording, tracker, frames), frames).mean()
     assert errors[True] < 2
-    assert errors[True] < 0.5 * errors[False]
+    assert errors[True] < 0.7 * errors[False]
 
 
 @pytest.mark.parametrize("frame", [10, 150, 300])
