@@ -213,7 +213,9 @@ def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_pa
 def test_a_run_of_format_2_keeps_its_memory_in_seconds() -> None:
     options = {"thresholds": {"memory_frames": 30, "energy": 0.5}}
     fields = {"format": 2, "sequence": "s", "camera": {}, "hand": {}, "tracker": "ik", "options": options}
-    thresholds = RunConfiguration.from_fields(fields, "run.json").tracker.thresholds
+    tracker = RunConfiguration.from_fields(fields, "run.json").tracker
+    assert isinstance(tracker, IkConfig)
+    thresholds = tracker.thresholds
     assert (thresholds.memory, thresholds.energy, thresholds.longest_gap) == (1.0, 0.5, math.inf)
 
 
