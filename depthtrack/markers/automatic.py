@@ -51,7 +51,7 @@ def find_start(
             break
     if not best.found:
         names = ", ".join(model.name for model in models)
-        raise InputError(f"none of the models {names[:80]} is found in {len(tried)} frames: check models and unit")
+        raise InputError(f"no model ({names[:80]}) was found in {len(tried)} frames: check the models and the unit")
     return best
 
 

@@ -58,7 +58,8 @@ def _lines(evaluation: "MarkerEvaluation") -> Iterator[str]:
 
 def _error(error: "Mislabelling") -> str:
     what = "no marker" if error.true is None else error.true
-    frames = f"frame {error.first}" if error.first == error.last else f"frames {error.first} to {error.last}"
+    first, last = error.first + 1, error.last + 1  # people count from 1, as --frames does
+    frames = f"frame {first}" if first == last else f"frames {first} to {last}"
     return f"{frames}: a point of {what} has the label {error.given}"
 
 

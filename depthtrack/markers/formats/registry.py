@@ -58,10 +58,14 @@ def write_capture(path: Path | str, capture: MarkerCapture) -> None:
 
 def find_format(path: Path) -> CaptureFormat:
     """Return the format of a file. Raises InputError if it is missing or of no known format."""
-    if not path.is_file():
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path} must be a file of a capture, found a folder or a device")
+    if not path.exists():
         raise InputError(f"there is no capture at {path}: no such file")
     with path.open("rb") as file:
         head = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
+    if not head:
+        raise InputError(f"{path} must hold a capture, found an empty file")
     for candidate in FORMATS:
         if candidate.matches(head):
             return candidate
