@@ -31,7 +31,6 @@ def write_synthetic_markers(
 
     Raises:
         InputError: if the folder exists and must not be replaced, or cannot be written.
-        MissingExtraError: if the capture is C3D and ezc3d is not installed.
     """
     check_names([model.name for model in synthetic.models])
     with new_folder(folder, SYNTHESIS_FILE, "a synthetic marker capture", overwrite) as work:

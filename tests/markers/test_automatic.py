@@ -72,5 +72,5 @@ def test_a_certain_start_ends_the_search(capture: MarkerCapture, monkeypatch: py
 
 def test_models_that_are_nowhere_are_named(capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(automatic, "initialise", lambda *_: StartedModels((None,)))
-    with pytest.raises(InputError, match="no model .box. was found in 7 frames"):
+    with pytest.raises(InputError, match=r"no model .box. was found in 7 frames"):
         find_start(replace(capture), [MODEL])

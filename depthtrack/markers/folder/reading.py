@@ -44,7 +44,6 @@ class MarkerFolder:
 
         Raises:
             InputError: if it is none, or a file is missing, malformed, or of other frames or markers.
-            MissingExtraError: if its trajectories are C3D and ezc3d is not installed.
         """
         contents = Contents.load(path)
         models = tuple(_model(path / MODELS / f"{name}.json", name) for name in contents.models)

@@ -50,7 +50,6 @@ def write_marker_folder(
 
     Raises:
         InputError: if the folder holds markers already, a name cannot be that of a file, or a file cannot be written.
-        MissingExtraError: if it is C3D and ezc3d is not installed.
     """
     check_unused(folder)
     if filled is not None:
