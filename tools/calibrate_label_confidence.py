@@ -1,4 +1,6 @@
-"""Fit the weights of `depthtrack/markers/labelling/confidence.py` to synthetic captures of seeds below 100.
+"""Fit the weights of the confidence of labels to synthetic captures of seeds below 100.
+
+They stand in `depthtrack/markers/labelling/confidence.py`.
 
 python tools/calibrate_label_confidence.py [SEED ...]
 """
@@ -36,7 +38,7 @@ def captures(seeds: list[int]) -> list[SyntheticMarkers]:
 
 
 def samples(made: SyntheticMarkers) -> list[tuple[Array, Mask]]:
-    """Return features (N, F) and whether the label is right (N,), of the online and the offline labels."""
+    """Return features (N, F) and whether the label is right (N,), online and offline."""
     options, truth = LabellingOptions(), np.concatenate(made.truth.columns, axis=1)
     points, models = PackedPoints.of(made.capture), made.truth.models
     scene, settings = Scene.of(models), Settings.of(options, made.capture.rate)

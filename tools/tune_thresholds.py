@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def measure_cost(cell: Cell) -> Row:
-    """Return the mean cost of the frames of a recording, mm, and the share without a trusted pose."""
+    """Return the mean cost of the frames, mm, and the share without a trusted pose."""
     folder, tracker, option, value = (cell[name] for name in SETTING)
     recording = {name: entry for name, entry in cell.items() if name not in SETTING}
     with made_recording(**recording) as sequence:

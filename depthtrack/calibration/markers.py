@@ -64,13 +64,18 @@ def calibrate_markers(
 ) -> CalibratedMarkers:
     """Return the hand of model k of a labelled capture with its offsets and sizes.
 
-    Poses that the capture lacks are fitted first. Samples of low confidence are left out.
+    Poses that the capture lacks are fitted first. Samples of low confidence are left out. So are all of their frames if
+    enough others remain: where one label is wrong, the label of its marker is on another point.
 
     Raises:
         InputError: if the model is a rigid body, or too few frames show enough markers.
     """
     options = options or MarkerCalibrationOptions()
     sure = labelled.confidence[k] >= options.least_confidence
+    doubtful = np.any((labelled.columns[k] >= 0) & ~sure, axis=1)
+    enough = max(options.least_share * sure.shape[1], 4)
+    if np.count_nonzero(sure[~doubtful].sum(axis=1) >= enough) >= options.inspected:
+        sure = sure & ~doubtful[:, None]
     positions = np.where(sure[..., None], labelled.positions(k), np.nan)
     return calibrate_on_positions(labelled.models[k], positions, labelled.poses[k], options)
 

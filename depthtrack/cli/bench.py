@@ -97,9 +97,9 @@ class Segment(_Benchmark):
 
 @dataclass(frozen=True)
 class Markers(_Benchmark):
-    """Measure frames per second of the online labelling of markers, from points to labels and poses, on one core.
+    """Measure frames per second of the online labelling of markers on one core.
 
-    The scenes are a hand of 26 markers, and two hands of 13 with three rigid bodies of 3.
+    It runs from points to labels and poses.     The scenes are a hand of 26 markers, and two hands of 13 with three rigid bodies of 3.
     """
 
     def run(self) -> None:

@@ -79,7 +79,7 @@ class MarkerTruth:
         return cls(str(path), samples, positions.selected(samples.labels), poses)
 
     def during(self, capture: MarkerCapture) -> "MarkerTruth":
-        """Return the truth about the frames of a part of the same recording, by the numbers of frames.
+        """Return the truth about a part of the same capture, by the numbers of frames.
 
         Raises:
             InputError: if it lacks some of them.

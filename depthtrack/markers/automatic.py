@@ -10,6 +10,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.markers.capture import MarkerCapture
+from depthtrack.markers.exchanges import exchange_markers
 from depthtrack.markers.initialisation.initialise import initialise
 from depthtrack.markers.initialisation.options import InitialisationOptions
 from depthtrack.markers.initialisation.started import StartedModels
@@ -68,11 +69,15 @@ def label_from(
 ) -> LabelledCapture:
     """Return the labels and poses of all frames, from the frame of a start in both directions.
 
+    Offline, markers that were exchanged while hidden are exchanged again.
+
     models: as `sized_models` returns them, or calibrated ones.
     started: as `find_start` returns it, or as it was saved.
     """
+    chosen = options or LabellingOptions()
     poses = [None if one is None else one.pose for one in started.models]
-    return label_capture(capture, models, options, poses, _starter, started.frame)
+    labelled = label_capture(capture, models, chosen, poses, _starter, started.frame)
+    return exchange_markers(labelled, chosen) if chosen.offline.use else labelled
 
 
 def _starter(points: Array, models: tuple[MarkerModel, ...]) -> tuple[Array | None, ...]:

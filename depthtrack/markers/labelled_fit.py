@@ -37,7 +37,7 @@ def fit_poses(labelled: LabelledCapture, options: LabellingOptions | None = None
     interpolated between other frames, or absent.
     """
     options = options or LabellingOptions()
-    starts = [_frame_poses(model, labelled.positions(k)) for k, model in enumerate(labelled.models)]
+    starts = [frame_poses(model, labelled.positions(k)) for k, model in enumerate(labelled.models)]
     points = PackedPoints.of(labelled.capture)
     number = _numbers(labelled, points)
     numbers = np.concatenate([_chosen(number, columns) for columns in labelled.columns], axis=1)
@@ -52,7 +52,7 @@ def fit_poses(labelled: LabelledCapture, options: LabellingOptions | None = None
     return replace(labelled, poses=tuple(np.moveaxis(fitted.poses, 1, 0).copy()))
 
 
-def _frame_poses(model: MarkerModel, positions: Array) -> Array:
+def frame_poses(model: MarkerModel, positions: Array) -> Array:
     """Return the pose (T, 27) of each frame alone; NaN with fewer than three markers.
 
     positions: (T, M, 3) metres, NaN if not measured.

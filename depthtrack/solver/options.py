@@ -50,10 +50,10 @@ class IcpOptions:
         unit="m^2/rad^2",
     )
     posture_weight: float = option(
-        1e-4,
+        0.0,
         "Weight of the prior that moves angles together as in common postures, per 3000 points; 0 uses none",
         unit="m^2",
-        source="tuning seeds of the cross-model benchmark, as the two options below",
+        source="1e-4 in the hybrid tracker by the tuning seeds of the cross-model benchmark, as the two options below",
     )
     posture_memory: float = option(
         5.0, "Time after which 37 % remain of an unobserved posture's distance from the mean posture", unit="s"
@@ -110,7 +110,6 @@ PAPER_ICP = IcpOptions(
     min_normal_cosine=(0.0, 0.0),
     damping=1e-6,
     temporal_weight=0.0,
-    posture_weight=0.0,
     synergy_weight=0.0,
     keypoint_weight=0.0,
     avoid_limits=True,

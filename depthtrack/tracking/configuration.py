@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from depthtrack.errors import InputError
 from depthtrack.options import check_seed, option
 from depthtrack.rendering.options import ScoringOptions
-from depthtrack.solver.options import PAPER_ICP, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
+from depthtrack.solver.options import PAPER_ICP, IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 from depthtrack.tracking.options import (
     BranchOptions,
     FingerOptions,
@@ -170,7 +170,7 @@ class HybridConfig:
     name: ClassVar[str] = "hybrid"
 
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=1e-4)), "Surface fit of each frame")
     search_points: int = option(
         3500, "Most points that the fits of searches use; 0: no limit", unit="points", advanced=True
     )

@@ -36,6 +36,7 @@ def test_labelling_begins_with_the_pose_and_the_frame_of_the_start(
 ) -> None:
     calls: list[tuple[Any, ...]] = []
     monkeypatch.setattr(automatic, "label_capture", lambda *arguments: calls.append(arguments))
+    monkeypatch.setattr(automatic, "exchange_markers", lambda labelled, options: labelled)
     monkeypatch.setattr(automatic, "initialise", lambda points, models: StartedModels((*started(0).models, None)))
     begin, options = started(7), LabellingOptions()
     other = body_with_markers()

@@ -142,8 +142,7 @@ def test_runs_of_earlier_versions_are_read() -> None:
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
     named = {"particles": 16, "seed": 3, "interval": 0.0, "refine": True, "surface_choice.surfaces": ("skin",)}
-    alone = {f"{fit}.icp.posture_weight": 0.0 for fit in ("final_fit", "swarm_search.fit")}
-    expected = with_options(CONFIGURATIONS["pso"](), named | alone)
+    expected = with_options(CONFIGURATIONS["pso"](), named)
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"
     assert found.context == {"label": "PSO"}

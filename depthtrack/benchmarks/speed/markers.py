@@ -1,4 +1,6 @@
-"""`depthtrack bench markers`: measure online labelling, from points to labels and poses, on one core.
+"""`depthtrack bench markers`: measure online labelling on one core.
+
+It runs from points to labels and poses.
 
 A frame is one call of the tracker: prediction, assignment, pose fit and status of all models. The captures are
 synthetic: 200 Hz, 0.5 mm noise, dropouts and ghosts. The settings are those of Maycock et al. 2015, Sec. V.

@@ -5,7 +5,7 @@ rendered energy decides which.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -67,8 +67,6 @@ def estimate_single_frame(
     pose: (27,) approximate global pose; its angles are ignored.
     """
     tools.set_target(observation)
-    # The synergies of the rounds are those given, so that no other postures attract the fit.
-    fit = replace(fit, icp=replace(fit.icp, posture_weight=0.0))
     scorer, fitter = tools.scorer_at(coarse_to_fine.resolution, observation), tools.fitter(fit, observation)
     generator = frame_generator(seed, observation.frame_index)
     poses = np.tile(np.asarray(pose, dtype=np.float64), (coarse_to_fine.samples, 1))

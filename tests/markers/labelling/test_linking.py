@@ -17,7 +17,7 @@ from depthtrack.types import Array
 
 
 def body(frames: int = 240) -> Array:
-    """Return a turning rigid body (T, 8, 3) of which markers vanish for up to 0.3 s."""
+    """Return a turning rigid body (T, 8, 3) whose markers vanish for up to 0.3 s."""
     rng = np.random.default_rng(1)
     shape, angle = rng.uniform(-0.2, 0.2, (8, 3)), np.linspace(0, 2, frames)
     R = rotation_matrix(quaternion_exp(np.stack([0 * angle, 0 * angle, angle], axis=-1)))

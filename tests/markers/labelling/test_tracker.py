@@ -1,4 +1,4 @@
-"""Online labelling: of whole hands, with missing markers and ghosts, and in the paper's configuration."""
+"""Online labelling: whole hands, missing markers, ghosts, the paper's configuration."""
 
 import numpy as np
 import pytest
