@@ -99,7 +99,8 @@ class Segment(_Benchmark):
 class Markers(_Benchmark):
     """Measure frames per second of the online labelling of markers on one core.
 
-    It runs from points to labels and poses.     The scenes are a hand of 26 markers, and two hands of 13 with three rigid bodies of 3.
+    It runs from points to labels and poses. The scenes are a hand of 26 markers, and two hands of 13 with three rigid
+    bodies of 3.
     """
 
     def run(self) -> None:
