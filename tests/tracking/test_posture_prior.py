@@ -23,7 +23,7 @@ FINGERS = [slice(4 * finger, 4 * finger + 4) for finger in range(5)]
 
 
 def test_the_prior_keeps_a_share_of_the_distance_from_the_mean_posture() -> None:
-    mean, options = common_postures().mean, IcpOptions()
+    mean, options = common_postures().mean, IcpOptions(posture_weight=1e-4)
     assert prior_near(FLAT, 1.0, options).mean == pytest.approx(FLAT, abs=1e-12)
     assert prior_near(FLAT, 0.0, options).mean == pytest.approx(mean)
     assert prior_near(FLAT, 0.25, options).mean == pytest.approx(0.75 * mean)
@@ -31,7 +31,7 @@ def test_the_prior_keeps_a_share_of_the_distance_from_the_mean_posture() -> None
 
 def test_a_hidden_finger_follows_its_neighbours() -> None:
     """The likeliest ring finger bends with a middle and a little finger that are measured bent."""
-    prior = prior_near(FLAT, 1.0, IcpOptions())
+    prior = prior_near(FLAT, 1.0, IcpOptions(posture_weight=1e-4))
     measured = np.zeros(20, dtype=np.bool_)
     measured[FINGERS[2]], measured[FINGERS[4]] = True, True
     bent = np.where(np.arange(20) % 4 > 0, 0.6, 0.0)
@@ -43,7 +43,7 @@ def test_a_hidden_finger_follows_its_neighbours() -> None:
 
 
 def test_without_a_weight_each_angle_is_held_alone() -> None:
-    options = IcpOptions(posture_weight=0.0)
+    options = IcpOptions()
     prior = prior_near(FLAT, 0.3, options)
     np.testing.assert_array_equal(prior.precision, options.temporal_weight * np.eye(20))
     np.testing.assert_array_equal(prior.mean, FLAT)
