@@ -96,18 +96,13 @@ class VideoWriter:
         """Return an encoder with the first codec that this build of OpenCV supports."""
         # FFmpeg reports every unsupported codec on stderr; it reads this variable once, at first use.
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-        level = cv2.utils.logging.getLogLevel()
-        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        try:
-            for codec in self.codecs:
-                fourcc = cv2.VideoWriter.fourcc(*codec)
-                with _silent_stderr():
-                    encoder = cv2.VideoWriter(str(self._temporary), fourcc, self.rate, (width, height))
-                if encoder.isOpened():
-                    return encoder
-                self._temporary.unlink(missing_ok=True)
-        finally:
-            cv2.utils.logging.setLogLevel(level)
+        for codec in self.codecs:
+            fourcc = cv2.VideoWriter.fourcc(*codec)
+            with _silent_stderr():
+                encoder = cv2.VideoWriter(str(self._temporary), fourcc, self.rate, (width, height))
+            if encoder.isOpened():
+                return encoder
+            self._temporary.unlink(missing_ok=True)
         raise InputError(
             f"this OpenCV ({cv2.__version__}) can encode none of {', '.join(self.codecs)} at {width}x{height}: "
             "install opencv-python-headless from PyPI, or write a contact sheet instead"
