@@ -27,7 +27,7 @@ class PredictionOptions:
     joint_speed: float = option(4.0, "Drift of a joint that moves no visible marker", unit="rad/s")
     joint_range: float = option(0.5, "Largest standard deviation of such a joint", unit="rad")
     determined: float = option(0.08, "Standard deviation of a joint that moves a visible marker", unit="rad")
-    palm_speed: float = option(0.5, "Drift of a model of which fewer than three markers are visible", unit="m/s")
+    palm_speed: float = option(0.5, "Drift of a model with fewer than three visible markers", unit="m/s")
     largest: float = option(0.06, "Largest standard deviation of a predicted position", unit="m")
     residual_gain: float = option(
         0.03, "Share of a new residual in the residual that is kept while a marker is missing"
