@@ -77,7 +77,7 @@ def label_from(
     chosen = options or LabellingOptions()
     poses = [None if one is None else one.pose for one in started.models]
     labelled = label_capture(capture, models, chosen, poses, _starter, started.frame)
-    return exchange_markers(labelled, chosen) if chosen.offline.use else labelled
+    return exchange_markers(labelled, chosen) if chosen.offline.use and chosen.offline.exchange > 0 else labelled
 
 
 def _starter(points: Array, models: tuple[MarkerModel, ...]) -> tuple[Array | None, ...]:

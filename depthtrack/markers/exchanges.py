@@ -13,7 +13,7 @@ import numpy as np
 
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.labelled_fit import fit_poses, frame_poses
-from depthtrack.markers.labelling.options import LabellingOptions
+from depthtrack.markers.labelling.options import LabellingOptions, OfflineOptions
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Index, Mask
 
@@ -21,12 +21,6 @@ _SAMPLED = 20
 """Frames of a stretch that are fitted, at most."""
 _SHORTEST = 5
 """Frames of a stretch, at least."""
-_ELEVATED = 3.0
-"""A stretch is fitted if the mean residual of a marker is more than this multiple of its usual one."""
-_LEAST = 0.002
-"""The mean residual of such a stretch, metres, at least."""
-_GAIN = 0.5
-"""Ratio of the mean squared residuals of both fingers below which their markers are exchanged."""
 
 
 def exchange_markers(labelled: LabelledCapture, options: LabellingOptions | None = None) -> LabelledCapture:
@@ -34,6 +28,7 @@ def exchange_markers(labelled: LabelledCapture, options: LabellingOptions | None
 
     Its poses fit the labels then, see `labelled_fit.fit_poses`.
     """
+    chosen = options or LabellingOptions()
     columns = tuple(rows.copy() for rows in labelled.columns)
     confidence = tuple(rows.copy() for rows in labelled.confidence)
     changed = False
@@ -41,20 +36,20 @@ def exchange_markers(labelled: LabelledCapture, options: LabellingOptions | None
         if model.is_rigid:
             continue
         residuals, positions = labelled.residuals(k), labelled.positions(k)
-        usual = np.nanquantile(residuals, 0.25, axis=0) if np.isfinite(residuals).any() else np.zeros(len(model.labels))
+        usual = np.array([_usual(each) for each in residuals.T])
         for i, j in combinations(np.flatnonzero(model.bodies > 0).tolist(), 2):
             pair = [i, j]
             for stretch in _stretches(columns[k][:, pair] >= 0):
-                if not _is_suspect(residuals[stretch][:, pair], usual[pair]):
+                if not _is_suspect(residuals[stretch][:, pair], usual[pair], chosen.offline):
                     continue
-                if _fits_better(model, positions[stretch], i, j):
+                if _fits_better(model, positions[stretch], i, j, chosen.offline.exchange):
                     rows = stretch[:, None]
                     for table in (columns[k], confidence[k], positions):
                         table[rows, pair] = table[rows, pair[::-1]]
                     residuals[rows, pair] = np.nan
                     changed = True
     exchanged = replace(labelled, columns=columns, confidence=confidence)
-    return fit_poses(exchanged, options) if changed else labelled
+    return fit_poses(exchanged, chosen) if changed else labelled
 
 
 def _stretches(seen: Mask) -> Iterator[Index]:
@@ -71,18 +66,27 @@ def _stretches(seen: Mask) -> Iterator[Index]:
                 yield run
 
 
-def _is_suspect(residuals: Array, usual: Array) -> bool:
+def _usual(residuals: Array) -> float:
+    """Return the lower quartile of residuals (T,), metres; 0 if none is known."""
+    known = residuals[np.isfinite(residuals)]
+    return float(np.quantile(known, 0.25)) if len(known) else 0.0
+
+
+def _is_suspect(residuals: Array, usual: Array, options: OfflineOptions) -> bool:
     """Return whether a marker is farther from the hand in a stretch than usual.
 
     residuals: (S, 2) metres, NaN if missing.
     """
     known = np.isfinite(residuals)
     means = np.where(known, residuals, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return bool(np.any(means > np.maximum(_ELEVATED * usual, _LEAST)))
+    return bool(np.any(means > np.maximum(options.suspect_ratio * usual, options.suspect_residual)))
 
 
-def _fits_better(model: MarkerModel, positions: Array, i: int, j: int) -> bool:
-    """Return whether the hand fits positions (S, M, 3) better with i and j exchanged."""
+def _fits_better(model: MarkerModel, positions: Array, i: int, j: int, ratio: float) -> bool:
+    """Return whether the hand fits positions (S, M, 3) better with i and j exchanged.
+
+    ratio: of the mean squared residuals of both fingers, below which it does.
+    """
     frames = np.unique(np.linspace(0, len(positions) - 1, min(len(positions), _SAMPLED)).astype(int))
     given = positions[frames]
     exchanged = given.copy()
@@ -92,7 +96,7 @@ def _fits_better(model: MarkerModel, positions: Array, i: int, j: int) -> bool:
     before, after = (_squares(model, each)[:, both] for each in (given, exchanged))
     if not (np.isfinite(before).any() and np.isfinite(after).any()):
         return False
-    return bool(np.nanmean(after) < _GAIN * np.nanmean(before))
+    return bool(np.nanmean(after) < ratio * np.nanmean(before))
 
 
 def _squares(model: MarkerModel, positions: Array) -> Array:

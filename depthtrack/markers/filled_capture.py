@@ -61,7 +61,7 @@ class FilledCapture:
     positions: (T, M, 3) metres, capture frame; NaN where a gap stays.
     how: (T, M) `Filling` of each sample.
     expected_error: (T, M) metres, root mean square distance from the true position; NaN unless filled.
-    poses: (T, 27) capture frame; those of the filled frames are consistent with the filled positions.
+    poses: (T, 27) capture frame; those of filled frames are of the smoothed motion, near the filled positions.
     """
 
     labelled: LabelledCapture

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
+from depthtrack.cli.markers.capture_options import CaptureOptions
+from depthtrack.cli.markers.folder_options import FolderOptions
 from depthtrack.errors import InputError
 from depthtrack.markers.labelling.options import PAPER_LABELLING, LabellingOptions, OfflineOptions
 
@@ -46,3 +48,20 @@ class LabellingArguments:
     def chosen(self, values: Any) -> LabellingOptions:
         """Return the options that the command line chose. Raises InputError if one is out of range."""
         return chosen_config(self._options, values, PREFIX)
+
+
+def labelling_command(base: type[Any], arguments: Sequence[str]) -> tuple[type[Any], Any]:
+    """Return a command with the options of the labelling, and its default values.
+
+    base: dataclass with a capture, a folder, and a property `labelling` to replace.
+
+    Raises:
+        InputError: if the arguments name no method.
+    """
+    labelling = LabellingArguments(arguments)
+    namespace = {
+        "__doc__": base.__doc__,
+        "labelling": property(lambda self: labelling.chosen(self.options)),
+    }
+    Command = dataclasses.make_dataclass("Command", [labelling.field], bases=(base,), frozen=True, namespace=namespace)
+    return Command, Command(capture=CaptureOptions(tyro.MISSING), folder=FolderOptions(tyro.MISSING))

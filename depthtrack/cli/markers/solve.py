@@ -1,14 +1,14 @@
 """`depthtrack markers solve`: poses and sizes of hands from a capture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import tyro
 
 from depthtrack.cli.markers.capture_options import CaptureOptions
 from depthtrack.cli.markers.folder_options import FolderOptions
-from depthtrack.cli.markers.labelling_options import LabellingArguments
+from depthtrack.cli.markers.labelling_options import labelling_command
 from depthtrack.cli.markers.model_options import ModelOptions
 from depthtrack.cli.markers.start_options import StartOptions
 from depthtrack.markers.labelling.options import LabellingOptions
@@ -83,10 +83,4 @@ def command(arguments: Sequence[str]) -> tuple[type[SolveCommand], Any]:
     Raises:
         InputError: if there is no such method.
     """
-    labelling = LabellingArguments(arguments)
-    namespace = {
-        "__doc__": SolveCommand.__doc__,
-        "labelling": property(lambda self: labelling.chosen(self.options)),
-    }
-    Command = make_dataclass("Command", [labelling.field], bases=(SolveCommand,), frozen=True, namespace=namespace)
-    return Command, Command(capture=CaptureOptions(tyro.MISSING), folder=FolderOptions(tyro.MISSING))
+    return labelling_command(SolveCommand, arguments)

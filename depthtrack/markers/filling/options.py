@@ -78,9 +78,6 @@ class PcaFillOptions:
     )
     weight_scale: float = option(0.2, "Distance over which the weight of a marker falls", unit="m", source=_GLOERSEN)
     missing_weight: float = option(0.02, "Weight of the missing markers", source=_GLOERSEN)
-    distal_threshold: float = option(
-        0.5, "R2 uses no marker with gaps farther away than this share of the mean distance", source=_GLOERSEN
-    )
     variance_share: float = option(0.99, "Share of the summed singular values that is kept", source=_GLOERSEN)
 
 

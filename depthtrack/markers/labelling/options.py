@@ -86,6 +86,13 @@ class OfflineOptions:
     rounds: int = option(6, "Rounds of pose fits and assignments of tracklets, at most")
     split: float = option(60.0, "Log-likelihood ratio from which on a tracklet of two markers is cut")
     adopt: float = option(0.1, "Shortest tracklet without a label that is tried as a marker by a fit", unit="s")
+    suspect_ratio: float = option(
+        3.0, "Multiple of a marker's usual residual from which on its exchange with another one is tried"
+    )
+    suspect_residual: float = option(0.002, "Least residual at which an exchange is tried", unit="m")
+    exchange: float = option(
+        0.5, "Ratio of the squared residuals below which two markers are exchanged; 0: never exchange"
+    )
     link_gate: float = option(3.0, "Largest distance of a link between frames", unit="standard deviations")
     link_clear: float = option(2.0, "By how much farther the next best link must be", unit="standard deviations")
     link_speed: float = option(0.3, "Standard deviation of the speed of a point without a known motion", unit="m/s")
@@ -110,6 +117,8 @@ class LabellingOptions:
             raise InputError(
                 f"probabilities must be between 0 and 1, found seen_again {a.seen_again} and reappears {a.reappears}"
             )
+        if not 0 <= self.offline.exchange <= 1:
+            raise InputError(f"the ratio of an exchange must be from 0 to 1, found {self.offline.exchange}")
         if not (1 <= f.iterations <= 1000 and 1 <= self.offline.rounds <= 100):
             raise InputError(
                 "iterations must be between 1 and 1000, and rounds between 1 and 100, "
