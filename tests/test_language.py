@@ -46,6 +46,7 @@ REWRITTEN = (
     "README.md",
     "examples/README.md",
     "docs/benchmarks.md",
+    "docs/exports.md",
     "docs/joints.md",
     "docs/keypoints.md",
     "docs/limitations.md",

@@ -12,22 +12,20 @@ from depthtrack.export.registry import EXPORTERS, export_joints, suffixes
 
 @dataclass(frozen=True)
 class Command:
-    """Write the pose and the 21 keypoints of each frame of a run.
+    """Write the poses and joints of a run for other programs.
 
-    Keypoints are in MediaPipe order, in metres, in the camera frame (x right, y down, z forward). Those of markers are
-    in the frame of the capture.
+    Tables and arrays hold 21 keypoints in MediaPipe order, in metres, in the camera frame (x right, y down, z forward).
+    docs/exports.md states joints, frame and units of each format. Runs of markers are in the frame of the capture.
     """
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
     """Run folder from `depthtrack track`, or that of a hand in a folder from `depthtrack markers`."""
     out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
-    """File to write: a table, numpy arrays, angles for OpenSim (.mot), or a benchmark's text (u v d of joints)."""
+    """File to write. Its suffix chooses the format, --format among those that share a suffix."""
     format: Annotated[str | None, stated_default(metavar="|".join(EXPORTERS))] = None
-    """Format of the file (default: by its suffix). A .txt file needs the benchmark whose joints and camera it uses."""
+    """Format of the file (default: the one named as its suffix, or the only one with it)."""
 
     def run(self) -> None:
-        import numpy as np
-
         from depthtrack.evaluation.replay import run_hand
         from depthtrack.export.joint_track import JointTrack
         from depthtrack.markers.folder.contents import run_folder
@@ -36,5 +34,4 @@ class Command:
         run = Run.load(run_folder(self.path))
         track = JointTrack.of(run, run_hand(run))
         export_joints(self.out, track, self.format)
-        posed = int(np.isfinite(track.poses).all(axis=1).sum())
-        print(f"wrote {self.out}: {len(track.index)} frames, {posed} with a pose")
+        print(f"wrote {self.out}: {len(track.index)} frames, {int(track.posed.sum())} with a pose")

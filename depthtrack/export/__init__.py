@@ -1,4 +1,4 @@
 """Export of a run's poses and joints to tables, arrays and the files of public benchmarks.
 
-One module a format. `docs/joints.md` lists the names, their order, the frame and the units.
+One module a format. `docs/exports.md` states the names, their order, the frame and the units.
 """

@@ -1,13 +1,16 @@
 """The poses and keypoints of a run, for export."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self
 
+import numpy as np
+
+from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.status import Status
-from depthtrack.types import Array, Index
+from depthtrack.types import Array, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -20,9 +23,10 @@ class JointTrack:
     energy, agreement, confidence: (T,) of the poses, see `RunRow`.
     visibility: (T, 5) share of each finger that is visible.
     spread: (T, 21) of the keypoints, metres, see `RunRow`.
-    poses: (T, 27) metres, quaternion, radians, camera frame.
-    keypoints: (T, 21, 3) metres, camera frame, in MediaPipe's order.
+    poses: (T, 27) metres, quaternion, radians.
+    keypoints: (T, 21, 3) metres, in MediaPipe's order.
     hand: the hand of the poses.
+    frame: "camera" if poses and keypoints are in the camera frame, "capture" if in that of a capture of markers.
     """
 
     index: Index
@@ -36,10 +40,22 @@ class JointTrack:
     poses: Array
     keypoints: Array
     hand: HandShape
+    frame: Literal["camera", "capture"] = "camera"
 
     @classmethod
     def of(cls, run: Run, hand: HandShape) -> Self:
         """Return the poses of a run with the keypoints of its hand."""
         keypoints = HandModel(hand).keypoints(run.poses)
         figures = (run.energy, run.agreement, run.confidence, run.visibility, run.spread)
-        return cls(run.index, run.timestamps, run.status, *figures, run.poses, keypoints, hand)
+        frame: Literal["camera", "capture"] = "capture" if run.configuration.get("tracker") == "markers" else "camera"
+        return cls(run.index, run.timestamps, run.status, *figures, run.poses, keypoints, hand, frame)
+
+    @property
+    def posed(self) -> Mask:
+        """Whether each frame (T,) has a pose."""
+        return np.asarray(np.isfinite(self.poses).all(axis=1))
+
+    def check_posed(self) -> None:
+        """Raise InputError if no frame has a pose."""
+        if not self.posed.any():
+            raise InputError("no frame of the run has a pose: there is nothing to export in this format")

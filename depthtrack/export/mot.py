@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from depthtrack.errors import InputError
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import write_atomic
 from depthtrack.hand.pose import ANGLE_NAMES, ANGLES, ORIENTATION, POSITION
@@ -28,9 +27,8 @@ def write(track: JointTrack, path: Path) -> None:
     Raises:
         InputError: if no frame has a pose, or the file cannot be written.
     """
-    posed = np.isfinite(track.poses).all(axis=1)
-    if not posed.any():
-        raise InputError(f"cannot write {path}: no frame of the run has a pose")
+    track.check_posed()
+    posed = track.posed
     poses = track.poses[posed]
     degrees = np.degrees(poses[:, ANGLES])
     table = np.column_stack([track.timestamps[posed], palm_rotations(poses), poses[:, POSITION], degrees])

@@ -50,6 +50,12 @@ def _mot() -> Write:
     return write
 
 
+def _xr(name: str) -> Write:
+    from depthtrack.export.xr_joints import OPENXR, WEBXR, write
+
+    return partial(write, {"openxr": OPENXR, "webxr": WEBXR}[name])
+
+
 def _benchmark(name: str) -> Write:
     from depthtrack.export.benchmark_joints import find_benchmark
     from depthtrack.export.uvd import write
@@ -61,6 +67,8 @@ EXPORTERS = {
     "csv": Exporter((".csv",), "a table", _csv),
     "npz": Exporter((".npz",), "numpy arrays", _npz),
     "mot": Exporter((".mot",), "joint angles for OpenSim", _mot),
+    "openxr": Exporter((".json", ".csv"), "the 26 joints of OpenXR", partial(_xr, "openxr")),
+    "webxr": Exporter((".json", ".csv"), "the 25 joints of WebXR", partial(_xr, "webxr")),
     "nyu": Exporter((".txt",), "u v d of NYU's joints", partial(_benchmark, "nyu")),
     "icvl": Exporter((".txt",), "u v d of ICVL's joints", partial(_benchmark, "icvl")),
     "msra": Exporter((".txt",), "u v d of MSRA's joints", partial(_benchmark, "msra")),
@@ -74,7 +82,9 @@ def suffixes() -> list[str]:
 
 
 def find_exporter(path: Path, name: str | None = None) -> Exporter:
-    """Return the exporter of a format, by default the only one with the suffix of `path`.
+    """Return the exporter of a format.
+
+    name: by default the format named as the suffix of `path`, or the only one with it.
 
     Raises:
         InputError: if there is no such format, its files end otherwise, or several formats share the suffix.
@@ -85,6 +95,8 @@ def find_exporter(path: Path, name: str | None = None) -> Exporter:
     fitting = [each for each, exporter in EXPORTERS.items() if suffix in exporter.suffixes]
     if not fitting:
         raise InputError(f"an export must end in {', '.join(suffixes())}, found '{path.name}'")
+    if name is None and suffix[1:] in fitting:
+        name = suffix[1:]
     if name is None and len(fitting) > 1:
         raise InputError(f"several formats end in {suffix}: choose one by --format {', '.join(fitting)}")
     chosen = fitting[0] if name is None else name
@@ -95,7 +107,7 @@ def find_exporter(path: Path, name: str | None = None) -> Exporter:
 
 
 def export_joints(path: Path, track: "JointTrack", name: str | None = None) -> None:
-    """Write a track to a file of a format, by default the only one with the suffix of `path`.
+    """Write a track to a file of a format, see `find_exporter`.
 
     Raises:
         InputError: if the format does not fit the path or the file cannot be written.
