@@ -1,11 +1,11 @@
-"""Particle swarm optimisation in a box (Oikonomidis et al. 2011, Sec. 2.4).
+"""Particle swarm optimisation in a domain (Oikonomidis et al. 2011, Sec. 2.4).
 
 Constriction PSO after Clerc and Kennedy 2002, "nearest point" bounds after Helwig and Wanka 2007. Partial
 randomisation after Yasuda et al. 2010 keeps the fingers from collapsing into the first minimum.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -37,39 +37,83 @@ class Optimum(NamedTuple):
         return float(self.energies[self.best])
 
 
+class Domain(Protocol):
+    """Where the particles of a swarm may be, and how they move there."""
+
+    def confined(self, particles: Array) -> Array:
+        """Return the positions (N, D) of the domain nearest to given ones."""
+        ...
+
+    def advance(
+        self, position: Array, velocity: Array, own_best: Array, best: Array, draws: Array, options: SwarmOptions
+    ) -> None:
+        """Move all particles one step, in place; see `advance`."""
+        ...
+
+    def randomise(self, position: Array, best: Array, generator: np.random.Generator, options: SwarmOptions) -> None:
+        """Replace a part of some positions (N, D) by random values, in place.
+
+        best: (D,) of the swarm.
+        """
+        ...
+
+
+class Box(NamedTuple):
+    """A box, some of whose dimensions may be randomised.
+
+    lower, upper: (D,) bounds.
+    fingers: dimensions that may be randomised.
+    """
+
+    lower: Array
+    upper: Array
+    fingers: slice
+
+    def confined(self, particles: Array) -> Array:
+        return np.clip(particles, self.lower, self.upper)
+
+    def advance(
+        self, position: Array, velocity: Array, own_best: Array, best: Array, draws: Array, options: SwarmOptions
+    ) -> None:
+        weights = (options.cognitive, options.social, options.inertia)
+        advance(position, velocity, own_best, best, draws, self.lower, self.upper, *weights)
+
+    def randomise(self, position: Array, best: Array, generator: np.random.Generator, options: SwarmOptions) -> None:
+        randomise(position, best, self.lower, self.upper, self.fingers, generator, options)
+
+
 def minimise(
     score: Callable[[Array], Array],
     particles: Array,
-    lower: Array,
-    upper: Array,
-    fingers: slice,
+    domain: Domain,
     generator: np.random.Generator,
     options: SwarmOptions,
+    progress: Callable[[float], None] = lambda energy: None,
 ) -> Optimum:
-    """Return the optimum of a swarm within a box.
+    """Return the optimum of a swarm within a domain.
 
     score: returns energies (N,) of positions (N, D).
     particles: (N, D) positions of the first generation.
-    lower, upper: (D,) bounds of the box.
-    fingers: dimensions that may be randomised.
+    progress: receives the least energy after each generation.
 
     The number of evaluations is N times `options.generations`. Equal generator states give equal bits.
     """
-    position = np.clip(particles, lower, upper)
+    position = domain.confined(particles)
     velocity = np.zeros_like(position)
     energy = score(position)
     own_best, own_energy = position.copy(), energy.copy()
     best = int(np.argmin(own_energy))
+    progress(float(own_energy[best]))
     for generation in range(1, options.generations):
         draws = generator.random((2, *position.shape))
-        weights = (options.cognitive, options.social, options.inertia)
-        advance(position, velocity, own_best, own_best[best], draws, lower, upper, *weights)
+        domain.advance(position, velocity, own_best, own_best[best], draws, options)
         if options.randomise_every and generation % options.randomise_every == 0:
-            randomise(position, own_best[best], lower, upper, fingers, generator, options)
+            domain.randomise(position, own_best[best], generator, options)
         energy = score(position)
         better = energy < own_energy
         own_best[better], own_energy[better] = position[better], energy[better]
         best = int(np.argmin(own_energy))
+        progress(float(own_energy[best]))
     return Optimum(own_best, own_energy, best)
 
 

@@ -11,7 +11,7 @@ from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, retract, tangent_between
 from depthtrack.solver.options import SwarmOptions, constriction
-from depthtrack.solver.swarm import advance, minimise, randomise
+from depthtrack.solver.swarm import Box, advance, minimise, randomise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid
 
@@ -63,7 +63,7 @@ def test_a_swarm_finds_a_minimum_within_its_bounds() -> None:
         return ((x - centre) ** 2).sum(axis=1)
 
     options = SwarmOptions(particles=40, generations=60)
-    found = minimise(score, rng.uniform(-3, 3, (40, 4)), lower, upper, slice(2, 4), rng, options)
+    found = minimise(score, rng.uniform(-3, 3, (40, 4)), Box(lower, upper, slice(2, 4)), rng, options)
     np.testing.assert_allclose(found.position, [0.3, -0.2, 1.0, 0.1], atol=1e-2)
     assert found.energy == score(found.position[None])[0]
     assert sum(evaluated) == 40 * 60 + 1
@@ -73,9 +73,8 @@ def test_the_same_generator_gives_the_same_bits() -> None:
     def run() -> np.ndarray:
         rng = np.random.Generator(np.random.Philox(key=[5, 7]))
         start = rng.normal(size=(12, 26))
-        return minimise(
-            lambda x: (x**2).sum(axis=1), start, np.full(26, -1.0), np.full(26, 1.0), slice(6, 26), rng, SwarmOptions()
-        ).position
+        box = Box(np.full(26, -1.0), np.full(26, 1.0), slice(6, 26))
+        return minimise(lambda x: (x**2).sum(axis=1), start, box, rng, SwarmOptions()).position
 
     np.testing.assert_array_equal(run(), run())
 

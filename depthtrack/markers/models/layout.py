@@ -1,7 +1,7 @@
-"""Marker layouts on the skin of a hand of any size.
+"""Marker layouts on the skin of a hand of any size, and their JSON files.
 
-A marker has a bone, a share of the bone's length and an angle about it. Its centre is on the ray from that point of
-the bone at which the skin is one marker radius away. The skin is the solid of `hand.skin.implicit`.
+The centre of a marker is on its ray (`skin_marker`), one marker radius away from the skin. The skin is the solid of
+`hand.skin.implicit`.
 """
 
 from collections.abc import Mapping
@@ -12,56 +12,19 @@ from typing import Any, Self
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_json
-from depthtrack.hand.kinematics import body_of
-from depthtrack.hand.pose import FINGERS
+from depthtrack.files import compact_json, read_json
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.implicit import ImplicitHand
 from depthtrack.markers.models.marker_model import MAX_MARKERS, MarkerModel
+from depthtrack.markers.models.skin_marker import SkinMarker, marker_ray
 from depthtrack.resources import resource_folder
 from depthtrack.types import Array
 
-BONES: Mapping[str, tuple[int, int]] = {
-    f"{finger}_{bone}": (f, phalanx)
-    for f, finger in enumerate(FINGERS)
-    for phalanx, bone in (
-        enumerate(("metacarpal", "proximal", "distal"))
-        if finger == "thumb"
-        else enumerate(("metacarpal", "proximal", "middle", "distal"), -1)
-    )
-}
-"""Finger and phalanx of each bone; phalanx -1 is a metacarpal in the palm, which runs from the wrist to its knuckle."""
 _FARTHEST = 0.06
 """Largest distance of a marker from its bone, metres, in a hand of scale 1."""
 _STEP = 0.0005
 """Distance of the samples that bracket the skin, metres."""
 _SECANTS = 4
-
-
-@dataclass(frozen=True)
-class SkinMarker:
-    """A marker on the skin.
-
-    bone: one of `BONES`.
-    along: share of the bone from its near end, 0 to 1.
-    around: angle about the bone, radians; 0 is the back of the hand or the nail's side.
-        It grows towards the side of the thumb; for the thumb, towards its palmar side.
-    spread: standard deviation of the marker's position on a subject, metres, each axis.
-    """
-
-    label: str
-    bone: str
-    along: float
-    around: float
-    spread: float
-
-    def __post_init__(self) -> None:
-        if self.bone not in BONES:
-            raise InputError(f"marker '{self.label}': the bone must be one of {', '.join(BONES)}, found {self.bone!r}")
-        if not 0 <= self.along <= 1 or not abs(self.around) <= np.pi or not 0 <= self.spread <= 0.05:
-            raise InputError(
-                f"marker '{self.label}': along must lie between 0 and 1, around within 180 degrees, spread below 50 mm"
-            )
 
 
 @dataclass(frozen=True)
@@ -90,11 +53,13 @@ class Layout:
             InputError: if a marker finds no skin, because the hand's proportions are too unusual.
         """
         solid = ImplicitHand.of(hand)
-        starts, directions = (np.array(rows) for rows in zip(*(_ray(solid, m) for m in self.markers), strict=True))
+        starts, directions = (
+            np.array(rows) for rows in zip(*(marker_ray(solid, m) for m in self.markers), strict=True)
+        )
         distance = _crossings(solid, starts, directions, self.radius / hand.scale)
         for marker in (m for m, found in zip(self.markers, distance, strict=True) if not np.isfinite(found)):
             raise InputError(f"marker '{marker.label}' finds no skin above {marker.along:g} of the {marker.bone}")
-        bodies = np.array([body_of(*BONES[m.bone]) if BONES[m.bone][1] >= 0 else 0 for m in self.markers])
+        bodies = np.array([marker.body for marker in self.markers])
         T_palm_body = solid.bones[bodies]
         lever = starts + distance[:, None] * directions - T_palm_body[:, :3, 3]
         local = np.einsum("nij,ni->nj", T_palm_body[:, :3, :3], lever)
@@ -106,6 +71,22 @@ class Layout:
             spread=np.array([m.spread for m in self.markers]),
             hand=hand,
         )
+
+    def to_json(self) -> str:
+        """Return the text of the layout's file, lengths in millimetres and angles in degrees."""
+        rows = [
+            {
+                "label": marker.label,
+                "bone": marker.bone,
+                "along": round(marker.along, 4),
+                "around_deg": round(float(np.degrees(marker.around)), 2),
+                "spread_mm": round(1000 * marker.spread, 3),
+            }
+            for marker in self.markers
+        ]
+        spread = round(1000 * max(marker.spread for marker in self.markers), 3)
+        radius = round(1000 * self.radius, 3)
+        return compact_json({"about": self.about, "radius_mm": radius, "spread_mm": spread, "markers": rows})
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
@@ -178,31 +159,6 @@ def _included(name: str) -> Path:
     if name not in layout_names():
         raise InputError(f"unknown marker layout '{name}': use {', '.join(layout_names())} or the path of a .json file")
     return resource_folder("markers/models/layouts") / f"{name}.json"
-
-
-def _ray(solid: ImplicitHand, marker: SkinMarker) -> tuple[Array, Array]:
-    """Return the start (3,), metres, and direction (3,) of a marker's ray, palm frame at rest."""
-    finger, phalanx = BONES[marker.bone]
-    if phalanx >= 0:
-        T = solid.bones[body_of(finger, phalanx)]
-        start, axes = T[:3, 3] + marker.along * solid.shape.lengths[finger, phalanx] * T[:3, 1], T[:3, :3]
-    else:
-        root, knuckle = _carpal_root(solid.shape, finger), solid.shape.bases[finger]
-        start, axes = root + marker.along * (knuckle - root), _frame(knuckle - root)
-    return start, np.sin(marker.around) * axes[:, 0] - np.cos(marker.around) * axes[:, 2]
-
-
-def _carpal_root(shape: HandShape, finger: int) -> Array:
-    """Return the point (3,) at the wrist where a metacarpal begins, palm frame, metres."""
-    return shape.wrist + np.array([(0.45, 0.15, -0.15, -0.45)[finger - 1] * shape.wrist_breadth / 2, 0, 0])
-
-
-def _frame(axis: Array) -> Array:
-    """Return the axes of a metacarpal as columns (3, 3): x to the thumb, y along it, z palmar."""
-    y = axis / np.linalg.norm(axis)
-    x = np.cross(y, [0, 0, 1])
-    x /= np.linalg.norm(x)
-    return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def _crossings(solid: ImplicitHand, starts: Array, directions: Array, radius: float) -> Array:

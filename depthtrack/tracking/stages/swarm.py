@@ -9,7 +9,7 @@ import numpy as np
 from depthtrack.hand.pose import POSITION, retract
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.options import SwarmOptions
-from depthtrack.solver.swarm import minimise
+from depthtrack.solver.swarm import Box, minimise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
@@ -35,7 +35,7 @@ def run_swarm(
         least[better], agreement[better] = scores.energy[better], scores.agreement[better]
         return scores.energy
 
-    found = minimise(score, particles, space.lower, space.upper, space.fingers, generator, options)
+    found = minimise(score, particles, Box(space.lower, space.upper, space.fingers), generator, options)
     rows = zip(space.poses(found.positions), found.energies.tolist(), agreement.tolist(), strict=True)
     return by_energy(Candidate(*row) for row in rows)
 

@@ -1,0 +1,65 @@
+"""Greedy choice of markers, and exchange of single markers (Schroeder et al. 2015, Sec. 6).
+
+The paper adapts farthest-point optimisation (Schloemer, Heck and Deussen 2011) in these two steps.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from depthtrack.markers.layout.quality import LayoutQuality
+from depthtrack.markers.layout.surface_swarm import FoundLayout
+from depthtrack.types import Index
+
+_LEAST_GAIN = 1e-12
+"""Relative decrease of the energy that an exchange must bring."""
+
+Progress = Callable[[float], None]
+
+
+def greedy_layout(
+    quality: LayoutQuality, count: int, pool: ThreadPoolExecutor | None = None, progress: Progress = lambda energy: None
+) -> FoundLayout:
+    """Return the layout of the greedy baseline: markers added and exchanged one by one."""
+    return exchanged(quality, added(quality, count, pool), pool, progress)
+
+
+def added(quality: LayoutQuality, count: int, pool: ThreadPoolExecutor | None = None) -> Index:
+    """Return the layout (count,) that grows by the marker with the least energy.
+
+    A layout too small to determine the parameters has the largest condition number, so its distance alone decides.
+    """
+    every = np.arange(len(quality.candidates))
+    # The first marker is the one farthest from the wrist; without others it has no distance.
+    rest = quality.candidates.rest
+    chosen = np.array([int(np.argmax(np.linalg.norm(rest - quality.candidates.hand.wrist, axis=1)))])
+    while len(chosen) < count:
+        grown = np.concatenate([np.broadcast_to(chosen, (len(every), len(chosen))), every[:, None]], axis=1)
+        chosen = np.append(chosen, int(np.argmin(quality.energies(grown, None, pool))))
+    return chosen
+
+
+def exchanged(
+    quality: LayoutQuality,
+    start: Index,
+    pool: ThreadPoolExecutor | None = None,
+    progress: Progress = lambda energy: None,
+) -> FoundLayout:
+    """Return the layout that no exchange of one marker improves, reached from `start` (K,).
+
+    Each marker in turn gets the best place. progress: receives the energy after each exchange that was tried.
+    """
+    layout, every = np.array(start, dtype=np.int64), np.arange(len(quality.candidates))
+    energy, tried, k = float(quality.energies(layout[None])[0]), 0, 0
+    while tried < len(layout):
+        others = np.repeat(layout[None], len(every), axis=0)
+        others[:, k] = every
+        found = quality.energies(others, np.full(len(every), energy - _LEAST_GAIN * abs(energy)), pool)
+        best = int(np.argmin(found))
+        tried += 1
+        if np.isfinite(found[best]):
+            layout[k], energy, tried = best, float(found[best]), 1
+        progress(energy)
+        k = (k + 1) % len(layout)
+    return FoundLayout(layout, energy)
