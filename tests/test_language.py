@@ -47,6 +47,7 @@ REWRITTEN = (
     "examples/README.md",
     "docs/benchmarks.md",
     "docs/exports.md",
+    "docs/formats.md",
     "docs/joints.md",
     "docs/keypoints.md",
     "docs/limitations.md",

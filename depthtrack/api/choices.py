@@ -8,6 +8,7 @@ from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.hand_choice import AVERAGE, chosen_hand
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
@@ -25,12 +26,18 @@ None measures the hand where one is tracked, else it is the average one.
 
 
 def open_recording(
-    path: Path | str, camera: Camera | Path | str | None = None, on_damage: OnDamage = "refuse"
+    path: Path | str,
+    camera: Camera | Path | str | None = None,
+    on_damage: OnDamage = "refuse",
+    *,
+    depth_topic: str | None = None,
+    colour_topic: str | None = None,
 ) -> Sequence:
     """Open a recording; frames are read one at a time.
 
     camera: camera to use instead of the recording's own: a `Camera`, a preset such as "tum", or a `camera.json`.
     on_damage: "refuse" raises an error at a frame that cannot be read, "skip" leaves it out.
+    depth_topic, colour_topic: topics of the images in a bag; those found by their type if absent.
 
     Raises:
         InputError: `path` holds no recording, or its camera is unknown.
@@ -43,7 +50,7 @@ def open_recording(
         camera = PRESETS[camera]
     elif isinstance(camera, str | Path):
         camera = Camera.from_json(Path(camera))
-    return open_sequence(path, camera, on_damage)
+    return open_sequence(path, camera, on_damage, ReadingOptions(depth_topic, colour_topic))
 
 
 def as_recording(recording: Recording) -> Sequence:

@@ -15,6 +15,7 @@ from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.workers import chosen_workers
 from depthtrack.machine import usable_cores
 from depthtrack.recording.hand_choice import TRUTH
+from depthtrack.recording.registry import reading_of
 from depthtrack.report.build import write_report
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.side_choice import choose_side
@@ -89,7 +90,8 @@ def _source(recording: Recording, hand: str | None, frames: int | None) -> Sourc
         source = Source(str(Path(recording).resolve()), hand=hand, frames=frames)
     else:
         path, camera = str(path_of(recording).resolve()), asdict(recording.camera)
-        source = Source(path, camera, on_damage_of(recording), hand, frames=frames)
+        damage, reading = on_damage_of(recording), reading_of(recording)
+        source = Source(path, camera, damage, hand, frames=frames, reading=reading)
     if hand is not None:
         return source
     choice = choose_side(source.open(), source.segmentation, usable_cores(), frames)

@@ -34,7 +34,7 @@ class Command:
 
         if self.sample is not None and self.sample < 1:
             raise InputError(f"--sample must be at least 1 frame, found {self.sample}")
-        sequence = self.recording.open()
+        sequence = self.recording.open(print_notes=False)
         count = min(len(sequence), self.sample or len(sequence))
         indices = np.linspace(0, len(sequence) - 1, count).round().astype(int).tolist()
         summary = summarise(
@@ -72,6 +72,7 @@ def _text(summary: "RecordingSummary") -> str:
             [f"{_value_text(key)}: {_value_text(value)}" for key, value in summary.description.items()] or ["unknown"],
         ),
         ("damaged", _damage_lines(summary)),
+        ("notes", summary.notes or ["none"]),
     ]
     return "\n".join(line for label, lines in rows for line in _block(label, lines))
 

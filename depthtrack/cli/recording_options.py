@@ -1,11 +1,13 @@
 """Options of the commands that open one recording."""
 
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
@@ -23,7 +25,7 @@ class RecordingOptions:
     """Recording to open, and its camera if it has none of its own."""
 
     path: tyro.conf.Positional[Path]
-    """The recording: a sequence folder, or a plain TUM RGB-D folder with a camera given below."""
+    """The recording: a folder or a file of any format of docs/formats.md."""
     camera: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
     """Camera in place of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
@@ -40,16 +42,23 @@ class RecordingOptions:
     """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame: stop with an error, or skip and count it."""
+    reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
-    def open(self, camera: "Camera | None" = None) -> "Sequence":
+    def open(self, camera: "Camera | None" = None, print_notes: bool = True) -> "Sequence":
         """Return the recording with the camera of the options, else with `camera`, else its own.
+
+        print_notes: whether to print what the user must know about the recording, on standard error.
 
         Raises:
             InputError: if the recording or the camera of the options is unusable.
         """
         from depthtrack.recording import open_sequence
 
-        return open_sequence(self.path, self._chosen_camera() or camera, self.on_damage)
+        sequence = open_sequence(self.path, self._chosen_camera() or camera, self.on_damage, self.reading.options)
+        if print_notes:
+            for note in sequence.notes:
+                print(f"note: {note}", file=sys.stderr)
+        return sequence
 
     def _chosen_camera(self) -> "Camera | None":
         """Return the camera that the options describe; None for the recording's own."""
@@ -76,5 +85,5 @@ class RecordingOptions:
             return None
         if self.fx is None or self.depth_scale is None:
             raise InputError("a camera from numbers needs --fx and --depth-scale: give both, or a --camera-preset")
-        width, height = image_size(self.path)
+        width, height = image_size(self.path, self.reading.options)
         return Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given})

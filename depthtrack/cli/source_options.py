@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from depthtrack.cli.hand_options import HandOptions
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import PresetName
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -30,6 +31,7 @@ class SourceOptions:
     """Nominal camera of a sensor, for recordings without one."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame: stop with an error, or skip and count it."""
+    reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
     def source(self, path: Path) -> "Source":
         """Return the recording at `path` with these options.
@@ -52,6 +54,7 @@ class SourceOptions:
             skin_model=None if skin_model is None else str(skin_model.resolve()),
             frames=self.frames,
             side=self.hands.given_side,
+            reading=self.reading.options,
         )
 
     def with_side(self, source: "Source") -> "Source":

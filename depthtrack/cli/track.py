@@ -11,6 +11,7 @@ import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
 from depthtrack.cli.hand_options import HandOptions, side_text
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
 from depthtrack.cli.stated_default import stated_default
@@ -178,7 +179,8 @@ def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]
     if run is not None:
         defaults |= {"start": run.start, "frames": run.frames}
         defaults |= {"keypoints": None if run.keypoints is None else Path(run.keypoints)}
-        recording = dataclasses.replace(recording, on_damage=run.on_damage)
+        reading = ReadingArguments.of(run.reading)
+        recording = dataclasses.replace(recording, on_damage=run.on_damage, reading=reading)
     return Command, Command(recording=recording, out=tyro.MISSING, **defaults)
 
 

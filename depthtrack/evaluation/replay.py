@@ -71,7 +71,7 @@ class Replay:
         path = sequence or recorded_path(run)
         if sequence is None and not path.exists():
             raise InputError(f"the recording {path} of the run {run.folder} is missing: give --sequence PATH")
-        recording = open_sequence(path, configuration.camera_model(where), on_damage="skip")
+        recording = open_sequence(path, configuration.camera_model(where), "skip", configuration.reading)
         _check_same_recording(run, recording, path)
         return cls(run, configuration, recording, configuration.hand_shape(where))
 

@@ -1,47 +1,85 @@
-"""Opening of a recording of any format.
+"""Opening of a recording of any format, which its content decides.
 
-A new format is a module with a subclass of BaseSequence and an entry in FORMATS.
+A new format is one module in `sequences/` with a subclass of BaseSequence: it is found by its presence there.
 """
 
+from functools import cache
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.recording import sequences
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
-from depthtrack.recording.sequences.capture import CaptureSequence
-from depthtrack.recording.sequences.tum import TumSequence
 
-FORMATS: tuple[type[BaseSequence], ...] = (TumSequence, CaptureSequence)
+_ADVICE = {
+    ".svo": "export it to MCAP or to PNG images with ZED's own tools",
+    ".svo2": "export it to MCAP or to PNG images with ZED's own tools",
+    ".oni": "record it as a folder of images with OpenNI's own tools",
+}
+"""What to do with files that only their maker's library reads, by suffix."""
 
 
-def open_sequence(path: Path | str, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> Sequence:
+def open_sequence(
+    path: Path | str,
+    camera: Camera | None = None,
+    on_damage: OnDamage = "refuse",
+    reading: ReadingOptions | None = None,
+) -> Sequence:
     """Open the recording at `path`.
 
     camera: replaces the camera of the recording; required if it has none.
     on_damage: the action at a frame that cannot be read: "refuse" raises DamagedFrameError, "skip" adds the
         frame to `sequence.damaged`.
+    reading: other choices, such as the topics of a bag.
 
     Raises:
         InputError: if `path` holds no recording, or one that is unusable beyond single frames.
+        MissingExtraError: if the format needs a library that is not installed.
     """
-    return _format_of(Path(path)).open(Path(path), camera, on_damage)
+    return _format_of(Path(path)).open(Path(path), camera, on_damage, reading)
 
 
-def image_size(path: Path | str) -> tuple[int, int]:
+def image_size(path: Path | str, reading: ReadingOptions | None = None) -> tuple[int, int]:
     """Return (width, height) of the depth images of a recording, without a camera.
 
     Raises:
         InputError: if `path` holds no recording, or no depth image can be read.
     """
-    return _format_of(Path(path)).image_size(Path(path))
+    return _format_of(Path(path)).image_size(Path(path), reading)
+
+
+def reading_of(sequence: Sequence) -> ReadingOptions:
+    """Return how an opened recording is read."""
+    return sequence.reading if isinstance(sequence, BaseSequence) else ReadingOptions()
+
+
+@cache
+def formats() -> tuple[type[BaseSequence], ...]:
+    """Return all formats, those that accept any similar folder last."""
+    modules = [import_module(f"{sequences.__name__}.{entry.name}") for entry in iter_modules(sequences.__path__)]
+    found = [
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and issubclass(value, BaseSequence)
+        and value is not BaseSequence
+        and value.__module__ == module.__name__
+    ]
+    return tuple(sorted(found, key=lambda each: each.is_generic))
 
 
 def _format_of(path: Path) -> type[BaseSequence]:
     if not path.exists():
         raise InputError(f"there is no recording at {path}: no such file or folder")
-    for candidate in FORMATS:
+    for candidate in formats():
         if candidate.matches(path):
             return candidate
-    known = " or ".join(candidate.format_name for candidate in FORMATS)
+    if (advice := _ADVICE.get(path.suffix.lower())) is not None:
+        raise InputError(f"{path} has a format that only the library of its maker reads: {advice}")
+    known = " or ".join(candidate.format_name for candidate in formats())
     raise InputError(f"{path} must be {known}, found another format")

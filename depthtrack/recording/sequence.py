@@ -146,6 +146,14 @@ class Sequence(Protocol):
         ...
 
     @property
+    def notes(self) -> list[str]:
+        """What a user must know about how the recording is read, one sentence each.
+
+        Commands print them.
+        """
+        ...
+
+    @property
     def damaged(self) -> list[DamagedFrame]:
         """The frames skipped so far, in order."""
         ...

@@ -57,6 +57,7 @@ class RecordingSummary:
     hand: str | None
     description: dict[str, Any]
     damaged: list[DamagedFrame]
+    notes: list[str]
 
 
 def summarise(
@@ -100,6 +101,7 @@ def summarise(
         hand=f"{sequence.hand.side}, scale {sequence.hand.scale:g}" if sequence.hand else None,
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),
+        notes=list(sequence.notes),
     )
 
 

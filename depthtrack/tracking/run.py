@@ -12,6 +12,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
+from depthtrack.recording.registry import reading_of
 from depthtrack.recording.run_folder import RunWriter, check_unused
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
@@ -32,7 +33,7 @@ def configure(
     segmentation: SegmentationOptions | None = None,
     **entries: Any,
 ) -> RunConfiguration:
-    """Return the configuration of a run of the recording at `path`.
+    """Return the configuration of a run of the recording at `path`, read as `sequence` was.
 
     entries: `start`, `frames`, `on_damage` and `keypoints` of `RunConfiguration`, if not the defaults.
     """
@@ -43,6 +44,7 @@ def configure(
         tracker,
         segmentation or SegmentationOptions(),
         **entries,
+        reading=reading_of(sequence),
         context={"versions": versions()},
     )
 

@@ -15,6 +15,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import load_synergies
 from depthtrack.options import from_data, to_data
 from depthtrack.recording.keypoints import MAX_BYTES
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.run_folder import Run, read_configuration
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
@@ -58,6 +59,7 @@ class RunConfiguration:
     frames: int | None = None
     on_damage: OnDamage = "refuse"
     keypoints: str | None = None
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
     context: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -97,6 +99,7 @@ class RunConfiguration:
             "frames": self.frames,
             "on_damage": self.on_damage,
             "keypoints": self.keypoints,
+            **({} if self.reading == ReadingOptions() else {"reading": to_data(self.reading)}),
             "camera": dict(self.camera),
             "hand": dict(self.hand),
             "digests": digests(self),
@@ -119,7 +122,7 @@ class RunConfiguration:
         for entry, kind in (("sequence", str), ("camera", dict), ("hand", dict)):
             if not isinstance(fields.get(entry), kind):
                 raise InputError(f"{where}: expected an entry '{entry}', found {fields.get(entry)!r:.40}")
-        own = ("format", "tracker", "options", "digests", "segmentation")
+        own = ("format", "tracker", "options", "digests", "segmentation", "reading")
         rest = {name: value for name, value in fields.items() if name not in own}
         known = {entry: rest.pop(entry) for entry in ("sequence", "camera", "hand")}
         known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage", "keypoints") if entry in rest}
@@ -133,6 +136,7 @@ class RunConfiguration:
             **known,
             tracker=from_data(RUN_CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),
             segmentation=from_data(SegmentationOptions, fields.get("segmentation", {}), f"{where}: segmentation"),
+            reading=from_data(ReadingOptions, fields.get("reading", {}), f"{where}: reading"),
             context=rest,
         )
 

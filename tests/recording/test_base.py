@@ -8,8 +8,10 @@ import pytest
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording import Sequence, open_sequence, registry
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
+from depthtrack.recording.sequences.capture import CaptureSequence
 from depthtrack.recording.sequences.tum import TumSequence
 from depthtrack.types import Depth
 
@@ -21,8 +23,14 @@ class ArraySequence(BaseSequence):
 
     format_name = "a .npy file"
 
-    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
-        super().__init__(path, camera, on_damage)
+    def __init__(
+        self,
+        path: Path,
+        camera: Camera | None = None,
+        on_damage: OnDamage = "refuse",
+        reading: ReadingOptions | None = None,
+    ) -> None:
+        super().__init__(path, camera, on_damage, reading)
         self._depth = np.load(path, allow_pickle=False)
         self.camera = camera or CAMERA
         self.timestamps = np.arange(len(self._depth)) / 30
@@ -32,7 +40,7 @@ class ArraySequence(BaseSequence):
         return path.suffix == ".npy"
 
     @classmethod
-    def image_size(cls, path: Path) -> tuple[int, int]:
+    def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
         return CAMERA.width, CAMERA.height
 
     def read_depth(self, index: int) -> Depth:
@@ -44,7 +52,7 @@ class ArraySequence(BaseSequence):
 
 @pytest.fixture
 def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(registry, "FORMATS", (TumSequence, ArraySequence))
+    monkeypatch.setattr(registry, "formats", lambda: (TumSequence, ArraySequence))
     np.save(tmp_path / "film.npy", np.array([0.5, -1.0, 0.7])[:, None, None] * np.ones(CAMERA.shape))
     return tmp_path / "film.npy"
 
@@ -57,6 +65,7 @@ def test_a_new_format_has_the_defaults_of_the_base(path: Path) -> None:
     assert sequence.ground_truth is None
     assert not sequence.has_colour
     assert sequence.description == {}
+    assert sequence.notes == []
     assert sequence.hand_mask(0) is None
     assert sequence.exact_depth(0) is None
     assert sequence[-1].timestamp == pytest.approx(2 / 30)
@@ -73,3 +82,17 @@ def test_damaged_frames_of_a_new_format_are_skipped_or_rejected(path: Path) -> N
 def test_the_error_of_an_unknown_format_names_the_known_ones(path: Path) -> None:
     with pytest.raises(InputError, match=r"must be a folder with depth\.txt .* or a \.npy file"):
         open_sequence(path.parent)
+
+
+def test_formats_are_found_by_their_modules() -> None:
+    found = registry.formats()
+    assert {TumSequence, CaptureSequence} <= set(found)
+    assert len(found) == len(set(found))
+    assert [each.is_generic for each in found] == sorted(each.is_generic for each in found)
+
+
+@pytest.mark.parametrize("name", ["film.svo2", "film.SVO", "film.oni"])
+def test_files_of_closed_formats_are_rejected_with_advice(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"anything")
+    with pytest.raises(InputError, match="library of its maker"):
+        open_sequence(tmp_path / name)

@@ -4,7 +4,7 @@ import json
 import math
 import time
 from collections.abc import Sequence as Rows
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from depthtrack.options import from_data, to_data
 from depthtrack.recording import open_sequence
 from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.keypoints import read_keypoints
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.run_folder import check_same, read_configuration
 from depthtrack.recording.run_rows import read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
@@ -43,6 +44,7 @@ class Source:
     skin_model: path of a skin colour model; published statistics if None.
     frames: number of frames; all if None.
     keypoints: path of a file of keypoints from elsewhere; None for none.
+    reading: how the recording is read.
     """
 
     path: str
@@ -53,6 +55,12 @@ class Source:
     frames: int | None = None
     side: Side | None = None
     keypoints: str | None = None
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
+
+    @classmethod
+    def from_data(cls, fields: dict[str, Any]) -> "Source":
+        """Return the recording of plain nested values."""
+        return cls(**{**fields, "reading": ReadingOptions(**fields["reading"])})
 
     def open(self) -> Sequence:
         """Return the opened recording.
@@ -61,7 +69,7 @@ class Source:
             InputError: if it is unusable.
         """
         camera = None if self.camera is None else Camera(**self.camera)
-        return open_sequence(self.path, camera, self.on_damage)
+        return open_sequence(self.path, camera, self.on_damage, self.reading)
 
     def hand_of(self, sequence: Sequence) -> HandShape:
         """Return the hand to track with."""
@@ -107,7 +115,7 @@ class PlannedRun:
     @classmethod
     def from_cell(cls, cell: Cell) -> "PlannedRun":
         """Return the run of a cell."""
-        return cls(**{**cell, "source": Source(**cell["source"])})
+        return cls(**{**cell, "source": Source.from_data(cell["source"])})
 
     @property
     def config(self) -> TrackerConfig:
@@ -165,7 +173,7 @@ def track_cell(cell: Cell) -> Row:
 
 def calibrate_cell(cell: Cell) -> Row:
     """Return the options that take the given time on a recording, and their CPU milliseconds."""
-    source = Source(**cell["source"])
+    source = Source.from_data(cell["source"])
     cv2.setNumThreads(1)
     sequence, config = source.open(), from_data(CONFIGURATIONS[cell["tracker"]], cell["options"], "options")
     hand, segmenter = source.hand_of(sequence), source.segmenter(sequence)

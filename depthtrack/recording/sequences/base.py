@@ -10,6 +10,7 @@ import numpy as np
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.types import Array, Depth, Image, Mask
 
@@ -19,10 +20,13 @@ class BaseSequence(ABC):
 
     A format sets `format_name`, overrides `matches`, `image_size` and `read_depth`, and in its constructor, after this
     one, sets `camera` and `timestamps` (N,), seconds, increasing. It overrides the rest if its recordings hold more.
+    It appends to `notes` what the user must know: colour that is not used, a file that is cut short.
     """
 
     format_name: ClassVar[str]
     """The format's description for errors: "a folder with depth.txt (TUM RGB-D layout)"."""
+    is_generic: ClassVar[bool] = False
+    """Whether `matches` accepts what other formats may accept too; such formats are tried last."""
 
     camera: Camera
     timestamps: Array
@@ -32,7 +36,13 @@ class BaseSequence(ABC):
     hand: HandShape | None = None
     ground_truth: GroundTruth | None = None
 
-    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
+    def __init__(
+        self,
+        path: Path,
+        camera: Camera | None = None,
+        on_damage: OnDamage = "refuse",
+        reading: ReadingOptions | None = None,
+    ) -> None:
         """Open a recording; `camera` replaces the recording's own.
 
         Raises:
@@ -41,6 +51,8 @@ class BaseSequence(ABC):
         self.path = path
         self.description: Mapping[str, Any] = {}
         self.on_damage = on_damage
+        self.reading = reading or ReadingOptions()
+        self.notes: list[str] = []
         self._damaged: dict[int, DamagedFrame] = {}
 
     @classmethod
@@ -50,7 +62,7 @@ class BaseSequence(ABC):
 
     @classmethod
     @abstractmethod
-    def image_size(cls, path: Path) -> tuple[int, int]:
+    def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
         """Return (width, height) of the depth images, without a camera.
 
         Raises:
@@ -58,9 +70,15 @@ class BaseSequence(ABC):
         """
 
     @classmethod
-    def open(cls, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> Self:
+    def open(
+        cls,
+        path: Path,
+        camera: Camera | None = None,
+        on_damage: OnDamage = "refuse",
+        reading: ReadingOptions | None = None,
+    ) -> Self:
         """Open a recording; see the constructor."""
-        return cls(path, camera, on_damage)
+        return cls(path, camera, on_damage, reading)
 
     @abstractmethod
     def read_depth(self, index: int) -> Depth:

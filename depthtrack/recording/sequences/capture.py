@@ -20,6 +20,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
@@ -96,9 +97,15 @@ class CaptureSequence(BaseSequence):
     format_name = f"a folder with {CAPTURE_FILE} (motion capture)"
     has_depth = False
 
-    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
+    def __init__(
+        self,
+        path: Path,
+        camera: Camera | None = None,
+        on_damage: OnDamage = "refuse",
+        reading: ReadingOptions | None = None,
+    ) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage)
+        super().__init__(path, camera, on_damage, reading)
         capture = read_json(path / CAPTURE_FILE, "the capture", CaptureDescription.from_fields)
         self._name = capture.name
         self.camera, self.T_camera_world = camera or capture.camera, capture.T_camera_world
@@ -112,7 +119,7 @@ class CaptureSequence(BaseSequence):
         return (path / CAPTURE_FILE).exists()
 
     @classmethod
-    def image_size(cls, path: Path) -> tuple[int, int]:
+    def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
         """Return (width, height) of the virtual camera.
 
         Raises:

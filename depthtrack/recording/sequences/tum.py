@@ -29,6 +29,7 @@ from depthtrack.files import read_json
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
 from depthtrack.recording.images import read_colour, read_depth, read_mask, read_size
+from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import associate, is_inside, read_list
@@ -43,9 +44,15 @@ class TumSequence(BaseSequence):
 
     format_name = "a folder with depth.txt (TUM RGB-D layout)"
 
-    def __init__(self, path: Path, camera: Camera | None = None, on_damage: OnDamage = "refuse") -> None:
+    def __init__(
+        self,
+        path: Path,
+        camera: Camera | None = None,
+        on_damage: OnDamage = "refuse",
+        reading: ReadingOptions | None = None,
+    ) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage)
+        super().__init__(path, camera, on_damage, reading)
         self.camera = camera or _read_camera(path)
         self.description = _read_description(path)
         self._depth = read_list(path, "depth.txt")
@@ -63,7 +70,7 @@ class TumSequence(BaseSequence):
         return (path / "depth.txt").exists()
 
     @classmethod
-    def image_size(cls, path: Path) -> tuple[int, int]:
+    def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
         """Return (width, height) of the first readable depth image.
 
         Raises:
