@@ -56,6 +56,18 @@ def _xr(name: str) -> Write:
     return partial(write, {"openxr": OPENXR, "webxr": WEBXR}[name])
 
 
+def _mano() -> Write:
+    from depthtrack.export.mano import write
+
+    return write
+
+
+def _bvh() -> Write:
+    from depthtrack.export.bvh import write
+
+    return write
+
+
 def _benchmark(name: str) -> Write:
     from depthtrack.export.benchmark_joints import find_benchmark
     from depthtrack.export.uvd import write
@@ -69,6 +81,8 @@ EXPORTERS = {
     "mot": Exporter((".mot",), "joint angles for OpenSim", _mot),
     "openxr": Exporter((".json", ".csv"), "the 26 joints of OpenXR", partial(_xr, "openxr")),
     "webxr": Exporter((".json", ".csv"), "the 25 joints of WebXR", partial(_xr, "webxr")),
+    "mano": Exporter((".npz", ".json"), "rotations of MANO's 16 joints", _mano),
+    "bvh": Exporter((".bvh",), "a skeleton and its motion", _bvh),
     "nyu": Exporter((".txt",), "u v d of NYU's joints", partial(_benchmark, "nyu")),
     "icvl": Exporter((".txt",), "u v d of ICVL's joints", partial(_benchmark, "icvl")),
     "msra": Exporter((".txt",), "u v d of MSRA's joints", partial(_benchmark, "msra")),
