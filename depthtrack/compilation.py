@@ -24,6 +24,8 @@ from depthtrack.errors import DepthtrackError
 
 VARIABLE = "NUMBA_CACHE_DIR"
 """Environment variable that names the folder for compiled code."""
+TOO_NEW = (0, 69)
+"""First version of numba whose internals were not tried with the cache here and `simd`; pyproject.toml has the same."""
 _PACKAGE = Path(__file__).parent
 _IMPORT = re.compile(rb"^\s*(?:from|import)\s+(depthtrack[\w.]*)(?:\s+import\s+(?:\(([^)]*)\)|(.*)))?", re.MULTILINE)
 
@@ -34,8 +36,9 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     options: those of `numba.njit`.
 
     Raises:
-        DepthtrackError: if the environment turns the compiler off.
+        DepthtrackError: if the environment turns the compiler off, or numba is newer than tried.
     """
+    check_numba(numba.__version__)
     if config.DISABLE_JIT:
         raise DepthtrackError("the kernels need numba's compiler: unset the environment variable NUMBA_DISABLE_JIT")
 
@@ -46,6 +49,18 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         return dispatcher
 
     return compile_lazily
+
+
+def check_numba(version: str) -> None:
+    """Check that the internals of numba are those that this program relies on.
+
+    Raises:
+        DepthtrackError: if the version is too new.
+    """
+    parts = tuple(int(part) for part in re.findall(r"\d+", version)[:2])
+    if parts >= TOO_NEW:
+        bound = ".".join(map(str, TOO_NEW))
+        raise DepthtrackError(f"numba must be older than {bound}, found {version}: run  pip install 'numba<{bound}'")
 
 
 @cache

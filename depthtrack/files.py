@@ -1,9 +1,11 @@
 """Read files of bounded size and write files that are complete or absent."""
 
+import ctypes
 import json
 import os
 import secrets
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -98,18 +100,21 @@ def compact_json(value: Any) -> str:
 def replace_atomically(path: Path) -> Iterator[Path]:
     """Yield a temporary path with the same suffix that replaces `path` if the block succeeds.
 
-    The temporary file is removed if the block fails. If the block writes no file, `path` stays as it was.
+    The temporary file is removed if the block fails. If the block writes no file, `path` stays as it was. The file that
+    a link leads to is replaced, not the link.
     Raises: InputError if the folder does not exist or the file cannot be written.
     """
+    shown, path = path, Path(os.path.realpath(path))
     if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: the folder {path.parent} does not exist: create it first")
+        raise InputError(f"cannot write {shown}: the folder {path.parent} does not exist: create it first")
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield temporary
         if temporary.exists():
+            _store(temporary)
             os.replace(temporary, path)
     except OSError as error:
-        raise InputError(f"cannot write {path}: {_reason(error)}") from error
+        raise InputError(f"cannot write {shown}: {_reason(error)}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -121,6 +126,12 @@ def write_atomic(path: Path, content: str | bytes) -> None:
     """
     with replace_atomically(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def _store(path: Path) -> None:
+    """Wait until the contents of a file are on the disk: a renamed file must not be empty after a power failure."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
 
 
 def check_replaceable(folder: Path, mark: str, what: str, overwrite: bool) -> None:
@@ -139,9 +150,16 @@ def check_replaceable(folder: Path, mark: str, what: str, overwrite: bool) -> No
 
 
 def move_folder(work: Path, folder: Path) -> None:
-    """Rename a complete folder `work` to `folder`, and delete what that replaces."""
+    """Rename a complete folder `work` to `folder`, and delete what that replaces.
+
+    On Linux, one of both is there at any time. Elsewhere, a process that is killed between two renames leaves the
+    former folder under a hidden name.
+    """
     if not folder.exists():
         work.rename(folder)
+        return
+    if _exchange(work, folder):
+        shutil.rmtree(work)
         return
     replaced = work.with_name(work.name + "-replaced")
     folder.rename(replaced)
@@ -151,6 +169,15 @@ def move_folder(work: Path, folder: Path) -> None:
         replaced.rename(folder)
         raise
     shutil.rmtree(replaced)
+
+
+def _exchange(first: Path, second: Path) -> bool:
+    """Exchange two names in one step; return whether the system can."""
+    if sys.platform != "linux":
+        return False
+    rename = getattr(ctypes.CDLL(None), "renameat2", None)
+    current, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return rename is not None and rename(current, os.fsencode(first), current, os.fsencode(second), exchange) == 0
 
 
 @contextmanager

@@ -12,7 +12,7 @@ PACKAGE = "depthtrack"
 
 LAYERS = (
     ("closing", "errors", "types"),
-    ("files", "options", "resources", "text_table", "selection"),
+    ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine",),
     ("compilation",),
     ("geometry",),

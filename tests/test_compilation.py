@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -126,3 +127,21 @@ def test_a_disabled_compiler_is_an_error_of_one_sentence(tmp_path: Path) -> None
     assert done.returncode != 0
     assert "NUMBA_DISABLE_JIT" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_the_bound_of_numba_is_that_of_the_package() -> None:
+    from depthtrack.compilation import TOO_NEW
+
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    (numba,) = (line for line in stated if line.startswith("numba"))
+    assert numba.partition("<")[2] == ".".join(map(str, TOO_NEW))
+
+
+@pytest.mark.parametrize("version", ["0.69.0", "0.70.0rc1", "1.0"])
+def test_a_numba_that_is_too_new_is_an_error_of_one_sentence(version: str) -> None:
+    from depthtrack.compilation import check_numba
+    from depthtrack.errors import DepthtrackError
+
+    check_numba("0.68.2")
+    with pytest.raises(DepthtrackError, match=rf"numba must be older than 0.69, found {version}: run  pip install"):
+        check_numba(version)

@@ -1,12 +1,20 @@
 """Command line: parse, call, print. Each command is one module, imported on its call."""
 
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
 from depthtrack import __version__
+from depthtrack.cli.ending import (
+    BROKEN_PIPE,
+    INTERRUPTED,
+    TERMINATED,
+    Terminated,
+    drop_unwritable_output,
+    terminable,
+    write_output,
+)
 from depthtrack.errors import DepthtrackError
 
 
@@ -50,13 +58,15 @@ _HELP = ("-h", "--help", "help")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
 
-    The code is 0 on success, 2 for an error that the user can correct, and 130 after an interrupt.
+    The code is 0 on success, and 2 for an error that the user can correct. It is 130 after an interrupt (Ctrl-C), and
+    143 after SIGTERM. It is 141 if the reader of the output closes it before the end of the work.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     name = arguments[0] if arguments else "--help"
     try:
-        code = _run(name, arguments[1:])
-        sys.stdout.flush()
+        with terminable():
+            code = _run(name, arguments[1:])
+        write_output()
         return code
     except DepthtrackError as error:
         _print_error(name, str(error))
@@ -69,17 +79,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         _print_error(name, advice(module, str(error)))
         return 2
+    except Terminated:
+        _print_error(name, "terminated")
+        return TERMINATED
     except KeyboardInterrupt:
-        print(f"depthtrack {name}: interrupted", file=sys.stderr)
-        return 130
+        _print_error(name, "interrupted")
+        return INTERRUPTED
     except BrokenPipeError:
-        # The reader of the output (head, less) has closed it: drop the rest, including Python's last flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return BROKEN_PIPE
     except OSError as error:
         # A full disk or a missing permission: the reason of the system is enough.
         _print_error(name, f"{error.filename or 'input or output'}: {error.strerror or error}")
         return 2
+    finally:
+        drop_unwritable_output()
 
 
 def _print_error(name: str, message: str) -> None:
@@ -113,7 +126,11 @@ def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, argumen
     entry, prog = commands[name], f"{prog} {name}"
     module = import_module(entry.module)
     if not hasattr(module, "COMMANDS"):
-        _parse(module, prog, arguments).run()
+        from depthtrack.cli.argument_checks import check_arguments
+
+        command = _parse(module, prog, arguments)
+        check_arguments(command)
+        command.run()
     elif not arguments or arguments[0] in _HELP:
         print(_overview(f"{prog}: {entry.summary}", prog, module.COMMANDS))
     else:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import DepthtrackError
@@ -21,7 +22,7 @@ class _Benchmark:
     """Duration of the measurement for each row. The table gives the best and the median call."""
     json: bool = False
     """Print JSON instead of a table."""
-    out: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
+    out: Annotated[Path | None, OUTPUT_FILE, stated_default(metavar="FILE.json")] = None
     """Also write the JSON to a file."""
 
     def _measure(self, benchmark: "ModuleType", plan: Any) -> None:
@@ -128,7 +129,7 @@ class Starts:
     """Models to find in the capture: layouts such as left:16, or files from `markers model`."""
     json: bool = False
     """Print JSON instead of a table."""
-    out: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
+    out: Annotated[Path | None, OUTPUT_FILE, stated_default(metavar="FILE.json")] = None
     """Also write the JSON to a file."""
 
     def run(self) -> None:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE
 from depthtrack.cli.measuring import calibrate_rig_on_sequence, calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import stated_default
-from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
+from depthtrack.outputs import check_distinct, check_file
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
@@ -32,13 +33,13 @@ class Command:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="HAND.json")]
+    out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=("-o",), metavar="HAND.json")]
     """Hand file to write."""
     side: Literal["auto", "right", "left"] = "auto"
     """Side of the hand; `auto` tries both."""
     hand: Annotated[Path | None, stated_default(metavar="RIG.glb")] = None
     """Rigged mesh (.glb, .gltf), or hand file that refers to one, to scale to the recording."""
-    picture: Annotated[Path | None, stated_default(metavar="FILE.png")] = None
+    picture: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png")] = None
     """Picture of the hand before and after calibration to write (default: beside the hand file)."""
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
@@ -59,11 +60,9 @@ class Command:
         from depthtrack.viewing.contact_sheet import save_picture
 
         picture = self.picture or self.out.with_suffix(".png")
-        for path in (self.out, picture):
-            if not path.parent.is_dir():
-                raise InputError(f"the folder {path.parent} does not exist: create it first")
-            if path.is_dir():
-                raise InputError(f"expected a file, found the folder {path}: name a file in it")
+        if self.picture is None:
+            check_file(picture, "--picture")
+            check_distinct({"-o": self.out, "--picture": picture}, [])
         side = None if self.side == "auto" else self.side
         rig = None if self.hand is None else load_hand(self.hand, side)
         sequence = self.recording.open()

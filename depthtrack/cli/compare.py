@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.source_options import SourceOptions
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -25,7 +26,7 @@ class Command:
 
     sequences: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SEQUENCE ...")]
     """Recordings to track."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")]
+    out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="DIR")]
     """Folder to write to."""
     trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="hybrid,pso,ik")] = ("hybrid,pso,ik",)
     """Trackers, each with options after a colon, as in  hybrid,ik:subsample=2 ; or a .toml file with a

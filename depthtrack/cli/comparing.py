@@ -5,12 +5,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from depthtrack.cli.output_folder import check_output_folder
 from depthtrack.cli.progress import bar, counter
 from depthtrack.evaluation.compare.comparison import Comparison, ComparisonProgress, Listener, compare
 from depthtrack.evaluation.compare.results import as_table, evaluate_runs, run_record, tracker_results, write_results
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.sweep.run import Workers
+from depthtrack.outputs import locked
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.build import check_reportable, write_report
 
@@ -19,14 +19,15 @@ def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, a
     """Run the comparison, print its table or JSON, and write results and report to `folder`.
 
     Raises:
-        InputError: if a recording is unusable, or `folder` is a file or contains runs with other options.
+        InputError: if a recording is unusable, or `folder` contains runs with other options.
         SweepError: if a run failed.
     """
-    check_output_folder(folder)
-    with _bar() as listener:
-        plans = compare(comparison, folder, workers, listener)
-    folders = [Path(plan.folder) for plan in plans]
-    evaluations = list(bar(evaluate_runs(folders, workers), "run", len(folders), "evaluating"))
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        with _bar() as listener:
+            plans = compare(comparison, folder, workers, listener)
+        folders = [Path(plan.folder) for plan in plans]
+        evaluations = list(bar(evaluate_runs(folders, workers), "run", len(folders), "evaluating"))
     if as_json:
         print(json.dumps([run_record(evaluation) for evaluation in evaluations], indent=2))
     else:

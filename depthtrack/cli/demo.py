@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.cli.progress import bar
 from depthtrack.cli.source_options import SourceOptions
@@ -31,7 +32,7 @@ class Command:
 
     path: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="PATH")] = None
     """Your own recording."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
+    out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
     """Folder to write to. The same folder continues an interrupted demo."""
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
     jobs: Annotated[int | None, stated_default(metavar="N")] = None
@@ -45,12 +46,10 @@ class Command:
         from time import perf_counter
 
         from depthtrack.cli.comparing import compare_and_report
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.compare.comparison import Comparison
         from depthtrack.evaluation.compare.specs import read_specs
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
-        check_output_folder(self.out)
         begun = perf_counter()
         workers = chosen_workers(self.jobs)
         sources = self._synthesised() if self.path is None else (self._own(self.path),)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -34,7 +35,7 @@ class Command:
     """Segment every frame again for the metrics without ground truth. This takes most of the time."""
     json: bool = False
     """Print JSON instead of a table: an object for one run, an array for several."""
-    report: Annotated[Path | None, stated_default(metavar="DIR")] = None
+    report: Annotated[Path | None, OUTPUT_FOLDER, stated_default(metavar="DIR")] = None
     """Also write report.html, results.csv and results.json to this folder."""
 
     predictions: Annotated[Path | None, stated_default(metavar="FILE.txt")] = None
@@ -48,11 +49,8 @@ class Command:
     """Benchmark that defines the joints, their order and the camera of both files."""
 
     def run(self) -> None:
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.markers.folder.contents import is_marker_folder
 
-        if self.report is not None:
-            check_output_folder(self.report, "--report")
         if self.predictions is None and any(is_marker_folder(path) or path.is_file() for path in self.runs):
             self._print(*self._markers())
             return

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.export.registry import EXPORTERS, export_joints, suffixes
 
@@ -20,7 +21,7 @@ class Command:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
     """Run folder from `depthtrack track`, or that of a hand in a folder from `depthtrack markers`."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
+    out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=("-o",), metavar="OUT" + "|".join(suffixes()))]
     """File to write. Its suffix chooses the format, --format among those that share a suffix."""
     format: Annotated[str | None, stated_default(metavar="|".join(EXPORTERS))] = None
     """Format of the file (default: the one named as its suffix, or the only one with it)."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -34,7 +35,7 @@ class Command:
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     file: tyro.conf.OmitArgPrefixes[KeypointsArgument]
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
+    out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
     """Run folder to write."""
     hand: Annotated[str | None, stated_default(metavar="HAND.json|RIG.glb|truth")] = None
     """A hand file, a rigged mesh, or the recording's own sizes (default: sizes of the keypoints)."""
@@ -51,14 +52,12 @@ class Command:
     """Threads of the renderer (default: one per core). Poses do not depend on it."""
 
     def run(self) -> None:
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.cli.progress import counter
         from depthtrack.machine import usable_cores
         from depthtrack.recording.keypoints import read_keypoints
         from depthtrack.tracking.configuration import LiftConfig
         from depthtrack.tracking.run import TrackingRun, configure
 
-        check_output_folder(self.out)
         for name, value in (("frames", self.frames), ("threads", self.threads)):
             if value is not None and value < 1:
                 raise InputError(f"--{name} must be at least 1, found {value}")

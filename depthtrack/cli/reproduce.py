@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -27,7 +28,7 @@ class Command:
     figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
     """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; `crossmodel` for hands
     that the trackers do not know; or `list` to print the names."""
-    out: Annotated[Path | None, stated_default(aliases=("-o",), metavar="DIR")] = None
+    out: Annotated[Path | None, OUTPUT_FOLDER, stated_default(aliases=("-o",), metavar="DIR")] = None
     """Folder to write to."""
     quick: bool = False
     """Run a coarse version with fewer cells and repetitions and swarms at 96 pixels. A figure then takes two minutes on
@@ -62,7 +63,6 @@ class Command:
         from depthtrack.benchmarks.papers.experiment import ExperimentOptions
         from depthtrack.benchmarks.papers.registry import chosen_experiments
         from depthtrack.benchmarks.papers.reproduce import reproduce
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
         names = [name for name in self.figures if name != "list"]
@@ -84,7 +84,6 @@ class Command:
             return
         if self.out is None or not self.figures:
             raise InputError("expected figures and a folder to write to: use  depthtrack reproduce all -o DIR")
-        check_output_folder(self.out)
         workers, done = chosen_workers(self.jobs, self.scheduler), []
         for experiment in experiments:
             folder = self.out / experiment.name

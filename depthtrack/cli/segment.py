@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
@@ -15,6 +16,7 @@ from depthtrack.cli.segmentation_options import SegmentationArguments, Segmentat
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.files import replace_atomically
+from depthtrack.outputs import check_folder, locked
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerName
 
@@ -37,7 +39,7 @@ class SegmentCommand:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    out: Annotated[Path | None, stated_default(aliases=("-o",), metavar="FOLDER")] = None
+    out: Annotated[Path | None, OUTPUT_FOLDER, stated_default(aliases=("-o",), metavar="FOLDER")] = None
     """Folder to write to (default: NAME-segmented in the current folder)."""
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts
@@ -57,7 +59,6 @@ class SegmentCommand:
     def run(self) -> None:
         from json import dumps
 
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.evaluation.segmentation import segment_sequence, summary
         from depthtrack.segmentation.segmenter import Segmenter
 
@@ -69,9 +70,9 @@ class SegmentCommand:
         choice = None if self.tracker is None else self.hands.choose_side(sequence, options)
         hand = self.hands.chosen(sequence, choice)
         folder = self.out or Path(f"{sequence.name}-segmented")
-        check_output_folder(folder)
+        check_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        with self._tracker(hand) as tracker:
+        with locked(folder), self._tracker(hand) as tracker:
             results = segment_sequence(sequence, segmenter, tracker, hand)
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}

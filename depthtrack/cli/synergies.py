@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -25,7 +26,7 @@ class Fit:
 
     postures: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POSTURES ...")]
     """Files or folders of postures."""
-    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="FILE.json")]
+    out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=["-o"], metavar="FILE.json")]
     """File to write."""
     tracks: Annotated[tuple[str, ...], stated_default(metavar="NAME ...")] = ()
     """Names of the tracks to use, for files with named tracks (default: all)."""
@@ -76,7 +77,7 @@ class Info:
 
     file: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.json")] = "leap"
     """File from `fit`, or the name of an included set: leap, leap-grasps."""
-    picture: Annotated[Path | None, stated_default(metavar="FILE.png")] = None
+    picture: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png")] = None
     """Picture to write: the hand from -2 to +2 standard deviations along each of the first components."""
     components: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 4
     """Number of components in the picture."""

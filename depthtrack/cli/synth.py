@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.marker_options import MarkerOptions
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
@@ -32,7 +33,7 @@ class Command:
 
     motion: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="MOTION")]
     """Name of a motion, or path of a .toml file like those in `sequences/`; `list` prints the names."""
-    out: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="OUT")] = None
+    out: Annotated[Path | None, Output("recording"), tyro.conf.Positional, stated_default(metavar="OUT")] = None
     """Folder to write. An existing folder needs --overwrite."""
 
     sensor: Literal["ideal", "kinect1", "kinect2", "realsense"] = "ideal"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.config_options import chosen_config, options_type
 from depthtrack.cli.hand_options import HandOptions, side_text
 from depthtrack.cli.reading_arguments import ReadingArguments
@@ -36,7 +37,7 @@ class TrackCommand:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
+    out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="RUN")]
     """Run folder to write."""
     tracker: TrackerName
     """Tracker: ik fits a surface to the point cloud, pso renders hypotheses, hybrid does both; the others are those of
@@ -69,12 +70,10 @@ class TrackCommand:
         raise NotImplementedError
 
     def run(self) -> None:
-        from depthtrack.cli.output_folder import check_output_folder
         from depthtrack.cli.progress import counter
         from depthtrack.machine import usable_cores
         from depthtrack.tracking.run import TrackingRun
 
-        check_output_folder(self.out)
         if self.frames is not None and self.frames < 1:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
         if self.threads is not None and self.threads < 1:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 
@@ -20,7 +21,7 @@ class Command:
 
     images: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="IMAGES")]
     """Folder of images, or a recording."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")]
+    out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=("-o",), metavar="FILE.json")]
     """Model to write."""
     masks: Annotated[Path | None, tyro.conf.Positional, stated_default(metavar="MASKS")] = None
     """Folder of masks; leave it out for a recording."""

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import VIDEO
 from depthtrack.cli.progress import bar
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -21,7 +22,7 @@ class Command:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="run", metavar="RUN")]
     """Run folder from `depthtrack track`, or folder from `depthtrack markers`."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT.mp4")]
+    out: Annotated[Path, VIDEO, tyro.conf.arg(aliases=("-o",), metavar="OUT.mp4")]
     """Video to write."""
     sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the run, if it was moved."""

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE, VIDEO
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import stated_default
 
@@ -15,13 +16,13 @@ class ViewOptions:
     """Content to show and files to write."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sheet: Annotated[Path | None, stated_default(metavar="FILE.png|.jpg")] = None
+    sheet: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png|.jpg")] = None
     """Contact sheet to write, with evenly spaced frames of the recording."""
-    strip: Annotated[Path | None, stated_default(metavar="FILE.png|.jpg")] = None
+    strip: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png|.jpg")] = None
     """Strip of close-ups to write: one column per frame, with colour, depth, hand and skeleton below each other."""
-    video: Annotated[Path | None, stated_default(metavar="FILE.mp4")] = None
+    video: Annotated[Path | None, VIDEO, stated_default(metavar="FILE.mp4")] = None
     """Video of the whole recording to write."""
-    rrd: Annotated[Path | None, stated_default(metavar="FILE.rrd")] = None
+    rrd: Annotated[Path | None, OUTPUT_FILE, stated_default(metavar="FILE.rrd")] = None
     """File of the interactive viewer to write (rerun FILE.rrd opens it)."""
     web: bool = False
     """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""

@@ -9,6 +9,7 @@ Poses of a resumed run are bitwise those of an uninterrupted one.
 import csv
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -20,6 +21,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_text, write_atomic
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS, POSE_SIZE
+from depthtrack.outputs import locked
 from depthtrack.recording.branches import BRANCH_COLUMNS, branch_rows
 from depthtrack.recording.run_rows import ROW_COLUMNS, RunRow, read_rows, row_cells
 from depthtrack.recording.run_tables import read_table, rewrite_table
@@ -38,15 +40,28 @@ class RunWriter(Closing):
         stages: names of the timings' columns.
 
         Raises:
-            InputError: if the folder holds a run and `resume` is false, or a run of another configuration.
+            InputError: if the folder holds a run and `resume` is false, or a run of another configuration, or another
+                process writes to it.
         """
         self.folder = folder
         self._stages = tuple(stages)
         self.rows: list[RunRow] = []
         check_unused(folder, resume)
-        started = (folder / "run.json").exists()
         folder.mkdir(parents=True, exist_ok=True)
-        if started:
+        with ExitStack() as stack:
+            stack.enter_context(locked(folder))
+            check_unused(folder, resume)
+            self._prepare(configuration)
+            self._poses, self._timings, self._branches = (
+                stack.enter_context((folder / name).open("a", newline="", encoding="utf-8"))
+                for name in ("poses.csv", "timings.csv", "branches.csv")
+            )
+            self._open = stack.pop_all()
+
+    def _prepare(self, configuration: dict[str, Any]) -> None:
+        """Write the tables of a new run, or keep the whole rows of a begun one."""
+        folder = self.folder
+        if (folder / "run.json").exists():
             before = read_configuration(folder)
             check_same(before, configuration, folder)
             if before.get("on_damage") != configuration.get("on_damage"):
@@ -62,9 +77,6 @@ class RunWriter(Closing):
             rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
             write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
-        self._poses = (folder / "poses.csv").open("a", newline="", encoding="utf-8")
-        self._timings = (folder / "timings.csv").open("a", newline="", encoding="utf-8")
-        self._branches = (folder / "branches.csv").open("a", newline="", encoding="utf-8")
 
     def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
         """Append the next frame and the milliseconds of its stages."""
@@ -79,10 +91,8 @@ class RunWriter(Closing):
         self.rows.append(row)
 
     def close(self) -> None:
-        """Close the files."""
-        self._poses.close()
-        self._timings.close()
-        self._branches.close()
+        """Close the files, and free the folder for other processes."""
+        self._open.close()
 
 
 @dataclass(frozen=True)

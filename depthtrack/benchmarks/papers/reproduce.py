@@ -20,6 +20,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Journal, Row
 from depthtrack.evaluation.sweep.run import Workers, run_sweep
 from depthtrack.files import write_atomic
 from depthtrack.machine import Machine, describe_machine
+from depthtrack.outputs import locked
 
 RowProgress = Callable[[Iterator[Row], int, int], Iterable[Row]]
 """Wraps the new rows, as a progress bar does. Takes the rows, the number of all rows, and that of existing rows."""
@@ -73,7 +74,8 @@ def reproduce(
     begun = perf_counter()
     machine = describe_machine()
     cells = [full_cell(experiment, cell) for cell in experiment.cells(options)]
-    with Journal(folder / "rows.jsonl", list(cells[0])) as journal:
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder), Journal(folder / "rows.jsonl", list(cells[0])) as journal:
         reused = sum(journal.get(cell) is not None for cell in cells)
         rows = run_sweep(measure_cell, cells, journal, workers, lambda rows: progress(rows, len(cells), reused))
     done = Reproduction(

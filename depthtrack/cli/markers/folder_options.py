@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FOLDER
+
 if TYPE_CHECKING:
     from depthtrack.markers.filled_capture import FilledCapture
     from depthtrack.markers.folder.contents import Source
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 class FolderOptions:
     """Folder to write."""
 
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="OUT")]
+    out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="OUT")]
     """Folder to write: labels, poses, confidence, residuals, and a run folder of each hand."""
     format: Literal["csv", "c3d", "trc"] = "csv"
     """Format of the labelled trajectories."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.markers.capture_options import CaptureOptions
 from depthtrack.cli.markers.model_options import ModelOptions
 from depthtrack.cli.stated_default import stated_default
@@ -27,7 +28,7 @@ class Command:
     """
 
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="MODEL.json")]
+    out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=("-o",), metavar="MODEL.json")]
     """File to write."""
     body: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LABEL ...")] = ()
     """Markers of a rigid body; the first one is its origin."""
@@ -55,10 +56,6 @@ class Command:
             raise InputError("give either the markers of a rigid body (--body) or the layout of a hand (-m)")
         if self.name is not None:
             check_names([self.name])
-        if self.out.is_dir() or not self.out.parent.is_dir():
-            raise InputError(
-                f"{self.out} must be a file in an existing folder: create the folder, or name another file"
-            )
         capture = self.capture.read()
         model, figures = self._body(capture) if self.body else self._hand(capture)
         write_atomic(self.out, model.to_json())

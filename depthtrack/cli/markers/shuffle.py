@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from depthtrack.cli.argument_checks import CAPTURE
 from depthtrack.cli.markers.capture_options import CaptureOptions
 
 
@@ -17,7 +18,7 @@ class Command:
     """
 
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
+    out: Annotated[Path, CAPTURE, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
     seed: int = 0
     """Seed of the order."""

@@ -28,6 +28,7 @@ from depthtrack.markers.folder.hand_run import write_hand_run
 from depthtrack.markers.folder.tables import check_labels, write_rigid_poses, write_values
 from depthtrack.markers.formats.registry import write_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
+from depthtrack.outputs import locked
 from depthtrack.tracking.run_configuration import versions
 
 
@@ -51,7 +52,22 @@ def write_marker_folder(
     Raises:
         InputError: if the folder holds markers already, a name cannot be that of a file, or a file cannot be written.
     """
-    check_unused(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        check_unused(folder)
+        _write(folder, labelled, source, configuration or {}, truth, suffix, filled)
+
+
+def _write(
+    folder: Path,
+    labelled: LabelledCapture,
+    source: Source | None,
+    configuration: Mapping[str, Any],
+    truth: LabelledCapture | None,
+    suffix: str,
+    filled: FilledCapture | None,
+) -> None:
+    """Write the files of a folder."""
     if filled is not None:
         labelled = _measured(filled)
     capture = labelled.capture
@@ -62,7 +78,7 @@ def write_marker_folder(
         first_frame=capture.first_frame,
         models=tuple(model.name for model in labelled.models),
         source=source,
-        configuration=configuration or {},
+        configuration=configuration,
         filled=filled is not None,
         notes=capture.notes,
         versions=versions(),
