@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from depthtrack.calibration.marker_solution import LabelSource, MarkerSolution, Progress, solve_capture
+from depthtrack.calibration.marker_solution import LabelSource, MarkerSolution, Measuring, Progress, solve_capture
 from depthtrack.hand.shape import HandShape
-from depthtrack.markers.automatic import find_start, label_from, sized_models
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.filled_capture import FilledCapture
 from depthtrack.markers.filling.fill import fill_gaps
@@ -30,13 +29,16 @@ def label_markers(
     models: Models,
     *,
     hand: HandShape | None = None,
+    calibrate: bool = True,
     options: LabellingOptions | None = None,
     out: Path | str | None = None,
     progress: Progress | None = None,
 ) -> LabelledCapture:
     """Find the markers of models among the points of a capture, whose labels are not used.
 
-    hand: sizes of hands that wear layouts; the average adult's if absent.
+    hand: sizes and side of hands that wear layouts. If absent, they start as the average adult's, and the markers
+        decide the side of a layout without one.
+    calibrate: measure the hands, and label again with the measured ones. Only the offline method does.
     options: of the labelling; those of the offline method if absent.
     out: folder to write.
     progress: called with the current step and the share of the work that is done.
@@ -53,10 +55,10 @@ def label_markers(
     """
     given, source = _opened(capture)
     chosen, used = _models(models, hand), options or LabellingOptions()
-    started = find_start(given, chosen, progress=progress)
-    labelled = label_from(given, sized_models(chosen, started), started, used)
-    _write(out, labelled, source, {"command": "label", "labelling": to_data(used)})
-    return labelled
+    measuring: Measuring = "if possible" if calibrate and used.offline.use else "never"
+    solution = solve_capture(given, chosen, labels="none", calibrate=measuring, labelling=used, progress=progress)
+    _write(out, solution.labelled, source, {"command": "label", "calibrate": measuring, "labelling": to_data(used)})
+    return solution.labelled
 
 
 def solve_markers(
@@ -87,8 +89,9 @@ def solve_markers(
     """
     given, source = _opened(capture)
     chosen, used = _models(models, hand), options or LabellingOptions()
-    solution = solve_capture(given, chosen, labels=labels, calibrate=calibrate, labelling=used, progress=progress)
-    _write(out, solution.labelled, source, {"command": "solve", "labelling": to_data(used)})
+    measuring: Measuring = "always" if calibrate else "never"
+    solution = solve_capture(given, chosen, labels=labels, calibrate=measuring, labelling=used, progress=progress)
+    _write(out, solution.labelled, source, {"command": "solve", "calibrate": measuring, "labelling": to_data(used)})
     return solution
 
 

@@ -1,9 +1,10 @@
-"""Poses and sizes of hands from a marker capture: label it, calibrate, fit again."""
+"""Labels, poses and sizes of hands from a marker capture: label it, calibrate, label again."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from depthtrack.calibration.marker_sides import with_measured_sides
 from depthtrack.calibration.markers import CalibratedMarkers, calibrate_markers
 from depthtrack.errors import InputError
 from depthtrack.markers.automatic import find_start, label_from, sized_models
@@ -16,6 +17,8 @@ from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.markers.named_labels import labels_by_name
 
+Measuring = Literal["always", "if possible", "never"]
+"""Whether hands are measured: `if possible` leaves a hand that too few frames show as its start found it."""
 LabelSource = Literal["auto", "file", "none"]
 """Labels that are used: those of the capture if it has them, only those, or none of them."""
 Progress = Callable[[str, float], None]
@@ -42,22 +45,27 @@ class MarkerSolution:
         """
         return {name: found.sizes() for name, found in self.calibrated.items()}
 
+    def measured_sides(self, models: Sequence[MarkerModel]) -> list[str]:
+        """Return the names of the hands whose side was open in the models that were given."""
+        found = zip(models, self.labelled.models, strict=True)
+        return [model.name for given, model in found if given.open_side]
+
 
 def solve_capture(
     capture: MarkerCapture,
     models: Sequence[MarkerModel],
     *,
     labels: LabelSource = "auto",
-    calibrate: bool = True,
+    calibrate: Measuring = "always",
     labelling: LabellingOptions | None = None,
     initialisation: InitialisationOptions | None = None,
     started: StartedModels | None = None,
     progress: Progress | None = None,
 ) -> MarkerSolution:
-    """Return the poses of models in a capture, with the sizes that the capture shows.
+    """Return labels, poses, sides and sizes of the models in a capture.
 
     labels: labels of the capture that are used.
-    calibrate: measure the sizes of each hand and the offsets of its markers.
+    calibrate: whether the sizes of each hand and the offsets of its markers are measured.
     started: start of the labelling, in place of a search.
 
     Raises:
@@ -70,16 +78,20 @@ def solve_capture(
             f"the capture lacks labels of {', '.join(model.name for model in models)[:80]}: label it first"
         )
     if named is not None:
-        started = None
+        started, named = None, with_measured_sides(named)
     else:
         started = started or find_start(capture, models, initialisation, progress=show)
         show("labelling", 0.2)
         named = label_from(capture, sized_models(models, started), started, labelling)
     calibrated = {}
     for k, model in enumerate(named.models):
-        if calibrate and not model.is_rigid:
+        if calibrate != "never" and not model.is_rigid:
             show(f"sizes of {model.name}", 0.5)
-            calibrated[model.name] = calibrate_markers(named, k)
+            try:
+                calibrated[model.name] = calibrate_markers(named, k)
+            except InputError:
+                if calibrate == "always":
+                    raise
     final = tuple(calibrated[model.name].model if model.name in calibrated else model for model in named.models)
     show("poses", 0.7)
     if started is None:

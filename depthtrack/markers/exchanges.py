@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from depthtrack.markers.labelled_capture import LabelledCapture
-from depthtrack.markers.labelled_fit import fit_poses, frame_poses
+from depthtrack.markers.labelled_fit import frame_poses
 from depthtrack.markers.labelling.options import LabellingOptions, OfflineOptions
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Index, Mask
@@ -26,7 +26,7 @@ _SHORTEST = 5
 def exchange_markers(labelled: LabelledCapture, options: LabellingOptions | None = None) -> LabelledCapture:
     """Return the capture with markers exchanged where that fits much better.
 
-    Its poses fit the labels then, see `labelled_fit.fit_poses`.
+    Its poses stay those of the labels before.
     """
     chosen = options or LabellingOptions()
     columns = tuple(rows.copy() for rows in labelled.columns)
@@ -48,8 +48,7 @@ def exchange_markers(labelled: LabelledCapture, options: LabellingOptions | None
                         table[rows, pair] = table[rows, pair[::-1]]
                     residuals[rows, pair] = np.nan
                     changed = True
-    exchanged = replace(labelled, columns=columns, confidence=confidence)
-    return fit_poses(exchanged, chosen) if changed else labelled
+    return replace(labelled, columns=columns, confidence=confidence) if changed else labelled
 
 
 def _stretches(seen: Mask) -> Iterator[Index]:

@@ -26,6 +26,8 @@ def places_by_name(labels: Sequence[str], models: Sequence[MarkerModel]) -> tupl
     found = []
     for model in models:
         sides = [] if model.hand is None else [model.hand.side, model.hand.side[0]]
+        if model.open_side:
+            sides += [model.mirrored().name, model.mirrored().name[0]]
         names = [
             [*(f"{prefix}:{label}" for prefix in (model.name, *sides)), *([label] if plain.count(label) == 1 else [])]
             for label in model.labels

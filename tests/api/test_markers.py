@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import depthtrack as dt
-from depthtrack.api import markers
+from depthtrack.calibration import marker_solution
 from depthtrack.markers.formats.registry import write_capture
 from depthtrack.markers.initialisation.started import StartedModels
 from depthtrack.synthesis.marker_capture import MarkerSynthesis, SyntheticMarkers, synthesise_markers
@@ -55,8 +55,8 @@ def test_a_changed_source_is_rejected(capture: Path, made: SyntheticMarkers, tmp
 
 
 def test_labelling_writes_a_folder(made: SyntheticMarkers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(markers, "find_start", lambda *_, **__: StartedModels((None, None)))
-    monkeypatch.setattr(markers, "label_from", lambda *_: made.truth)
+    monkeypatch.setattr(marker_solution, "find_start", lambda *_, **__: StartedModels((None, None)))
+    monkeypatch.setattr(marker_solution, "label_from", lambda *_: made.truth)
     labelled = dt.label_markers(made.capture, made.models, out=tmp_path / "out")
     assert labelled is made.truth
     found = dt.read_marker_folder(tmp_path / "out")

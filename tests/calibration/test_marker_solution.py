@@ -1,5 +1,6 @@
 """Solving of a capture: labels of the file or found ones, calibrated or not."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from depthtrack.calibration import marker_solution
 from depthtrack.calibration.marker_solution import solve_capture
 from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.markers.initialisation.started import StartedModels
 from depthtrack.markers.labelled_fit import fit_poses
+from depthtrack.markers.models.model_choice import choose_models
 from depthtrack.synthesis.marker_capture import MarkerSynthesis, SyntheticMarkers, synthesise_markers
 
 
@@ -20,7 +23,7 @@ def made() -> SyntheticMarkers:
 
 def test_labels_of_the_file_give_sizes_and_closer_markers(made: SyntheticMarkers) -> None:
     capture = made.truth.labelled()
-    plain = solve_capture(capture, made.models, calibrate=False)
+    plain = solve_capture(capture, made.models, calibrate="never")
     solved = solve_capture(capture, made.models)
     assert not plain.calibrated
     assert list(solved.sizes()) == ["right"]
@@ -55,3 +58,28 @@ def test_found_labels_are_found_again_with_the_calibrated_models(
 def test_labels_that_must_be_there_are_missed(made: SyntheticMarkers) -> None:
     with pytest.raises(InputError, match="lacks labels of right, body1"):
         solve_capture(made.capture, made.models, labels="file")
+
+
+def test_few_frames_are_measured_only_if_they_must_be(made: SyntheticMarkers) -> None:
+    capture = made.truth.labelled().between(0, 4)
+    assert not solve_capture(capture, made.models, calibrate="if possible").calibrated
+    with pytest.raises(InputError, match="a calibration needs"):
+        solve_capture(capture, made.models)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_labels_give_an_open_side(side: Side) -> None:
+    synthesis = MarkerSynthesis(motion="grasp", layout="13", hand=HandShape(side=side), frames=40, rate=40.0, seed=5)
+    capture = synthesise_markers(synthesis).truth.labelled()
+    models = choose_models(["13"])
+    found = solve_capture(capture, models, calibrate="never")
+    assert found.labelled.models[0].name == side
+    assert found.measured_sides(models) == [side]
+
+
+def test_final_poses_depend_on_the_labels_alone(made: SyntheticMarkers) -> None:
+    fitted = fit_poses(made.truth)
+    moved = tuple(poses + 0.01 for poses in made.truth.poses)
+    again = fit_poses(replace(made.truth, poses=moved))
+    for before, after in zip(fitted.poses, again.poses, strict=True):
+        np.testing.assert_array_equal(before, after)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from depthtrack.calibration import marker_solution
 from depthtrack.cli import main
-from depthtrack.markers import automatic
 from depthtrack.markers.folder.reading import MarkerFolder
 from depthtrack.markers.initialisation.started import StartedModels
 
@@ -21,8 +21,8 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def true_labels(capture: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = MarkerFolder.load(capture.parent / "truth").labelled
-    monkeypatch.setattr(automatic, "find_start", lambda *_, **__: StartedModels((None,)))
-    monkeypatch.setattr(automatic, "label_from", lambda *_: truth)
+    monkeypatch.setattr(marker_solution, "find_start", lambda *_, **__: StartedModels((None,)))
+    monkeypatch.setattr(marker_solution, "label_from", lambda *_: truth)
 
 
 def files(folder: Path) -> dict[str, bytes]:

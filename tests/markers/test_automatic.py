@@ -12,6 +12,8 @@ from depthtrack.markers.automatic import find_start, label_from, sized_models
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.initialisation.started import StartedModel, StartedModels
 from depthtrack.markers.labelling.options import LabellingOptions
+from depthtrack.markers.models.marker_model import MarkerModel
+from depthtrack.markers.models.model_choice import choose_models
 from tests.support.markers import body_with_markers
 
 MODEL = body_with_markers()
@@ -36,7 +38,9 @@ def test_labelling_begins_with_the_pose_and_the_frame_of_the_start(
 ) -> None:
     calls: list[tuple[Any, ...]] = []
     monkeypatch.setattr(automatic, "label_capture", lambda *arguments: calls.append(arguments))
-    monkeypatch.setattr(automatic, "exchange_markers", lambda labelled, options: labelled)
+    steps: list[str] = []
+    monkeypatch.setattr(automatic, "exchange_markers", lambda labelled, options: steps.append("exchange"))
+    monkeypatch.setattr(automatic, "fit_poses", lambda labelled, options: steps.append("fit"))
     monkeypatch.setattr(automatic, "initialise", lambda points, models: StartedModels((*started(0).models, None)))
     begin, options = started(7), LabellingOptions()
     other = body_with_markers()
@@ -47,6 +51,7 @@ def test_labelling_begins_with_the_pose_and_the_frame_of_the_start(
     assert (given, found, chosen, frame) == (capture, models, options, 7)
     assert poses[0] is begin.found[0].pose
     assert poses[1] is None
+    assert steps == ["exchange", "fit"]
     assert [pose is None for pose in starter(np.zeros((3, 3)), models)] == [False, True]
 
 
@@ -69,6 +74,25 @@ def test_a_certain_start_ends_the_search(capture: MarkerCapture, monkeypatch: py
     shown: list[float] = []
     assert find_start(capture, [MODEL], progress=lambda step, share: shown.append(share)).frame == 0
     assert shown == [0.0]
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_an_open_side_becomes_the_one_with_less_energy(
+    side: str, capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[str] = []
+
+    def initialise(points: np.ndarray, models: tuple[MarkerModel, ...], options: object) -> StartedModels:
+        tried.append(models[0].name)
+        energy = 3.0 if models[0].name == side else 9.0
+        return StartedModels((replace(started(0).found[0], model=models[0], energy=energy),))
+
+    monkeypatch.setattr(automatic, "initialise", initialise)
+    found = find_start(capture, choose_models(["13"]))
+    assert found.found[0].model.name == side
+    assert not found.found[0].model.open_side
+    # A difference of 6 in each frame decides after two of them.
+    assert tried == ["right", "left", "right", "left"]
 
 
 def test_models_that_are_nowhere_are_named(capture: MarkerCapture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def test_markers_exchanged_after_a_common_gap_are_exchanged_back(truth: Labelled
     assert (wrong.columns[0] != truth.columns[0])[80:].any()
     mended = exchange_markers(wrong)
     np.testing.assert_array_equal(mended.columns[0][80:], truth.columns[0][80:])
-    assert np.nanmax(mended.residuals(0)[80:]) < np.nanmax(wrong.residuals(0)[80:])
+    assert np.nanmax(fit_poses(mended).residuals(0)[80:]) < np.nanmax(wrong.residuals(0)[80:])
 
 
 def test_right_labels_stay(truth: LabelledCapture) -> None:

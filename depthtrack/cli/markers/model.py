@@ -70,6 +70,7 @@ class Command:
         return model, {"spread_mm": [round(1000 * float(s), 3) for s in model.spread]}
 
     def _hand(self, capture: "MarkerCapture") -> "tuple[MarkerModel, dict[str, Any]]":
+        from depthtrack.calibration.marker_sides import with_measured_sides
         from depthtrack.calibration.markers import calibrate_markers
 
         models = self.chosen.load()
@@ -79,7 +80,10 @@ class Command:
             raise InputError(f"the rounds must not be negative, found {self.rounds}")
         layout = models[0] if self.name is None else models[0].with_(name=self.name)
         labelled = None if self.unlabelled else self._labelled_by_name(capture, layout)
-        calibrated = calibrate_markers(self._labelled(capture, layout) if labelled is None else labelled)
+        if labelled is None:
+            calibrated = calibrate_markers(self._labelled(capture, layout))
+        else:
+            calibrated = calibrate_markers(with_measured_sides(labelled))
         figures = {"labels": "found" if labelled is None else "of the capture"} | _figures(calibrated)
         return calibrated.model, figures
 
@@ -109,7 +113,10 @@ class Command:
                 return label_from(capture, models, started)
 
             _, labelled = self_calibrate(capture, sized_models((layout,), started), label, self.rounds)
-        return replace(labelled, models=(layout,))
+        found = labelled.models[0].hand
+        assert found is not None
+        worn = layout if layout.hand is not None and found.side == layout.hand.side else layout.mirrored()
+        return replace(labelled, models=(worn,))
 
 
 def _figures(calibrated: "CalibratedMarkers") -> dict[str, Any]:

@@ -19,7 +19,10 @@ class ModelOptions:
     models: Annotated[tuple[str, ...], tyro.conf.arg(aliases=("-m",), metavar="MODEL ...")] = field(
         default_factory=tuple
     )
-    """Each a layout such as 26 or left:16, a layout file, or the file of a model from `markers model` or `solve`."""
+    """Each a layout such as 26 or left:16, a layout file, or the file of a model from `markers model` or `solve`.
+
+    The markers decide the side of a layout without one, unless --hand gives it.
+    """
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of hands that wear layouts (default: the average adult's, which the capture corrects)."""
 

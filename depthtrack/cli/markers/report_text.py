@@ -30,6 +30,8 @@ def print_report(folder: Path, labelled: "LabelledCapture", as_json: bool, **ent
             f"  {name:16}{model['markers']:>9}{_percent(model['measured_share']):>10}{_percent(posed):>9}"
             f"{_mm(model['residual_mm']):>11}{_share(model['confidence']):>12}"
         )
+    for name in entries.get("measured_sides", ()):
+        print(f"  {name}: the side was measured from the markers")
     for name, sizes in entries.get("sizes", {}).items():
         length = sizes["hand_length"]
         print(f"  {name}: {length['mm']:.1f} mm long, standard deviation {length['sd_mm']:.1f} mm")

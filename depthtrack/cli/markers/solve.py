@@ -39,42 +39,9 @@ class SolveCommand:
         raise NotImplementedError
 
     def run(self) -> None:
-        from depthtrack.calibration.marker_solution import solve_capture
-        from depthtrack.cli.markers.report_text import print_report
-        from depthtrack.cli.progress import percent_bar
-        from depthtrack.markers.initialisation.started import save_started
-        from depthtrack.options import to_data
+        from depthtrack.cli.markers.solution import solve_and_write
 
-        models = self.chosen.load()
-        self.folder.check(models)
-        capture = self.start.part(self.capture.read())
-        with percent_bar() as show:
-            solution = solve_capture(
-                capture,
-                models,
-                labels=self.labels,
-                calibrate=self.calibrate,
-                labelling=self.labelling,
-                initialisation=self.start.initialisation,
-                started=self.start.saved(models, len(capture)),
-                progress=show,
-            )
-        sizes = {
-            name: {size: {"mm": 1000 * length, "sd_mm": 1000 * sd} for size, (length, sd) in found.items()}
-            for name, found in solution.sizes().items()
-        }
-        configuration = {
-            "command": "solve",
-            "labels": self.labels,
-            "calibrate": self.calibrate,
-            "method": self.start.method,
-            "labelling": to_data(self.labelling),
-            "sizes": sizes,
-        }
-        self.folder.write(solution.labelled, self.capture.path, configuration)
-        if solution.started is not None:
-            save_started(solution.started, self.folder.out / "start.json")
-        print_report(self.folder.out, solution.labelled, self.json, sizes=sizes)
+        solve_and_write(self, "solve", self.labels, "always" if self.calibrate else "never")
 
 
 def command(arguments: Sequence[str]) -> tuple[type[SolveCommand], Any]:

@@ -58,9 +58,10 @@ class StartOptions:
             return None
         saved = StartedModels.from_json(self.start)
         names = [None if one is None else one.model.name for one in saved.models]
-        wanted = [model.name for model in models]
-        if len(names) != len(wanted) or any(a not in (None, b) for a, b in zip(names, wanted, strict=True)):
-            raise InputError(f"{self.start} must be of the models {', '.join(wanted)}: name them in its order")
+        wanted = [{model.name, model.mirrored().name} if model.open_side else {model.name} for model in models]
+        if len(names) != len(wanted) or any(a is not None and a not in b for a, b in zip(names, wanted, strict=True)):
+            expected = ", ".join(model.name for model in models)
+            raise InputError(f"{self.start} must be of the models {expected}: name them in its order")
         if not 0 <= saved.frame < frames:
             raise InputError(f"{self.start} starts in frame {saved.frame + 1}, but the capture has {frames} frames")
         return saved

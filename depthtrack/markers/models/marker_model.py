@@ -15,7 +15,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.shape import HandShape, other_side
 from depthtrack.hand.size_parameters import COUNT
 from depthtrack.types import Array, Index
 
@@ -35,6 +35,7 @@ class MarkerModel:
     spread: (M,) metres, standard deviation of the offsets.
     hand: sizes of the hand; None for a rigid body.
     size_spread: (35,) standard deviation of these sizes, see `hand.size_parameters`; None if they are not measured.
+    open_side: whether the capture decides the side of the hand. Files do not store it.
 
     Raises:
         InputError: if the fields do not agree, or a number is out of range.
@@ -47,6 +48,7 @@ class MarkerModel:
     spread: Array
     hand: HandShape | None = None
     size_spread: Array | None = None
+    open_side: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.labels)
@@ -93,6 +95,16 @@ class MarkerModel:
             InputError: as the constructor does.
         """
         return replace(self, **changes)
+
+    def mirrored(self) -> Self:
+        """Return the model of the hand's other side; a name that is the side changes with it."""
+        assert self.hand is not None
+        side = other_side(self.hand.side)
+        return self.with_(
+            name=side if self.name == self.hand.side else self.name,
+            offsets=self.offsets * [-1, 1, 1],
+            hand=self.hand.with_(side=side),
+        )
 
     def to_json(self) -> str:
         """Return the text of the model's file, lengths in millimetres."""

@@ -16,7 +16,7 @@ def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = N
     """Return the models that words name.
 
     words: each a model, the file of a model, or a layout after the side of its hand, such as `left:19`. Without a side,
-        a layout is worn by `hand`.
+        a layout is worn by `hand`, or by one whose side the capture decides.
     hand: sizes of the hands; those of the average adult if None.
 
     Raises:
@@ -24,23 +24,26 @@ def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = N
     """
     if not words:
         raise InputError("expected a model: name a layout such as 26 or left:16, or the file of a model")
-    sizes = HandShape() if hand is None else hand
-    models = tuple(word if isinstance(word, MarkerModel) else _model(word, sizes) for word in words)
+    models = tuple(word if isinstance(word, MarkerModel) else _model(word, hand) for word in words)
     names = [model.name for model in models]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"two models are named '{name[:64]}': give hands different sides, or rename one")
-    return models
+    return tuple(
+        model.with_(open_side=False) if model.open_side and model.mirrored().name in names else model
+        for model in models
+    )
 
 
-def _model(word: str, hand: HandShape) -> MarkerModel:
+def _model(word: str, hand: HandShape | None) -> MarkerModel:
+    sizes = HandShape() if hand is None else hand
     side, _, layout = word.partition(":")
     for known in get_args(Side):
         if side == known:
-            return find_layout(layout).on(hand.with_(side=known))
+            return find_layout(layout).on(sizes.with_(side=known))
     if word.endswith(".json") and not _is_layout(Path(word)):
         return MarkerModel.from_json(Path(word))
-    return find_layout(word).on(hand)
+    return find_layout(word).on(sizes).with_(open_side=hand is None)
 
 
 def _is_layout(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from depthtrack.errors import InputError
@@ -23,6 +24,16 @@ def test_words_name_layouts_sides_and_files(tmp_path: Path) -> None:
     assert (models[0].hand.scale, models[1].hand.side) == (0.9, "left")
     assert choose_models([f"left:{layout}"])[0].labels == models[0].labels
     assert choose_models([str(layout)])[0].name == "right"
+
+
+def test_the_side_of_a_layout_is_open_unless_a_word_or_a_hand_gives_it() -> None:
+    alone, given, worn = (choose_models(*a)[0] for a in ((["13"],), (["right:13"],), (["13"], HandShape(side="left"))))
+    assert (alone.open_side, given.open_side, worn.open_side) == (True, False, False)
+    assert [model.open_side for model in choose_models(["13", "left:16"])] == [False, False]
+    other = alone.mirrored()
+    assert (other.name, worn.name) == ("left", "left")
+    np.testing.assert_allclose(other.offsets, worn.offsets, rtol=0, atol=1e-12)
+    assert alone.with_(name="hand").mirrored().name == "hand"
 
 
 @pytest.mark.parametrize(
