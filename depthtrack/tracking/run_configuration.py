@@ -4,10 +4,15 @@ import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, Self
 
+import cv2
+import numba
+import numpy as np
+import scipy
+
+import depthtrack
 from depthtrack.errors import InputError
 from depthtrack.files import read_bounded
 from depthtrack.geometry.camera import Camera
@@ -174,11 +179,9 @@ class RunConfiguration:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that decide poses."""
-    return {
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("depthtrack", "numpy", "numba", "opencv-python-headless", "scipy")},
-    }
+    """Return the versions of Python and of the packages that decide poses, as each module states its own."""
+    modules = (depthtrack, np, numba, cv2, scipy)
+    return {"python": platform.python_version(), **{module.__name__: module.__version__ for module in modules}}
 
 
 def digests(configuration: RunConfiguration) -> dict[str, str]:

@@ -1,7 +1,9 @@
 """Configuration of a run: JSON round trip, repeated runs, and earlier run folders."""
 
+import importlib.metadata
 import json
 import math
+import re
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 import pytest
 
+from depthtrack import __version__
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
@@ -20,7 +23,7 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, HybridConfig, IkConfig, PsoConfig, TrackerConfig
 from depthtrack.tracking.earlier_runs import upgraded
 from depthtrack.tracking.run import TrackingRun, configure
-from depthtrack.tracking.run_configuration import RunConfiguration
+from depthtrack.tracking.run_configuration import RunConfiguration, versions
 from tests.support.segmentation import changed_options
 
 FRAMES = 3
@@ -251,3 +254,12 @@ def test_a_run_of_format_5_holds_each_angle_alone(options: dict[str, Any]) -> No
     assert isinstance(tracker, IkConfig)
     assert tracker.fit.icp.posture_weight == 0
     assert tracker.fit.icp.icp_iterations == options.get("fit", {}).get("icp", {}).get("icp_iterations", 5)
+
+
+def test_the_versions_need_no_installed_metadata(monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenCV comes in four packages, and a source tree may be used without installation."""
+    monkeypatch.setattr(importlib.metadata, "version", None)
+    stated = versions()
+    assert stated["depthtrack"] == __version__
+    assert all(re.match(r"\d+\.\d+", number) for number in stated.values())
+    assert {"python", "numpy", "numba", "cv2", "scipy"} < stated.keys()
