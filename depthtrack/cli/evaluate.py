@@ -107,7 +107,7 @@ class Command:
 
     def _predictions(self, path: Path) -> tuple[list[dict[str, Any]], list[str]]:
         from depthtrack.evaluation.predictions import evaluate_predictions
-        from depthtrack.export.benchmark_joints import find_benchmark
+        from depthtrack.hand.benchmark_joints import find_benchmark
         from depthtrack.recording import open_sequence
 
         if self.runs or self.report is not None:

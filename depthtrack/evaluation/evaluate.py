@@ -169,6 +169,13 @@ def _pose_errors(
         )
         added = added_jitter(model.endpoints(run.poses), true_points, run.timestamps)
         return true_points, points, (points.mean(), points.largest(), angle_error(run.poses, true_poses), added)
+    if truth.benchmark is not None:
+        benchmark = truth.benchmark.benchmark
+        joints = _select_rows(truth.benchmark.positions, rows)
+        points = PointErrors.between(
+            "joint_error_mm", benchmark.joints, benchmark.from_keypoints(model.keypoints(run.poses)), joints
+        )
+        return joints, points, (points.mean(), points.largest())
     if truth.joints is not None:
         joints = _select_rows(truth.joints, rows)
         points = joint_errors(model, run.poses, joints)

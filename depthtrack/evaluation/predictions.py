@@ -8,8 +8,8 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import Metric, PointErrors, SuccessCurve
-from depthtrack.export.benchmark_joints import Benchmark
 from depthtrack.export.uvd import read_uvd
+from depthtrack.hand.benchmark_joints import Benchmark
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.recording.sequence import Sequence
 from depthtrack.types import Array
@@ -99,6 +99,10 @@ def evaluate_predictions(predictions: Path, benchmark: Benchmark, truth: Path | 
 def _annotated(sequence: Sequence, benchmark: Benchmark) -> Array:
     """Return the joints (T, J, 3) of the benchmark in all frames of a recording; NaN if unknown."""
     truth = sequence.ground_truth
+    if truth is not None and truth.benchmark is not None and truth.benchmark.benchmark.name == benchmark.name:
+        rows = [truth.at(float(time)) for time in sequence.timestamps]
+        unknown = np.full((len(benchmark.joints), 3), np.nan)
+        return np.array([unknown if row is None else truth.benchmark.positions[row] for row in rows])
     known = [None if truth is None else truth.keypoints_at(float(time)) for time in sequence.timestamps]
     if all(keypoints is None for keypoints in known):
         raise InputError(f"{sequence.name} has no joints to compare with: give --labels")

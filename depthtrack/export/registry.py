@@ -69,8 +69,8 @@ def _bvh() -> Write:
 
 
 def _benchmark(name: str) -> Write:
-    from depthtrack.export.benchmark_joints import find_benchmark
     from depthtrack.export.uvd import write
+    from depthtrack.hand.benchmark_joints import find_benchmark
 
     return partial(write, find_benchmark(name))
 

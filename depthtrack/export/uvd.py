@@ -1,7 +1,9 @@
 """The text format of public benchmarks: a line a frame, u v d (px, px, mm) of each joint.
 
 Predictions and labels of NYU, ICVL and MSRA have this format (see `benchmark_joints`). Blanks or commas separate the
-numbers; a file name may come first. An unknown joint is `nan nan nan`, or has no positive depth.
+numbers; a file name may come first. An unknown joint is `nan nan nan`, or has no positive depth. MSRA's own
+`joint.txt` has another format, x y z with negative z below a line with their count; `recording.sequences.msra15`
+reads it.
 """
 
 import math
@@ -11,15 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.export.benchmark_joints import Benchmark
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import read_lines, replace_atomically
 from depthtrack.geometry.camera import Camera
+from depthtrack.hand.benchmark_joints import Benchmark
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array
 
 MAX_BYTES = 1 << 28
 """Largest file read, a hundred times the benchmarks' own."""
+_NOT_UVD = "if it is a joint.txt of MSRA, with x y z and negative z, give its folder as --sequence instead"
 _LARGEST = 1e6
 """Bound on coordinates, pixels or millimetres."""
 
@@ -30,13 +33,15 @@ def read_uvd(path: Path, benchmark: Benchmark) -> Array:
     Unknown joints are NaN.
 
     Raises:
-        InputError: if a line does not have three numbers for each joint; it names the line.
+        InputError: if a line does not have three numbers for each joint, or no depth is positive; it names the line.
     """
     values, frames = array("d"), 0
     for number, line in enumerate(read_lines(path, MAX_BYTES), start=1):
         fields = line.replace(",", " ").split()
         if not fields:
             continue
+        if frames == 0 and len(fields) == 1 and fields[0].isdecimal():
+            raise InputError(f"{path} begins with a number of frames: {_NOT_UVD}")
         values.extend(_numbers(fields, 3 * len(benchmark.joints), f"{path}, line {number}", benchmark))
         frames += 1
         if frames > MAX_FRAMES:
@@ -44,6 +49,7 @@ def read_uvd(path: Path, benchmark: Benchmark) -> Array:
     if frames == 0:
         raise InputError(f"{path} must have a line of u v d for each frame, found none")
     uvd = np.array(values).reshape(frames, len(benchmark.joints), 3)
+    _check_depths(path, uvd[..., 2])
     return _from_uvd(uvd, benchmark.camera)
 
 
@@ -72,6 +78,15 @@ def write_uvd(path: Path, benchmark: Benchmark, joints: Array) -> None:
     with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         for frame in _to_uvd(joints, benchmark.camera):
             file.write(" ".join(f"{x:.3f}" for x in frame.ravel()) + "\n")
+
+
+def _check_depths(path: Path, depths: Array) -> None:
+    """Raise InputError if depths (T, J), mm, are known but none is positive."""
+    known = depths[np.isfinite(depths)]
+    if len(known) and not np.any(known > 0):
+        raise InputError(
+            f"{path} must hold u v d with depths above 0 mm, found {known.min():g} to {known.max():g} mm: {_NOT_UVD}"
+        )
 
 
 def _from_uvd(uvd: Array, camera: Camera) -> Array:

@@ -66,11 +66,35 @@ def read_colour(path: Path, shape: tuple[int, int]) -> Image:
     Raises:
         DamagedFrameError: if the file is missing or damaged, or has another size.
     """
-    data, _ = _read(path, shape)
-    image = _decode(path, data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    return decode_colour(path, _read_bytes(path, shape), shape)
+
+
+def decode_colour(where: Path | str, data: bytes, shape: tuple[int, int]) -> Image:
+    """Return the RGB pixels (h, w, 3) of the bytes of a PNG or JPEG, whose name is `where`.
+
+    Raises:
+        DamagedFrameError: if they are damaged, or the image has another size.
+    """
+    _check(where, data, shape)
+    image = _decode(where, data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if image.shape != (*shape, 3):
-        raise DamagedFrameError(f"{path} must decode to 8-bit colour {shape}, found {image.dtype} {image.shape}")
+        raise DamagedFrameError(f"{where} must decode to 8-bit colour {shape}, found {image.dtype} {image.shape}")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+
+
+def read_packed(path: Path, shape: tuple[int, int]) -> Image:
+    """Return the RGB bytes (h, w, 3) of a PNG whose colours hold parts of a larger number.
+
+    Raises:
+        DamagedFrameError: if the file is missing or damaged, has another size, or is no 8-bit colour PNG.
+    """
+    data, header = _read(path, shape)
+    if header.image_format != "PNG" or header.mode != "RGB":
+        raise DamagedFrameError(
+            f"{path} must be a PNG with 8-bit colours that hold the depth, found a {header.image_format} of mode"
+            f" {header.mode}: copy the original file"
+        )
+    return cv2.cvtColor(_decode(path, data, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
 def read_mask(path: Path, shape: tuple[int, int]) -> Mask:
@@ -114,12 +138,22 @@ def _write(path: Path, suffix: str, image: Image | NDArray[np.uint16], settings:
 
 def _read(path: Path, shape: tuple[int, int]) -> tuple[bytes, _Header]:
     """Return the bytes and the header of an undamaged file of the expected size."""
+    data = _read_bytes(path, shape)
+    return data, _check(path, data, shape)
+
+
+def _read_bytes(path: Path, shape: tuple[int, int]) -> bytes:
     height, width = shape
     try:
         # Eight bytes a pixel exceed every image here uncompressed; the rest is for metadata.
-        data = read_bounded(path, 8 * height * width + (1 << 20))
+        return read_bounded(path, 8 * height * width + (1 << 20))
     except InputError as error:
         raise DamagedFrameError(str(error)) from error
+
+
+def _check(path: Path | str, data: bytes, shape: tuple[int, int]) -> _Header:
+    """Return the header of an undamaged image of the expected size."""
+    height, width = shape
     header, image = _open(path, data)
     if (header.height, header.width) != shape:
         raise DamagedFrameError(
@@ -132,10 +166,10 @@ def _read(path: Path, shape: tuple[int, int]) -> tuple[bytes, _Header]:
     complete = _PNG_END in data if header.image_format == "PNG" else _JPEG_END in data[header.pixels_begin :]
     if not complete:
         raise DamagedFrameError(f"{path} is truncated: it ends after {len(data)} bytes, in the middle of the image")
-    return data, header
+    return header
 
 
-def _open(path: Path, data: bytes) -> tuple[_Header, Pictures.Image]:
+def _open(path: Path | str, data: bytes) -> tuple[_Header, Pictures.Image]:
     """Return the header and Pillow's image without decoding its pixels."""
     file = BytesIO(data)
     try:
@@ -150,7 +184,7 @@ def _open(path: Path, data: bytes) -> tuple[_Header, Pictures.Image]:
     return _Header(str(image.format), image.mode, image.width, image.height, file.tell()), image
 
 
-def _decode(path: Path, data: bytes, flags: int) -> NDArray[np.integer[Any] | np.floating[Any]]:
+def _decode(path: Path | str, data: bytes, flags: int) -> NDArray[np.integer[Any] | np.floating[Any]]:
     try:
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
     except cv2.error:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.hand.benchmark_joints import Benchmark
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.types import Array, Depth, Image, Mask
@@ -49,12 +50,24 @@ class Frame:
 
 
 @dataclass(frozen=True)
+class BenchmarkJoints:
+    """Annotated joints of a benchmark whose skeleton differs from the 21 keypoints.
+
+    positions: (T, J, 3) metres, world frame, in the order of `benchmark.joints`; NaN if unknown.
+    """
+
+    benchmark: Benchmark
+    positions: Array
+
+
+@dataclass(frozen=True)
 class GroundTruth:
     """The annotations of a recording; `poses` or `joints` may be absent.
 
     timestamps: (T,) of the annotated frames, seconds, increasing.
     poses: (T, 27) of `hand`, metres, quaternion, radians, world frame.
-    joints: (T, 21, 3) keypoints, metres, world frame, MediaPipe order.
+    joints: (T, 21, 3) keypoints, metres, world frame, MediaPipe order; NaN if unknown.
+    benchmark: joints of another skeleton, with which runs are compared by name; None without any.
 
     The world frame is that of `Sequence.T_camera_world`: the camera frame of depth cameras.
 
@@ -65,6 +78,7 @@ class GroundTruth:
     poses: Array | None = None
     joints: Array | None = None
     hand: HandShape | None = None
+    benchmark: BenchmarkJoints | None = None
 
     def at(self, timestamp: float, tolerance: float = 1e-3) -> int | None:
         """Return the row of the annotation within `tolerance` (s) of `timestamp`, or None."""

@@ -97,7 +97,7 @@ def summarise(
         masks=counts.masks,
         exact_depths=counts.exact_depths,
         poses=annotated if truth and truth.poses is not None else 0,
-        joints=annotated if truth and truth.joints is not None else 0,
+        joints=annotated if truth and (truth.joints is not None or truth.benchmark is not None) else 0,
         hand=f"{sequence.hand.side}, scale {sequence.hand.scale:g}" if sequence.hand else None,
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),

@@ -8,8 +8,8 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.evaluation.predictions import evaluate_predictions
-from depthtrack.export.benchmark_joints import BENCHMARKS
 from depthtrack.export.uvd import write_uvd
+from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.recording import open_sequence
 from tests.support.runs import synthesise, true_poses, write_run
 

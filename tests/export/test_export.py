@@ -14,11 +14,11 @@ from hypothesis.extra.numpy import arrays
 
 from depthtrack.cli import main
 from depthtrack.errors import InputError
-from depthtrack.export.benchmark_joints import BENCHMARKS
 from depthtrack.export.csv_table import HEADER
 from depthtrack.export.mot import palm_rotations
 from depthtrack.export.uvd import read_uvd, write_uvd
 from depthtrack.geometry.rotations import quaternion_exp, rotation_matrix
+from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.hand.kinematics import KEYPOINT_NAMES, HandModel
 from depthtrack.hand.pose import POSE_NAMES
 from depthtrack.hand.shape import HandShape

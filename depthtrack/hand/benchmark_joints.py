@@ -41,12 +41,30 @@ class Benchmark:
         object.__setattr__(self, "joints", tuple(self.mixtures))
 
     def from_keypoints(self, keypoints: ArrayLike) -> Array:
-        """Return the benchmark's joints (..., J, 3) of keypoints (..., 21, 3), in their unit."""
+        """Return the benchmark's joints (..., J, 3) of keypoints (..., 21, 3), in their unit.
+
+        A joint is NaN if one of its keypoints is.
+        """
         weights = np.zeros((len(self.joints), len(KEYPOINT_NAMES)))
         for j, mixture in enumerate(self.mixtures.values()):
             for name, weight in mixture.items():
                 weights[j, KEYPOINT_NAMES.index(name)] = weight
-        return np.einsum("jk,...kc->...jc", weights, np.asarray(keypoints, dtype=np.float64))
+        points = np.asarray(keypoints, dtype=np.float64)
+        unknown = (~np.isfinite(points)).astype(np.float64)
+        mixed = np.einsum("jk,...kc->...jc", weights, np.nan_to_num(points))
+        return np.where(np.einsum("jk,...kc->...jc", np.abs(weights), unknown) > 0, np.nan, mixed)
+
+    def to_keypoints(self, joints: ArrayLike) -> Array:
+        """Return the keypoints (..., 21, 3) of the benchmark's joints (..., J, 3); NaN for those it lacks.
+
+        A joint that is a mixture of keypoints gives none.
+        """
+        points = np.asarray(joints, dtype=np.float64)
+        keypoints = np.full((*points.shape[:-2], len(KEYPOINT_NAMES), 3), np.nan)
+        for j, mixture in enumerate(self.mixtures.values()):
+            if len(mixture) == 1:
+                keypoints[..., KEYPOINT_NAMES.index(next(iter(mixture))), :] = points[..., j, :]
+        return keypoints
 
 
 def _same(*names: str) -> dict[str, Mixture]:
