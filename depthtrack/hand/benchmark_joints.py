@@ -55,9 +55,9 @@ class Benchmark:
         return np.where(np.einsum("jk,...kc->...jc", np.abs(weights), unknown) > 0, np.nan, mixed)
 
     def to_keypoints(self, joints: ArrayLike) -> Array:
-        """Return the keypoints (..., 21, 3) of the benchmark's joints (..., J, 3); NaN for those it lacks.
+        """Return the keypoints (..., 21, 3) of the benchmark's joints (..., J, 3).
 
-        A joint that is a mixture of keypoints gives none.
+        A keypoint is NaN if it is no joint of its own, but part of a mixture or of none.
         """
         points = np.asarray(joints, dtype=np.float64)
         keypoints = np.full((*points.shape[:-2], len(KEYPOINT_NAMES), 3), np.nan)

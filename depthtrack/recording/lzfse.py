@@ -1,4 +1,6 @@
-"""LZFSE data of a known size: the sizes that its blocks declare are added up before anything is decompressed.
+"""Decompression of LZFSE data of a known size.
+
+The sizes that its blocks declare are added up before anything is decompressed.
 
 | mark | block                      | header                                                                  |
 |------|----------------------------|-------------------------------------------------------------------------|

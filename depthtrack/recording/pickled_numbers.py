@@ -41,7 +41,9 @@ class _Mark:
 
 
 def read_pickled_numbers(path: Path, largest: int = 1 << 24) -> Mapping[str, Any]:
-    """Return the entries of a pickled dictionary; arrays are NumPy arrays, what is no number or text is None.
+    """Return the entries of a pickled dictionary.
+
+    Arrays are NumPy arrays. What is no number, text or list of them is None.
 
     Raises:
         InputError: if the file is missing, longer than `largest` bytes, damaged, or holds no dictionary.
@@ -187,7 +189,10 @@ def _dtype(call: Any) -> np.dtype[Any] | None:
 
 
 def _bytes(data: Any) -> bytes | bytearray:
-    """Return the bytes of an array: Python 2 wrote them as text, protocols below 3 as a call of an encoder."""
+    """Return the bytes of an array.
+
+    Python 2 wrote them as text, protocols below 3 as a call of an encoder.
+    """
     if isinstance(data, _Call) and data.function == _Name("_codecs.encode"):
         data = data.arguments[0]
     return data if isinstance(data, bytes | bytearray) else str(data).encode("latin-1")

@@ -1,6 +1,6 @@
-"""Members of a zip file, read one at a time with bounds on their sizes; a truncated file up to its end.
+"""Members of a zip file, read one at a time with bounds on their sizes.
 
-The list of members is at the end of a zip file. If it is missing, the headers before the members are read instead.
+The list of members is at the end of a zip file. If the file is truncated, the headers before the members are read.
 Source: PKWARE, APPNOTE.TXT, sections 4.3 and 4.5.
 """
 
@@ -65,7 +65,7 @@ class ZipMembers:
         return cls(path, members, truncated)
 
     def numbered(self, pattern: re.Pattern[str]) -> dict[int, str]:
-        """Return the names that match as a whole, by the number in the pattern's only group, increasing."""
+        """Return the names that match as a whole, by the number in the only group, increasing."""
         return dict(sorted((int(match[1]), name) for name in self.members if (match := pattern.fullmatch(name))))
 
     def read(self, name: str, largest: int) -> bytes:
@@ -119,7 +119,7 @@ def _scanned(path: Path) -> dict[str, _Member]:
 
 
 def _header(file: BinaryIO, offset: int) -> tuple[str, int, _Member] | None:
-    """Return the name, the offset of the bytes, and the member at `offset`; None if there is none."""
+    """Return the name, the offset of the bytes, and the member at `offset`, or None."""
     file.seek(offset)
     data = file.read(_HEADER.size)
     if len(data) < _HEADER.size or not data.startswith(_HEADER_MARK):
@@ -139,7 +139,10 @@ def _header(file: BinaryIO, offset: int) -> tuple[str, int, _Member] | None:
 
 
 def _long_sizes(extra: bytes) -> tuple[int, int]:
-    """Return the size and the compressed size in a ZIP64 extra field; sizes that no file has without one."""
+    """Return the size and the compressed size in a ZIP64 extra field.
+
+    Without one they are larger than any file.
+    """
     while len(extra) >= 4:
         kind, length = struct.unpack_from("<2H", extra)
         if kind == 1 and length >= 16 and len(extra) >= 20:
@@ -150,7 +153,10 @@ def _long_sizes(extra: bytes) -> tuple[int, int]:
 
 
 def _descriptor(file: BinaryIO, begin: int) -> tuple[int, int, int] | None:
-    """Return checksum, compressed size and size stated behind bytes that begin at `begin`; None if cut."""
+    """Return checksum, compressed size and size stated behind bytes, or None if they are cut.
+
+    begin: offset of the bytes.
+    """
     file.seek(begin)
     data = file.read(_MAX_UNSIZED + _DESCRIPTOR.size)
     place = data.find(_DESCRIPTOR_MARK)

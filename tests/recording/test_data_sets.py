@@ -1,4 +1,4 @@
-"""Data sets with ground truth, read to their published formats; runs are compared with their joints by name."""
+"""Data sets are read by their published formats, and runs are compared with their joints."""
 
 import struct
 from collections.abc import Callable

@@ -31,7 +31,7 @@ def sample(path: Path, **fields: Any) -> Path:
 
 
 def test_poses_are_those_of_the_folder_that_it_was_copied_from(tmp_path: Path) -> None:
-    folder = synthesise(tmp_path / "folder", 4, "--model", "skin", "--sensor", "kinect1")
+    folder = synthesise(tmp_path / "folder", 3)
     file = copy_as_r3d(folder, tmp_path / "copy.r3d")
     poses = []
     for path in (folder, file):

@@ -21,7 +21,7 @@ HO3D_UNIT = 0.00012498664727900177
 
 
 def write_msra15(folder: Path, depths: Depths, joints: Joints | None = None) -> Path:
-    """depths (h, w) metres; joints (T, 21, 3) metres, camera frame, in the order of the benchmark."""
+    """depths (h, w) metres; joints (T, 21, 3) metres, camera frame, the benchmark's order."""
     folder.mkdir(parents=True)
     for number, depth in enumerate(depths):
         height, width = depth.shape
@@ -73,7 +73,7 @@ def write_icvl(root: Path, depths: Depths, joints: Joints) -> Path:
 def write_dexycb(
     root: Path, camera: Camera, depths: Depths, joints: Joints, mask: NDArray[np.bool_], colour: NDArray[np.uint8]
 ) -> Path:
-    """joints (T, 21, 3) metres; a frame whose joints are NaN is written as not seen. Returns the camera's folder."""
+    """joints (T, 21, 3) metres; NaN joints are written as not seen. Returns the folder."""
     folder = root / "20200709-subject-01" / "20200709_141754" / "836212060125"
     folder.mkdir(parents=True)
     for number, depth in enumerate(depths):

@@ -1,4 +1,6 @@
-"""A recording of one camera of DexYCB: the folder `20200709-subject-01/20200709_141754/836212060125`.
+"""A recording of one camera of DexYCB.
+
+Its folder is `20200709-subject-01/20200709_141754/836212060125`.
 
 | file                                 | content                                                      |
 |--------------------------------------|--------------------------------------------------------------|

@@ -91,7 +91,7 @@ class Msra15Sequence(BaseSequence):
 
 
 def read_joints(path: Path) -> Array:
-    """Return the joints (T, 21, 3) of a `joint.txt`, metres, camera frame, in the order of the file.
+    """Return the joints (T, 21, 3) of a `joint.txt` in its order, metres, camera frame.
 
     Raises:
         InputError: if the number of lines differs from the first line, or a line is no 63 numbers with negative z.

@@ -45,7 +45,7 @@ _COARSE = 300
 
 
 class Record3dSequence(BaseSequence):
-    """The frames of a `.r3d` file. A file that is cut short is read up to its last complete frame."""
+    """The frames of a `.r3d` file, up to the last complete one if it is cut short."""
 
     format_name = "a .r3d file (Record3D)"
 
@@ -212,7 +212,7 @@ def _depth_shape(metadata: Mapping[str, Any], colour_shape: tuple[int, int]) -> 
 
 
 def _numbers(value: Any, shape: tuple[int | None, ...]) -> Array | None:
-    """Return finite numbers of a shape, in which None is any size; None if the value is something else."""
+    """Return finite numbers of a shape, in which None is any size; None for anything else."""
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
