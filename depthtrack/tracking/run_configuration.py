@@ -179,7 +179,7 @@ class RunConfiguration:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that decide poses, as each module states its own."""
+    """Return the versions of Python and of the packages that decide poses."""
     modules = (depthtrack, np, numba, cv2, scipy)
     return {"python": platform.python_version(), **{module.__name__: module.__version__ for module in modules}}
 
