@@ -20,10 +20,3 @@ def export_transform(track: JointTrack) -> Array:
 def frame_text(track: JointTrack) -> str:
     """Return the description of the exported frame."""
     return "camera: x right, y up, z backward" if track.frame == "camera" else "capture: its own axes"
-
-
-def continuous(quaternions: Array) -> Array:
-    """Return the same rotations as quaternions (T, ..., 4) that keep their sign from row to row."""
-    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1, keepdims=True) < 0
-    signs = np.cumprod(np.where(turns, -1.0, 1.0), axis=0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs])

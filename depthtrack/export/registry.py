@@ -68,6 +68,18 @@ def _bvh() -> Write:
     return write
 
 
+def _glb() -> Write:
+    from depthtrack.export.glb import write
+
+    return write
+
+
+def _rrd() -> Write:
+    from depthtrack.export.rrd import write
+
+    return write
+
+
 def _benchmark(name: str) -> Write:
     from depthtrack.export.uvd import write
     from depthtrack.hand.benchmark_joints import find_benchmark
@@ -83,6 +95,8 @@ EXPORTERS = {
     "webxr": Exporter((".json", ".csv"), "the 25 joints of WebXR", partial(_xr, "webxr")),
     "mano": Exporter((".npz", ".json"), "rotations of MANO's 16 joints", _mano),
     "bvh": Exporter((".bvh",), "a skeleton and its motion", _bvh),
+    "glb": Exporter((".glb",), "the moving skin as glTF", _glb),
+    "rrd": Exporter((".rrd",), "keypoints for the rerun viewer", _rrd),
     "nyu": Exporter((".txt",), "u v d of NYU's joints", partial(_benchmark, "nyu")),
     "icvl": Exporter((".txt",), "u v d of ICVL's joints", partial(_benchmark, "icvl")),
     "msra": Exporter((".txt",), "u v d of MSRA's joints", partial(_benchmark, "msra")),

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.export.axes import continuous, export_transform, frame_text
+from depthtrack.export.axes import export_transform, frame_text
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import replace_atomically
-from depthtrack.geometry.rotations import quaternion_from_matrix
+from depthtrack.geometry.rotations import continuous, quaternion_from_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.openxr_joints import OPENXR_JOINTS, OPENXR_PARENTS, openxr_radii, openxr_transforms
 from depthtrack.types import Array

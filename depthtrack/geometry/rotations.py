@@ -70,6 +70,13 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Array:
     return normalised(xyzw[:, [3, 0, 1, 2]].reshape(*R.shape[:-2], 4))
 
 
+def continuous(quaternions: Array) -> Array:
+    """Return the same rotations as quaternions (T, ..., 4) that keep their sign from row to row."""
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=-1, keepdims=True) < 0
+    signs = np.cumprod(np.where(turns, -1.0, 1.0), axis=0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs])
+
+
 @compiled(nogil=True)
 def compiled_normalised(w: float, x: float, y: float, z: float) -> Quaternion:
     """Return the unit quaternion with w >= 0."""

@@ -3,7 +3,6 @@
 It needs the extra `view` (rerun-sdk).
 """
 
-import importlib
 import shutil
 import socket
 import sysconfig
@@ -12,7 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from depthtrack.errors import InputError, MissingExtraError
+from depthtrack.errors import InputError
+from depthtrack.export.rrd import rerun_library
 from depthtrack.files import replace_atomically
 from depthtrack.geometry.camera import Camera
 from depthtrack.viewing.theme import ESTIMATED_MASK, TRUE_MASK
@@ -33,7 +33,7 @@ class RerunStream(ABC, Generic[Item]):
     """
 
     def __init__(self, name: str, camera: Camera, near: float, far: float) -> None:
-        self._rr = _rerun()
+        self._rr = rerun_library()
         self._stream = self._rr.RecordingStream("depthtrack", recording_id=None)
         self._stream.send_recording_name(name)
         self._range = near, far
@@ -135,10 +135,3 @@ def _free_port(default: int) -> int:
                 continue
             return int(probe.getsockname()[1])
     raise InputError("the viewer cannot be served: no network port is free")
-
-
-def _rerun() -> Any:
-    try:
-        return importlib.import_module("rerun")
-    except ImportError as error:
-        raise MissingExtraError("the interactive viewer", "view") from error
