@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from depthtrack.geometry.camera import Camera as Camera
     from depthtrack.hand.kinematics import KEYPOINT_NAMES as KEYPOINT_NAMES
     from depthtrack.hand.kinematics import HandModel as HandModel
+    from depthtrack.hand.one_euro import OneEuroFilter as OneEuroFilter
+    from depthtrack.hand.one_euro import OneEuroOptions as OneEuroOptions
     from depthtrack.hand.shape import HandShape as HandShape
     from depthtrack.hand.synergies import Synergies as Synergies
     from depthtrack.markers.capture import MarkerCapture as MarkerCapture
@@ -82,6 +84,7 @@ _MODULES = {
     "export.registry": ("EXPORTERS",),
     "geometry.camera": ("Camera",),
     "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
+    "hand.one_euro": ("OneEuroFilter", "OneEuroOptions"),
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),
     "markers.capture": ("MarkerCapture",),

@@ -20,6 +20,7 @@ from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
 from depthtrack.evaluation.replay import Replay, run_hand
 from depthtrack.export.joint_track import JointTrack
 from depthtrack.export.registry import export_joints
+from depthtrack.hand.one_euro import OneEuroOptions
 from depthtrack.machine import usable_cores
 from depthtrack.recording.run_folder import Run
 from depthtrack.segmentation.options import SegmentationOptions
@@ -177,10 +178,13 @@ def joint_track(run: Run | Path | str) -> JointTrack:
     return JointTrack.of(run, run_hand(run))
 
 
-def export_run(run: Run | Path | str, out: Path | str, format: str | None = None) -> JointTrack:
+def export_run(
+    run: Run | Path | str, out: Path | str, format: str | None = None, *, smooth: OneEuroOptions | None = None
+) -> JointTrack:
     """Write the poses and keypoints of a run to a file, and return them.
 
-    format: one of `EXPORTERS`; by default the only one with the suffix of `out`.
+    format: one of `EXPORTERS`; by default the one named as the suffix of `out`, or the only one with it.
+    smooth: options of a one-euro filter over time, which delays motion; poses are not filtered if absent.
 
     Raises:
         InputError: the format does not exist or does not fit `out`, or the file cannot be written.
@@ -189,5 +193,7 @@ def export_run(run: Run | Path | str, out: Path | str, format: str | None = None
         depthtrack.export_run("my-run", "joints.csv")
     """
     track = joint_track(run)
+    if smooth is not None:
+        track, _ = track.smoothed(smooth)
     export_joints(Path(out), track, format)
     return track

@@ -1,12 +1,13 @@
 """The poses and keypoints of a run, for export."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.one_euro import OneEuroOptions, smooth
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run
 from depthtrack.recording.status import Status
@@ -49,6 +50,15 @@ class JointTrack:
         figures = (run.energy, run.agreement, run.confidence, run.visibility, run.spread)
         frame: Literal["camera", "capture"] = "capture" if run.configuration.get("tracker") == "markers" else "camera"
         return cls(run.index, run.timestamps, run.status, *figures, run.poses, keypoints, hand, frame)
+
+    def smoothed(self, options: OneEuroOptions | None = None) -> tuple[Self, Array]:
+        """Return the track with poses and keypoints of a one-euro filter, and its delays.
+
+        The delays (T, 3) are those of position, orientation and finger angles, s; see `OneEuroFilter`.
+        """
+        poses, delays = smooth(self.poses, self.timestamps, options)
+        keypoints = HandModel(self.hand).keypoints(poses)
+        return replace(self, poses=poses, keypoints=keypoints), delays
 
     @property
     def posed(self) -> Mask:

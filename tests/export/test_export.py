@@ -228,6 +228,25 @@ def test_rotations_of_the_palm_do_not_jump() -> None:
     np.testing.assert_allclose(palm_rotations(poses)[:, 2], np.degrees(angle), atol=1e-6)
 
 
+# Smoothing
+
+
+def test_smoothed_poses_are_exported_with_their_delay(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, options in {"raw": (), "smooth": ("--smooth",), "late": ("--smooth", "--smooth-cutoff", "0.5")}.items():
+        assert main(["export", str(run), "-o", str(tmp_path / f"{name}.npz"), *options]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("median delay: position") == 2
+    tracks = {name: np.load(tmp_path / f"{name}.npz") for name in ("raw", "smooth", "late")}
+    distance = {
+        name: np.nanmax(np.abs(tracks[name]["keypoints"] - tracks["raw"]["keypoints"])) for name in ("smooth", "late")
+    }
+    assert 0 < distance["smooth"] < distance["late"] < 0.05
+    hand = HandShape.from_fields(Run.load(run).configuration["hand"])
+    np.testing.assert_array_equal(tracks["smooth"]["keypoints"], HandModel(hand).keypoints(tracks["smooth"]["poses"]))
+
+
 # Errors
 
 
@@ -239,6 +258,9 @@ def test_rotations_of_the_palm_do_not_jump() -> None:
         (["{run}", "-o", "{out}/a.txt"], "several formats end in .txt: choose one by --format nyu, icvl, msra"),
         (["{run}", "-o", "{out}/a.csv", "--format", "nyu"], "must end in .txt"),
         (["{run}", "-o", "{out}/a.csv", "--format", "xls"], "no format 'xls'"),
+        (["{run}", "-o", "{out}/a.json"], "choose one by --format openxr, webxr, mano"),
+        (["{run}", "-o", "{out}/a.csv", "--smooth-cutoff", "2"], "--smooth-cutoff needs --smooth"),
+        (["{run}", "-o", "{out}/a.csv", "--smooth", "--smooth-cutoff", "0"], "above 0 Hz, found 0"),
         (["{out}", "-o", "{out}/a.csv"], "holds no run"),
     ],
 )
