@@ -8,7 +8,7 @@ from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.hand_choice import AVERAGE, chosen_hand
-from depthtrack.recording.reading import ReadingOptions
+from depthtrack.recording.reading import ReadingOptions, TimeUnit
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.recording.sequences.base import BaseSequence
@@ -32,12 +32,20 @@ def open_recording(
     *,
     depth_topic: str | None = None,
     colour_topic: str | None = None,
+    time_unit: TimeUnit = "auto",
+    invalid: tuple[int, ...] = (),
+    mirror: bool = False,
+    depth_only: bool = False,
 ) -> Sequence:
     """Open a recording; frames are read one at a time.
 
     camera: camera to use instead of the recording's own: a `Camera`, a preset such as "tum", or a `camera.json`.
     on_damage: "refuse" raises an error at a frame that cannot be read, "skip" leaves it out.
     depth_topic, colour_topic: topics of the images in a bag; those found by their type if absent.
+    time_unit: unit of the times in lists: "s", "ms", "us", "ns", "frames" at 30 Hz, or "index" to ignore the times.
+    invalid: stored depth values that mean no reading, beside 0.
+    mirror: mirror the images left to right; the camera is that of the mirrored images.
+    depth_only: ignore colour.
 
     Raises:
         InputError: `path` holds no recording, or its camera is unknown.
@@ -50,7 +58,8 @@ def open_recording(
         camera = PRESETS[camera]
     elif isinstance(camera, str | Path):
         camera = Camera.from_json(Path(camera))
-    return open_sequence(path, camera, on_damage, ReadingOptions(depth_topic, colour_topic))
+    reading = ReadingOptions(depth_topic, colour_topic, time_unit, invalid, mirror, depth_only)
+    return open_sequence(path, camera, on_damage, reading)
 
 
 def as_recording(recording: Recording) -> Sequence:

@@ -103,9 +103,11 @@ def _truth_lines(summary: "RecordingSummary", of_those_read: str) -> list[str]:
 
 
 def _damage_lines(summary: "RecordingSummary") -> list[str]:
-    frames = [f"frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}" for frame in summary.damaged]
-    count = len({frame.index for frame in summary.damaged})
-    return [f"{count} of {summary.frames} frames", *frames] if frames else ["none"]
+    damaged = [*summary.damaged, *summary.damaged_colour]
+    frames = [f"frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}" for frame in damaged]
+    count, colours = len({frame.index for frame in summary.damaged}), len(summary.damaged_colour)
+    of_colour = f", and the colour of {colours}" if colours else ""
+    return [f"{count} of {summary.frames} frames{of_colour}", *frames] if frames else ["none"]
 
 
 def _block(label: str, lines: list[str], width: int = 15, most: int = 12) -> list[str]:

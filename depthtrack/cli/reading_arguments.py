@@ -1,7 +1,7 @@
 """Options about how a recording is read, beside its camera."""
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from depthtrack.cli.stated_default import stated_default
 
@@ -17,6 +17,15 @@ class ReadingArguments:
     """Topic of the depth images in a bag or MCAP file (default: the one found by its type)."""
     colour_topic: Annotated[str | None, stated_default(metavar="TOPIC")] = None
     """Topic of the colour images in a bag or MCAP file (default: the one found by its type)."""
+
+    time_unit: Literal["auto", "s", "ms", "us", "ns", "frames", "index"] = "auto"
+    """Unit of the times in lists. `frames` are numbers of frames at 30 Hz; `index` ignores the times."""
+    invalid: Annotated[tuple[int, ...], stated_default(metavar="VALUE...")] = ()
+    """Stored depth values that mean no reading, beside 0."""
+    mirror: bool = False
+    """Mirror the images left to right. The camera is that of the mirrored images."""
+    depth_only: bool = False
+    """Ignore colour."""
 
     @property
     def options(self) -> "ReadingOptions":

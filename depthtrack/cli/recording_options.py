@@ -41,7 +41,7 @@ class RecordingOptions:
     depth_scale: Annotated[float | None, stated_default(metavar="METRES")] = None
     """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
-    """At an unreadable frame: stop with an error, or skip and count it."""
+    """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
     def open(self, camera: "Camera | None" = None, print_notes: bool = True) -> "Sequence":

@@ -22,8 +22,6 @@ class SegmentationShortcuts:
 
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
-    depth_only: bool = False
-    """Ignore colour."""
     wrist_margin: Annotated[float | None, stated_default(metavar="MM")] = None
     """Length of the forearm to keep beyond the wrist (default: 0), for comparison with silhouettes that include it."""
 
@@ -36,8 +34,6 @@ class SegmentationShortcuts:
         changed: dict[str, Any] = {}
         if self.skin_model is not None:
             changed["skin_model"] = str(self.skin_model)
-        if self.depth_only:
-            changed["use_colour"] = False
         if self.wrist_margin is not None:
             if not -50 <= self.wrist_margin <= 200:
                 raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")

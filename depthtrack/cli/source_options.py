@@ -30,7 +30,7 @@ class SourceOptions:
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor, for recordings without one."""
     on_damage: Literal["refuse", "skip"] = "refuse"
-    """At an unreadable frame: stop with an error, or skip and count it."""
+    """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
     def source(self, path: Path) -> "Source":

@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines
 from depthtrack.hand.shape import Side
+from depthtrack.recording.colour_association import MAX_COLOUR_DELAY, associate
 from depthtrack.recording.sequence import Frame, ImageKeypoints
-from depthtrack.recording.sequences.tum_lists import MAX_COLOUR_DELAY, MAX_FRAMES, associate
+from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array, Index
 
 LANDMARK_NAMES = (

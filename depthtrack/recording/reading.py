@@ -1,8 +1,13 @@
 """Choices of the user about how a recording is read, beside its camera."""
 
 from dataclasses import dataclass
+from typing import Literal
 
+from depthtrack.errors import InputError
 from depthtrack.options import option
+
+TimeUnit = Literal["auto", "s", "ms", "us", "ns", "frames", "index"]
+_MOST_VALUES, _LARGEST_STORED = 16, 65535
 
 
 @dataclass(frozen=True)
@@ -11,3 +16,14 @@ class ReadingOptions:
 
     depth_topic: str | None = option(None, "Topic of the depth images in a bag (default: the one found by its type)")
     colour_topic: str | None = option(None, "Topic of the colour images in a bag (default: the one found by its type)")
+    time_unit: TimeUnit = option("auto", "Unit of the times in lists; frames are at 30 Hz, index ignores the times")
+    invalid: tuple[int, ...] = option((), "Stored depth values that mean no reading, beside 0")
+    mirror: bool = option(False, "Mirror the images left to right; the camera is that of the mirrored images")
+    depth_only: bool = option(False, "Ignore colour")
+
+    def __post_init__(self) -> None:
+        if len(self.invalid) > _MOST_VALUES or not all(0 <= value <= _LARGEST_STORED for value in self.invalid):
+            found = ", ".join(f"{value:.6g}" for value in self.invalid[:_MOST_VALUES])
+            raise InputError(
+                f"--invalid must be at most {_MOST_VALUES} stored values from 0 to {_LARGEST_STORED}, found {found}"
+            )

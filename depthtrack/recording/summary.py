@@ -37,6 +37,7 @@ class RecordingSummary:
     missing: share of pixels without a reading.
     colours, masks, exact_depths: frames with them, among those read.
     poses, joints: annotated frames, among those listed.
+    damaged_colour: frames read whose colour cannot be.
     """
 
     name: str
@@ -57,6 +58,7 @@ class RecordingSummary:
     hand: str | None
     description: dict[str, Any]
     damaged: list[DamagedFrame]
+    damaged_colour: list[DamagedFrame]
     notes: list[str]
 
 
@@ -101,6 +103,7 @@ def summarise(
         hand=f"{sequence.hand.side}, scale {sequence.hand.scale:g}" if sequence.hand else None,
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),
+        damaged_colour=sequence.damaged_colour,
         notes=list(sequence.notes),
     )
 

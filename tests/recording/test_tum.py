@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording import GroundTruth, SequenceWriter, image_size, open_sequence
-from depthtrack.recording.sequence import Sequence
-from depthtrack.recording.sequences.tum_lists import associate
+from depthtrack.recording.colour_association import associate
+from depthtrack.recording.sequence import OnDamage, Sequence
 from tests.support.recordings import CAMERA, TIMES, colour_at, depth_at, write_plain_tum, write_sample
 
 TUM_CAMERA = Camera(CAMERA.width, CAMERA.height, 30.0, 30.0, 15.5, 11.5, 1 / 5000)
@@ -181,11 +181,14 @@ def test_a_damaged_frame_is_rejected_or_skipped_and_counted(sample: Path, damage
         sequence[2]
 
 
-def test_a_damaged_colour_image_damages_its_frame(sample: Path) -> None:
+@pytest.mark.parametrize("on_damage", ["refuse", "skip"])
+def test_a_damaged_colour_image_costs_only_the_colour_of_its_frame(sample: Path, on_damage: OnDamage) -> None:
     truncate(sorted((sample / "rgb").iterdir())[1])
-    sequence = open_sequence(sample, on_damage="skip")
-    assert [frame.index for frame in sequence] == [0, 2, 3, 4]
-    assert "is truncated" in sequence.damaged[0].reason
+    sequence = open_sequence(sample, on_damage=on_damage)
+    assert [frame.colour is not None for frame in sequence] == [True, False, True, True, True]
+    assert sequence.damaged == []
+    assert [frame.index for frame in sequence.damaged_colour] == [1]
+    assert "is truncated" in sequence.damaged_colour[0].reason
 
 
 def test_a_damaged_mask_damages_only_itself(sample: Path) -> None:
@@ -218,8 +221,9 @@ def test_a_header_of_another_size_never_reaches_the_decoder(
         path.write_bytes(data.replace(height + width, b"\xff\xff\xff\xff", 1))
     monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("the decoder was asked"))
     monkeypatch.setattr("depthtrack.recording.sequences.tum.read_depth", lambda *_: np.zeros(CAMERA.shape, np.uint16))
-    with pytest.raises(DamagedFrameError, match="exceeds limit"):
-        open_sequence(tmp_path / "out")[0]
+    sequence = open_sequence(tmp_path / "out")
+    assert sequence[0].colour is None
+    assert "exceeds limit" in sequence.damaged_colour[0].reason
 
 
 @given(st.data())
@@ -228,8 +232,13 @@ def test_every_truncation_is_detected(tmp_path_factory: pytest.TempPathFactory, 
     path = data.draw(st.sampled_from([folder / "depth/0.000000.png", folder / "rgb/0.000000.jpg"]))
     whole = path.read_bytes()
     path.write_bytes(whole[: data.draw(st.integers(0, len(whole) - 1))])
-    with pytest.raises(DamagedFrameError):
-        open_sequence(folder)[0]
+    sequence = open_sequence(folder)
+    if path.suffix == ".png":
+        with pytest.raises(DamagedFrameError):
+            sequence[0]
+    else:
+        assert sequence[0].colour is None
+        assert len(sequence.damaged_colour) == 1
 
 
 @given(st.data())

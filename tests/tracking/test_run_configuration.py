@@ -203,13 +203,13 @@ def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_pa
     more = ["--segmentation.margin", "0.05", "--segmentation.grid.max-jump", "0.02", "--wrist-margin", "10"]
     assert main([*first, *more, "--retry-ratio", "1.4", "--start", "truth", "--depth-only"]) == 0
     again = ["track", str(recording), "-o", str(tmp_path / "again"), "--config", str(tmp_path / "first")]
-    assert main([*again, "--segmentation.use-colour"]) == 0
-    for folder, use_colour in (("first", False), ("again", True)):
+    assert main([*again, "--no-depth-only"]) == 0
+    for folder, depth_only in (("first", True), ("again", False)):
         configuration = read_configuration(tmp_path / folder)
         stored = configuration["segmentation"]
         assert configuration["options"]["retry_ratio"] == 1.4
         assert (stored["roi"]["margin"], stored["grid"]["max_jump"], stored["wrist_margin"]) == (0.05, 0.02, 0.01)
-        assert stored["use_colour"] == use_colour
+        assert configuration["reading"]["depth_only"] == depth_only
 
 
 def test_a_run_of_format_2_keeps_its_memory_in_seconds() -> None:

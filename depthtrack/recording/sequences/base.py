@@ -3,9 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
@@ -13,6 +14,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
 from depthtrack.types import Array, Depth, Image, Mask
+
+Value = TypeVar("Value", bound=np.generic)
 
 
 class BaseSequence(ABC):
@@ -54,6 +57,7 @@ class BaseSequence(ABC):
         self.reading = reading or ReadingOptions()
         self.notes: list[str] = []
         self._damaged: dict[int, DamagedFrame] = {}
+        self._damaged_colour: dict[int, DamagedFrame] = {}
 
     @classmethod
     @abstractmethod
@@ -114,6 +118,11 @@ class BaseSequence(ABC):
         """See `Sequence`."""
         return [self._damaged[index] for index in sorted(self._damaged)]
 
+    @property
+    def damaged_colour(self) -> list[DamagedFrame]:
+        """See `Sequence`."""
+        return [self._damaged_colour[index] for index in sorted(self._damaged_colour)]
+
     def __len__(self) -> int:
         return len(self.timestamps)
 
@@ -122,10 +131,29 @@ class BaseSequence(ABC):
         return Frame(
             index=index,
             timestamp=float(self.timestamps[index]),
-            depth=self.read_depth(index),
-            colour=self.read_colour(index),
+            depth=self._as_read(self._valid(self.read_depth(index))),
+            colour=None if (colour := self._readable_colour(index)) is None else self._as_read(colour),
             camera=self.camera,
         )
+
+    def _readable_colour(self, index: int) -> Image | None:
+        """Return the colour of a frame; None, and an entry in `damaged_colour`, if damaged."""
+        try:
+            return self.read_colour(index)
+        except DamagedFrameError as error:
+            self._damaged_colour[index] = DamagedFrame(index, float(self.timestamps[index]), str(error))
+            return None
+
+    def _valid(self, depth: Depth) -> Depth:
+        """Return depth (h, w) with 0 in place of the stored values that mean no reading."""
+        if not self.reading.invalid:
+            return depth
+        stored = np.rint(depth / np.float32(self.camera.depth_scale))
+        return np.where(np.isin(stored, self.reading.invalid), np.float32(0), depth)
+
+    def _as_read(self, image: NDArray[Value]) -> NDArray[Value]:
+        """Return an image (h, w, ...), mirrored if the options say so."""
+        return np.ascontiguousarray(image[:, ::-1]) if self.reading.mirror else image
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames(range(len(self)))

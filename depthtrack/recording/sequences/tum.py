@@ -17,22 +17,24 @@ A synthetic hand_mask/ shows the hand up to the plane of its wrist, also where t
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-import numpy as np
-
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_json
 from depthtrack.geometry.camera import Camera
+from depthtrack.recording.colour_association import ColourAssociation, associate_colour
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
 from depthtrack.recording.images import read_colour, read_depth, read_mask, read_size
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
+from depthtrack.recording.sequence import GroundTruth, OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
-from depthtrack.recording.sequences.tum_lists import associate, is_inside, read_list
+from depthtrack.recording.sequences.inside import is_inside
+from depthtrack.recording.sequences.tum_folder import ImageFiles, find_lists, holds_images
+from depthtrack.recording.sequences.tum_lists import ImageList
+from depthtrack.recording.time_units import Clock, clock_of
 from depthtrack.types import Depth, Image, Mask
 
 EXACT_DEPTH_SCALE = 0.00005
@@ -43,6 +45,7 @@ class TumSequence(BaseSequence):
     """A sequence folder. A plain TUM folder has no `camera.json`, so `camera` must be given."""
 
     format_name = "a folder with depth.txt (TUM RGB-D layout)"
+    is_generic = True
 
     def __init__(
         self,
@@ -55,19 +58,57 @@ class TumSequence(BaseSequence):
         super().__init__(path, camera, on_damage, reading)
         self.camera = camera or _read_camera(path)
         self.description = _read_description(path)
-        self._depth = read_list(path, "depth.txt")
-        self._colour = read_list(path, "rgb.txt") if (path / "rgb.txt").exists() else []
-        self.timestamps = np.array([file.timestamp for file in self._depth])
-        self._partner = associate(self.timestamps, [file.timestamp for file in self._colour])
-        self.has_colour = bool(self._partner)
+        lists = find_lists(path)
+        self._files = ImageFiles(path)
+        self._depth, clock = self._timed(lists.depth)
+        self.timestamps = clock.seconds(self._depth.times)
+        self._colour, self._association = self._associated(lists.colour)
+        self.has_colour = bool(self._association.partner)
+        self.notes += [note for note in (lists.note, clock.note, self._association.note) if note is not None]
         self.hand = read_hand(path)
-        self.ground_truth = read_ground_truth(path, self.hand)
+        self.ground_truth = self._annotations(clock)
         self._exact_camera = replace(self.camera, depth_scale=_exact_depth_scale(self.description, path))
+
+    def _associated(self, colour: ImageList | None) -> tuple[ImageList | None, ColourAssociation]:
+        """Return the colour and its association; none if it has another size. Raises InputError."""
+        if colour is None or self.reading.depth_only:
+            return None, ColourAssociation()
+        kept, clock = self._timed(colour)
+        size = next(_sizes(self._files.path(file.name) for file in kept.files), None)
+        if size is not None and size != (self.camera.width, self.camera.height):
+            note = (
+                f"colour of {size[0]}x{size[1]} pixels is not registered to the depth of"
+                f" {self.camera.width}x{self.camera.height}: depth alone"
+            )
+            return None, ColourAssociation(note=note)
+        return kept, associate_colour(self.timestamps, clock.seconds(kept.times))
+
+    def _timed(self, images: ImageList) -> tuple[ImageList, Clock]:
+        """Return a list with increasing times, and their clock. Raises InputError."""
+        unit = self.reading.time_unit
+        if unit == "index":
+            return images, Clock("index")
+        if self.on_damage == "refuse":
+            images.check_increasing()
+        kept = images.increasing()
+        if kept.left_out:
+            self.notes.append(
+                f"{kept.left_out} of {len(images.files)} lines of {images.path.name} are left out:"
+                " their times do not increase"
+            )
+        return kept, clock_of(kept.times, kept.whole, unit)
+
+    def _annotations(self, clock: Clock) -> GroundTruth | None:
+        """Return the ground truth in seconds; None for mirrored images, which it does not describe."""
+        truth = read_ground_truth(self.path, self.hand)
+        if truth is None or self.reading.mirror:
+            return None
+        return replace(truth, timestamps=clock.times_between(truth.timestamps))
 
     @classmethod
     def matches(cls, path: Path) -> bool:
         """See `BaseSequence`."""
-        return (path / "depth.txt").exists()
+        return holds_images(path)
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
@@ -76,23 +117,23 @@ class TumSequence(BaseSequence):
         Raises:
             InputError: if none can be read.
         """
-        for file in read_list(path, "depth.txt"):
-            try:
-                return read_size(path / file.name)
-            except DamagedFrameError:
-                continue
-        raise InputError(f"{path}: none of the depth images can be read")
+        files = ImageFiles(path)
+        size = next(_sizes(files.path(file.name) for file in find_lists(path).depth.files), None)
+        if size is None:
+            raise InputError(f"{path}: none of the depth images can be read")
+        return size
 
     def read_depth(self, index: int) -> Depth:
         """See `BaseSequence`."""
-        stored = read_depth(self.path / self._depth[index].name, self.camera.shape)
+        stored = read_depth(self._files.path(self._depth.files[index].name), self.camera.shape)
         return self.camera.metres(stored)
 
     def read_colour(self, index: int) -> Image | None:
         """See `BaseSequence`."""
-        if index not in self._partner:
+        if self._colour is None or index not in self._association.partner:
             return None
-        return read_colour(self.path / self._colour[self._partner[index]].name, self.camera.shape)
+        file = self._colour.files[self._association.partner[index]]
+        return read_colour(self._files.path(file.name), self.camera.shape)
 
     def hand_mask(self, index: int) -> Mask | None:
         """See `Sequence`.
@@ -101,7 +142,7 @@ class TumSequence(BaseSequence):
             DamagedFrameError: if the mask exists and cannot be read.
         """
         path = self._beside(index, "hand_mask")
-        return None if path is None else read_mask(path, self.camera.shape)
+        return None if path is None else self._as_read(read_mask(path, self.camera.shape))
 
     def exact_depth(self, index: int) -> Depth | None:
         """See `Sequence`.
@@ -110,17 +151,28 @@ class TumSequence(BaseSequence):
             DamagedFrameError: if the image exists and cannot be read.
         """
         path = self._beside(index, "exact_depth")
-        return None if path is None else self._exact_camera.metres(read_depth(path, self.camera.shape))
+        if path is None:
+            return None
+        return self._as_read(self._exact_camera.metres(read_depth(path, self.camera.shape)))
 
     def _beside(self, index: int, kind: str) -> Path | None:
         """Return the image of another kind with a depth image's name; None if there is none."""
-        name = f"{kind}/{PurePosixPath(self._depth[index].name).stem}.png"
+        name = f"{kind}/{PurePosixPath(self._depth.files[index].name).stem}.png"
         path = self.path / name
         if not os.path.lexists(path):
             return None
         if not is_inside(self.path, name):
             raise DamagedFrameError(f"{path} must lie within the folder of the recording")
         return path
+
+
+def _sizes(paths: Iterable[Path]) -> Iterator[tuple[int, int]]:
+    """Yield (width, height) of the readable images."""
+    for path in paths:
+        try:
+            yield read_size(path)
+        except DamagedFrameError:
+            continue
 
 
 def _read_camera(folder: Path) -> Camera:
