@@ -209,7 +209,7 @@ def test_advanced_options_of_the_command_line_are_stored(recording: Path, tmp_pa
         stored = configuration["segmentation"]
         assert configuration["options"]["retry_ratio"] == 1.4
         assert (stored["roi"]["margin"], stored["grid"]["max_jump"], stored["wrist_margin"]) == (0.05, 0.02, 0.01)
-        assert configuration["reading"]["depth_only"] == depth_only
+        assert configuration.get("reading", {}).get("depth_only", False) == depth_only
 
 
 def test_a_run_of_format_2_keeps_its_memory_in_seconds() -> None:
