@@ -116,7 +116,7 @@ class DepthVideo:
         return frame
 
     def _forward(self, wanted: int) -> Any | None:
-        """Return the frame of a time among those that are still to be decoded; None if it is not among them."""
+        """Return the frame of a time among those still to be decoded, or None."""
         for frame in self._frames:
             if frame.pts is not None and frame.pts >= wanted:
                 return frame if frame.pts == wanted else None
@@ -161,7 +161,7 @@ def _checked_format(stream: Any, path: Path) -> tuple[str, int]:
 
 
 def _lasts_longer(container: Any, times: Array) -> bool:
-    """Return whether the stated duration exceeds the times (N,), seconds, by more than three frames."""
+    """Return whether the stated duration exceeds the times (N,) by three frames."""
     if container.duration is None or len(times) < 2:
         return False
     begin = (container.start_time or 0) / _MICROSECONDS
@@ -169,7 +169,10 @@ def _lasts_longer(container: Any, times: Array) -> bool:
 
 
 def _listed(container: Any, stream: Any, path: Path) -> tuple[list[int], list[int]]:
-    """Return the times of all complete packets and of key frames, in units of the stream, increasing."""
+    """Return the times of all complete packets and of key frames, increasing.
+
+    Both are in units of the stream.
+    """
     times: set[int] = set()
     keys: set[int] = set()
     for packet in container.demux(stream):

@@ -115,9 +115,9 @@ def test_the_depth_must_be_named_if_there_are_several(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds 2 depth videos"):
         open_sequence(root, CAMERA)
     assert len(open_sequence(root / VIDEO.with_name("file-001.mp4"), CAMERA)) == 2
-    colour = lerobot.write_video(
-        root / "videos" / "observation.images.front" / "file.mp4", [lerobot.codes_of(DEPTHS[0])]
-    )
+    grey = [np.full((24, 32), 9, dtype=np.uint16)] * 3
+    path = root / "videos" / "observation.images.front" / "file.mp4"
+    colour = lerobot.write_video(path, grey, "mpeg4", "yuv420p", options={})
     with pytest.raises(InputError, match="is no depth by"):
         open_sequence(colour, CAMERA)
 
