@@ -1,7 +1,6 @@
 """Read files of bounded size and write files that are complete or absent."""
 
 import ctypes
-import json
 import os
 import secrets
 import shutil
@@ -9,9 +8,10 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 from depthtrack.errors import InputError
+from depthtrack.strict_data import exact_json_text, parse_json
 
 Built = TypeVar("Built")
 
@@ -79,12 +79,12 @@ def read_json(
         raise InputError(f"cannot read {what}: {error}") from error
     hint = "" if made_by is None else f" (`{made_by}` writes such a file)"
     try:
-        return build(json.loads(text, parse_constant=_reject_constant))
+        return build(parse_json(text))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except KeyError as error:
         raise InputError(f"{path}: the entry {error} is missing{hint}") from error
-    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError) as error:
         raise InputError(f"cannot read {what} {path}: {error}{hint}") from error
 
 
@@ -204,19 +204,15 @@ def _reason(error: OSError) -> str:
     return error.strerror or str(error)
 
 
-def _reject_constant(name: str) -> NoReturn:
-    raise ValueError(f"JSON has no {name}")
-
-
 def _compact(value: Any, indent: int, used: int) -> str:
     """Return the text of a value that begins `used` columns from the left, its lines indented by `indent`."""
-    line = json.dumps(value, allow_nan=False)
+    line = exact_json_text(value)
     nested = isinstance(value, dict | list) and bool(value)
     if not nested or (indent > 0 and used + len(line) <= _LINE_WIDTH and not _holds_objects(value)):
         return line
     inner = " " * (indent + 2)
     if isinstance(value, dict):
-        keys = [f"{inner}{json.dumps(str(key))}: " for key in value]
+        keys = [f"{inner}{exact_json_text(str(key))}: " for key in value]
         items = value.values()
     else:
         keys, items = [inner] * len(value), value

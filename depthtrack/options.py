@@ -4,13 +4,13 @@ This module imports neither numpy nor numba, so that `--help` is fast.
 """
 
 import dataclasses
-import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_type_hints
 
 from depthtrack.errors import InputError
+from depthtrack.strict_data import exact_json_text, parse_json
 
 T = TypeVar("T")
 
@@ -97,13 +97,13 @@ def with_options(configuration: T, values: Mapping[str, Any]) -> T:
 
 def to_data(configuration: Any) -> dict[str, Any]:
     """Return nested plain dictionaries, lists, numbers and strings of a configuration."""
-    data: dict[str, Any] = json.loads(to_json(configuration))
+    data: dict[str, Any] = parse_json(to_json(configuration))
     return data
 
 
 def to_json(configuration: Any) -> str:
     """Return a configuration as JSON; `from_data` of it gives an equal configuration."""
-    return json.dumps(_strict(dataclasses.asdict(configuration)), indent=2, allow_nan=False)
+    return exact_json_text(_strict(dataclasses.asdict(configuration)), indent=2)
 
 
 def _strict(value: Any) -> Any:

@@ -11,7 +11,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = "depthtrack"
 
 LAYERS = (
-    ("closing", "errors", "types"),
+    ("closing", "errors", "number_text", "types"),
+    ("strict_data",),
     ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine",),
     ("compilation",),

@@ -15,7 +15,7 @@ from depthtrack.cli.ending import (
     terminable,
     write_output,
 )
-from depthtrack.errors import DepthtrackError
+from depthtrack.errors import DepthtrackError, printable
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _print_error(name: str, message: str) -> None:
-    """Print the error of a command; control characters of file names and arguments are escaped."""
-    text = f"depthtrack {name}: {message}"
-    shown = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
-    print(shown.encode(errors="backslashreplace").decode(), file=sys.stderr)
+    """Print the error of a command in one line."""
+    print(printable(f"depthtrack {name}: {message}"), file=sys.stderr)
 
 
 def _run(name: str, arguments: list[str]) -> int:

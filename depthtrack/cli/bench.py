@@ -39,10 +39,11 @@ def print_measured(benchmark: "ModuleType", plan: Any, json: bool, out: Path | N
         DepthtrackError: if the report has no rows.
     """
     from dataclasses import asdict
-    from json import dumps
+
+    from depthtrack.strict_data import json_text
 
     report = benchmark.run(plan, lambda rows: bar(rows, "row", plan.row_count))
-    text = dumps(asdict(report), indent=2)
+    text = json_text(asdict(report), indent=2)
     if out is not None:
         write_atomic(out, text + "\n")
     print(text if json else benchmark.as_text(report))

@@ -51,11 +51,10 @@ class Command:
     """Print JSON instead of text."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.calibration.calibrate import summary
         from depthtrack.hand.hand_file import load_hand
         from depthtrack.segmentation.options import SegmentationOptions
+        from depthtrack.strict_data import json_text
         from depthtrack.viewing.calibration_picture import calibration_picture
         from depthtrack.viewing.contact_sheet import save_picture
 
@@ -78,7 +77,8 @@ class Command:
             report, text = summary(measured), _text(measured, self.out, picture)
         write_atomic(self.out, content)
         save_picture(page, picture)
-        print(dumps({**report, "hand_file": str(self.out), "picture": str(picture)}, indent=2) if self.json else text)
+        report |= {"hand_file": str(self.out), "picture": str(picture)}
+        print(json_text(report, indent=2) if self.json else text)
 
 
 def _rig_text(calibration: "RigCalibration", out: Path, picture: Path) -> str:

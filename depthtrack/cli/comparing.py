@@ -1,6 +1,5 @@
 """Run a comparison with a progress bar, then write its table, files and report."""
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +12,7 @@ from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.outputs import locked
 from depthtrack.recording.sequence import Frame
 from depthtrack.report.build import check_reportable, write_report
+from depthtrack.strict_data import json_text
 
 
 def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, as_json: bool = False) -> None:
@@ -29,7 +29,7 @@ def compare_and_report(comparison: Comparison, folder: Path, workers: Workers, a
         folders = [Path(plan.folder) for plan in plans]
         evaluations = list(bar(evaluate_runs(folders, workers), "run", len(folders), "evaluating"))
     if as_json:
-        print(json.dumps([run_record(evaluation) for evaluation in evaluations], indent=2))
+        print(json_text([run_record(evaluation) for evaluation in evaluations], indent=2))
     else:
         print(as_table(tracker_results(evaluations)))
     write_everything(evaluations, folder, quiet=as_json)

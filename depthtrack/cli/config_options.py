@@ -1,7 +1,6 @@
 """Derive command-line options from a configuration: names, defaults and help."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
@@ -11,6 +10,7 @@ import tyro
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 from depthtrack.options import Parameter, parameters, to_data, with_options
+from depthtrack.strict_data import exact_json_text, parse_json
 
 T = TypeVar("T")
 
@@ -66,7 +66,7 @@ def _annotation(parameter: Parameter, prefix: str, hidden: bool) -> Any:
 
 
 def _default(parameter: Parameter) -> Any:
-    return parameter.default if _is_plain(parameter.kind) else json.dumps(_data(parameter.default))
+    return parameter.default if _is_plain(parameter.kind) else exact_json_text(_data(parameter.default))
 
 
 def _data(value: Any) -> Any:
@@ -77,7 +77,7 @@ def _data(value: Any) -> Any:
 
 def _parsed(parameter: Parameter, text: str, prefix: str) -> Any:
     try:
-        return json.loads(text)
+        return parse_json(text)
     except ValueError as error:
         raise InputError(f"--{prefix}{parameter.name}: expected JSON, found {text!r:.60}") from error
 

@@ -26,14 +26,14 @@ class Command:
 
     def run(self) -> None:
         from dataclasses import asdict
-        from json import dumps
 
         from depthtrack.cli.broken_imports import advice, broken_imports
+        from depthtrack.strict_data import json_text
 
         if not 0 < self.time_limit <= 3600:
             raise InputError(f"--time-limit must lie between 0 and 3600 seconds, found {self.time_limit:g}")
         if broken := broken_imports():
-            raise DepthtrackError("\n".join(advice(module, reason) for module, reason in broken.items()))
+            raise DepthtrackError("; ".join(advice(module, reason) for module, reason in broken.items()))
 
         from depthtrack.rendering.doctor import SystemInfo, examine
 
@@ -44,7 +44,7 @@ class Command:
         )
         if self.json:
             rows = [{**asdict(outcome), "works": outcome.works} for outcome in outcomes]
-            print(dumps({"machine": asdict(machine), "renderers": rows}, indent=2))
+            print(json_text({"machine": asdict(machine), "renderers": rows}, indent=2))
         else:
             print(_text(machine, outcomes))
         default = outcomes[0]

@@ -65,10 +65,10 @@ class Command:
             write_everything(evaluations, self.report, self.sequence, quiet=self.json)
 
     def _print(self, reports: list[dict[str, Any]], texts: list[str]) -> None:
-        from json import dumps
+        from depthtrack.strict_data import json_text
 
         values = reports[0] if len(reports) == 1 else reports
-        print(dumps(values, indent=2, allow_nan=False) if self.json else "\n\n".join(texts))
+        print(json_text(values, indent=2) if self.json else "\n\n".join(texts))
 
     def _markers(self) -> tuple[list[dict[str, Any]], list[str]]:
         from depthtrack.cli.markers.evaluation_text import evaluation_text, trajectory_text

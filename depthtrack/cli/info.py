@@ -26,11 +26,11 @@ class Command:
 
     def run(self) -> None:
         from dataclasses import asdict
-        from json import dumps
 
         import numpy as np
 
         from depthtrack.recording.summary import summarise
+        from depthtrack.strict_data import json_text
 
         if self.sample is not None and self.sample < 1:
             raise InputError(f"--sample must be at least 1 frame, found {self.sample}")
@@ -43,7 +43,7 @@ class Command:
             self.recording.on_damage,
             progress=lambda frames: bar(frames, total=count),
         )
-        print(dumps(asdict(summary), indent=2) if self.json else _text(summary))
+        print(json_text(asdict(summary), indent=2) if self.json else _text(summary))
 
 
 def _text(summary: "RecordingSummary") -> str:
@@ -118,8 +118,8 @@ def _block(label: str, lines: list[str], width: int = 15, most: int = 12) -> lis
 
 def _value_text(value: object) -> str:
     """Return a value of sequence.json as one line of at most 200 printable characters."""
-    from json import dumps
+    from depthtrack.strict_data import json_text
 
-    text = value if isinstance(value, str) else dumps(value, ensure_ascii=False)
+    text = value if isinstance(value, str) else json_text(value, ascii_only=False)
     text = "".join(c if c.isprintable() else " " for c in text)
     return text if len(text) <= 200 else text[:197] + "..."

@@ -58,12 +58,11 @@ class Command:
     """Print the summaries as a JSON array."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.benchmarks.papers.experiment import ExperimentOptions
         from depthtrack.benchmarks.papers.registry import chosen_experiments
         from depthtrack.benchmarks.papers.reproduce import reproduce
         from depthtrack.evaluation.sweep.workers import chosen_workers
+        from depthtrack.strict_data import json_text
 
         names = [name for name in self.figures if name != "list"]
         experiments = chosen_experiments(names or ["all"])
@@ -91,7 +90,7 @@ class Command:
             if not self.json:
                 print(_as_text(done[-1], experiment.reference, folder))
         if self.json:
-            print(dumps([each.to_json() for each in done], indent=2))
+            print(json_text([each.to_json() for each in done], indent=2))
 
 
 def _bar(name: str) -> "Callable[[Iterator[dict[str, object]], int, int], Iterable[dict[str, object]]]":

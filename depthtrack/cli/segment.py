@@ -57,10 +57,9 @@ class SegmentCommand:
         raise NotImplementedError
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.evaluation.segmentation import segment_sequence, summary
         from depthtrack.segmentation.segmenter import Segmenter
+        from depthtrack.strict_data import json_text
 
         if self.hands != HandOptions() and self.tracker is None:
             raise InputError("--hand and --side need a tracker: give --tracker ik or --tracker pso")
@@ -76,7 +75,7 @@ class SegmentCommand:
             results = segment_sequence(sequence, segmenter, tracker, hand)
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
-        print(dumps(report, indent=2) if self.json else _text(report))
+        print(json_text(report, indent=2) if self.json else _text(report))
 
     def _tracker(self, hand: "HandShape") -> "AbstractContextManager[Tracker | None]":
         from contextlib import closing, nullcontext

@@ -150,7 +150,7 @@ def _text(synergies: "Synergies") -> str:
 
 
 def _json(synergies: "Synergies") -> str:
-    from json import dumps
+    from depthtrack.strict_data import json_text
 
     fields = {
         "source": synergies.source,
@@ -168,4 +168,4 @@ def _json(synergies: "Synergies") -> str:
             for k in range(len(synergies))
         ],
     }
-    return dumps(fields, indent=2)
+    return json_text(fields, indent=2)

@@ -7,7 +7,6 @@ Source: Romero, Tzionas and Black, "Embodied hands", ACM Trans. Graphics 36(6), 
 axes are those of the published model.
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from depthtrack.files import replace_atomically, write_atomic
 from depthtrack.geometry.rotations import quaternion_from_matrix, quaternion_log
 from depthtrack.hand.kinematics import JOINT_NAMES, HandModel
 from depthtrack.hand.rest_rotations import JOINT_PARENTS, RestSkeleton
+from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array
 
 _FINGERS = ("index", "middle", "little", "ring", "thumb")
@@ -68,7 +68,7 @@ def write(track: JointTrack, path: Path) -> None:
         lists = {
             name: _without_nan(value) if isinstance(value, np.ndarray) else value for name, value in parameters.items()
         }
-        write_atomic(path, json.dumps(lists, allow_nan=False) + "\n")
+        write_atomic(path, exact_json_text(lists) + "\n")
         return
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in parameters.items()}
     with replace_atomically(path) as temporary, temporary.open("wb") as file:

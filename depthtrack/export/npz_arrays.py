@@ -1,6 +1,5 @@
 """Export to NumPy's .npz without pickles; NaN if there is no pose."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import replace_atomically
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import POSE_NAMES
+from depthtrack.strict_data import exact_json_text
 
 CONVENTIONS = {
     "length": "m",
@@ -40,5 +40,5 @@ def write(track: JointTrack, path: Path) -> None:
             keypoints=track.keypoints,
             pose_names=np.array(POSE_NAMES, dtype=np.str_),
             keypoint_names=np.array(KEYPOINT_NAMES, dtype=np.str_),
-            conventions=np.array(json.dumps(CONVENTIONS), dtype=np.str_),
+            conventions=np.array(exact_json_text(CONVENTIONS), dtype=np.str_),
         )

@@ -17,6 +17,7 @@ from depthtrack.export.joint_track import JointTrack
 from depthtrack.files import read_lines, replace_atomically
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.benchmark_joints import Benchmark
+from depthtrack.number_text import parse_number, parse_numbers
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array
 
@@ -108,17 +109,17 @@ def _numbers(fields: list[str], count: int, where: str, benchmark: Benchmark) ->
             f"{where}: expected {count} numbers, u v d of the {count // 3} joints of {benchmark.name}, "
             f"found {len(fields)} fields beginning with {' '.join(fields)[:40]!r}"
         )
-    numbers = [float(field) for field in fields]
-    if any(abs(x) > _LARGEST for x in numbers):
+    found = parse_numbers(fields)
+    if any(abs(x) > _LARGEST for x in found):
         raise InputError(
-            f"{where}: expected pixels and millimetres up to {_LARGEST:g}, found {max(numbers, key=abs):.6g}"
+            f"{where}: expected pixels and millimetres up to {_LARGEST:g}, found {max(found, key=abs):.6g}"
         )
-    return numbers
+    return found
 
 
 def _is_number(text: str) -> bool:
     """Return whether `text` is a finite number or nan."""
     try:
-        return not math.isinf(float(text))
+        return not math.isinf(parse_number(text))
     except ValueError:
         return False

@@ -5,7 +5,6 @@ joints and axes. WebXR has other names and leaves the palm out.
 """
 
 import csv
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from depthtrack.files import replace_atomically
 from depthtrack.geometry.rotations import continuous, quaternion_from_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.openxr_joints import OPENXR_JOINTS, OPENXR_PARENTS, openxr_radii, openxr_transforms
+from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array
 
 _DECIMALS = 9
@@ -114,7 +114,7 @@ def _json(standard: XrStandard, track: JointTrack, position: Array, orientation:
         "parents": standard.parents,
         "radius": radius.round(_DECIMALS).tolist(),
     }
-    yield json.dumps(head, indent=1)[:-2] + ',\n "frames": ['
+    yield exact_json_text(head, indent=1)[:-2] + ',\n "frames": ['
     for row, index in enumerate(track.index.tolist()):
         frame: dict[str, Any] = {
             "index": index,
@@ -126,7 +126,7 @@ def _json(standard: XrStandard, track: JointTrack, position: Array, orientation:
         if frame["active"]:
             frame["position"] = position[row].round(_DECIMALS).tolist()
             frame["orientation"] = orientation[row].round(_DECIMALS).tolist()
-        yield (",\n" if row else "\n") + json.dumps(frame, allow_nan=False)
+        yield (",\n" if row else "\n") + exact_json_text(frame)
     yield "\n]}\n"
 
 

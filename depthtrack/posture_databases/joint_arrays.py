@@ -9,12 +9,8 @@ name: (tracks,) optional, the track's name.
 Without `start` and `length` all joints belong to one hand, and its side is determined from them.
 """
 
-import math
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -26,16 +22,10 @@ from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.shape import Side
 from depthtrack.posture_databases.joint_postures import postures_of_joints
 from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_count
+from depthtrack.recording.numpy_arrays import read_arrays
 from depthtrack.types import Array
 
 MAX_TRACKS = 10_000
-_MOST = 1 << 28
-"""Bytes of the largest array read."""
-_DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, EOFError, OSError),
-    *(RuntimeError, ValueError, TypeError, SyntaxError, TokenError, MemoryError),
-)
-"""Exceptions of zipfile and numpy's header parser for damaged, encrypted or unknown content."""
 
 
 def matches(path: Path) -> bool:
@@ -50,7 +40,7 @@ def read(path: Path) -> PostureSet:
         InputError: if the file is damaged or holds no joints of a hand.
     """
     check_size(path, MAX_BYTES)
-    arrays = _read_arrays(path, ("joints", "start", "length", "right", "name"))
+    arrays = read_arrays(path, ("joints", "start", "length", "right", "name"))
     if "joints" not in arrays:
         raise InputError(f"{path}: expected an array 'joints' (N, 5, 4, 3), found none")
     keypoints = _keypoints(path, arrays["joints"])
@@ -112,36 +102,3 @@ def _tracks(path: Path, arrays: dict[str, NDArray[Any]], count: int) -> list[_Tr
         label = "" if name is None else str(name[i])
         tracks.append(_Track(slice(first, first + frames), side, label if label.isprintable() else ""))
     return tracks
-
-
-def _read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Return those of the named arrays that the file has, without pickles and within bounds."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            present = set(archive.namelist())
-            return {name: _read_array(archive, f"{name}.npy") for name in names if f"{name}.npy" in present}
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    except _DAMAGE as error:
-        raise InputError(f"{path} must be an undamaged .npz file: {error}") from error
-
-
-def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    size = archive.getinfo(name).file_size
-    with archive.open(name) as file:
-        version = np.lib.format.read_magic(file)
-        if version == (1, 0):
-            shape, column_major, dtype = np.lib.format.read_array_header_1_0(file)
-        elif version == (2, 0):
-            shape, column_major, dtype = np.lib.format.read_array_header_2_0(file)
-        else:
-            raise InputError(f"{name} must be of NumPy's array format 1.0 or 2.0, found {version}")
-        if dtype.kind not in "fiubU":
-            raise InputError(f"{name} must hold numbers or names, found {dtype}")
-        claimed = math.prod(shape) * dtype.itemsize
-        if claimed > min(size, _MOST) or any(extent < 0 for extent in shape):
-            raise InputError(f"{name} must have at most {min(size, _MOST):,} bytes, found {claimed:,} in its header")
-        values = np.frombuffer(file.read(claimed), dtype=dtype)
-    if dtype.kind == "U":
-        values.tolist()  # raises for bytes that are not text
-    return values.reshape(shape, order="F" if column_major else "C")

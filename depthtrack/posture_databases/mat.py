@@ -18,6 +18,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines
+from depthtrack.number_text import parse_numbers
 from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_angles, check_count
 
 COLUMNS, GLOBAL_COLUMNS = 26, 6
@@ -70,7 +71,7 @@ def read(path: Path) -> PostureSet:
 
 def _row(fields: list[str], where: str) -> list[float]:
     try:
-        row = [float(field) for field in fields]
+        row = parse_numbers(fields)
     except ValueError:
         row = []
     if len(row) != COLUMNS or not np.isfinite(row).all():

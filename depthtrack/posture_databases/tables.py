@@ -19,6 +19,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_lines
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ANGLE_NAMES
+from depthtrack.number_text import parse_numbers_or_blanks
 from depthtrack.posture_databases.joint_postures import postures_of_joints
 from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_angles, check_count
 from depthtrack.types import Array
@@ -74,7 +75,7 @@ def _columns(path: Path, lines: Iterator[str], chosen: list[int]) -> Array:
             if fields:
                 count += 1
                 check_count(path, count)
-                values.extend(float(fields[k].strip() or "nan") for k in chosen)
+                values.extend(parse_numbers_or_blanks([fields[k] for k in chosen]))
     except (ValueError, IndexError, csv.Error):
         raise InputError(f"{path}, row {count}: expected numbers in the columns that the header names") from None
     table = np.array(values).reshape(count, len(chosen))

@@ -14,6 +14,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_NAMES
+from depthtrack.number_text import parse_number, parse_numbers, parse_whole_number
 from depthtrack.recording.run_tables import read_table
 from depthtrack.types import Array
 
@@ -72,8 +73,10 @@ def read_branches(path: Path) -> dict[int, tuple[Branch, ...]]:
     found: dict[int, tuple[Branch, ...]] = {}
     for number, (index, begun, frames, evidence, *pose) in enumerate(read_table(path, BRANCH_COLUMNS), start=2):
         try:
-            branch = Branch(np.array([float(x) for x in pose]), float(begun), int(frames), float(evidence))
-            frame = int(index)
+            branch = Branch(
+                np.array(parse_numbers(pose)), parse_number(begun), parse_whole_number(frames), parse_number(evidence)
+            )
+            frame = parse_whole_number(index)
         except ValueError as error:
             raise InputError(f"{path}, line {number}: expected the numbers of a branch: {error!s:.120}") from error
         if not np.isfinite([branch.begun, branch.evidence, *branch.pose]).all() or branch.frames < 0:

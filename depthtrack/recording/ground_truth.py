@@ -1,4 +1,7 @@
-"""Reading of a recording's annotations, `hand_poses.csv`, `joints.csv` and `hand.json`."""
+"""Reading of a recording's annotations, `hand_poses.csv`, `joints.csv` and `hand.json`.
+
+A keypoint with a blank cell in `joints.csv` is unknown.
+"""
 
 import math
 from array import array
@@ -11,6 +14,7 @@ from depthtrack.files import read_lines
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import ORIENTATION, POSE_NAMES
 from depthtrack.hand.shape import HandShape
+from depthtrack.number_text import parse_numbers, parse_numbers_or_blanks
 from depthtrack.recording.sequence import GroundTruth
 from depthtrack.types import Array
 
@@ -30,7 +34,7 @@ def read_ground_truth(folder: Path, hand: HandShape | None) -> GroundTruth | Non
         InputError: if a table is malformed.
     """
     poses = _read_table(folder / POSES_FILE, POSES_HEADER)
-    joints = _read_table(folder / JOINTS_FILE, JOINTS_HEADER)
+    joints = _read_table(folder / JOINTS_FILE, JOINTS_HEADER, blanks=True)
     tables = [table for table in (poses, joints) if table is not None]
     if not tables:
         return None
@@ -47,9 +51,16 @@ def read_ground_truth(folder: Path, hand: HandShape | None) -> GroundTruth | Non
     return GroundTruth(
         timestamps=tables[0][:, 0],
         poses=None if poses is None else poses[:, 1:],
-        joints=None if joints is None else joints[:, 1:].reshape(-1, len(KEYPOINT_NAMES), 3),
+        joints=None if joints is None else _joints(joints[:, 1:]),
         hand=hand,
     )
+
+
+def _joints(cells: Array) -> Array:
+    """Return keypoints (T, 21, 3); one with an unknown coordinate is unknown."""
+    joints = cells.reshape(-1, len(KEYPOINT_NAMES), 3)
+    joints[np.isnan(joints).any(axis=-1)] = np.nan
+    return joints
 
 
 def _same_times(a: Array, b: Array) -> bool:
@@ -66,8 +77,11 @@ def read_hand(folder: Path) -> HandShape | None:
     return HandShape.from_json(path) if path.exists() else None
 
 
-def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
-    """Return the rows (T, len(header)) of a CSV by increasing time; None without a file."""
+def _read_table(path: Path, header: tuple[str, ...], blanks: bool = False) -> Array | None:
+    """Return the rows (T, len(header)) of a CSV by increasing time; None without a file.
+
+    blanks: whether cells may be blank, which is NaN.
+    """
     if not path.exists():
         return None
     lines = read_lines(path, MAX_TABLE_BYTES)
@@ -80,9 +94,10 @@ def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
     values, last = array("d"), -math.inf
     for number, line in enumerate(lines, start=2):
         fields = line.strip().split(",")
-        row = _numbers(fields)
+        row = _numbers(fields, blanks)
         if len(row) != len(header):
-            raise InputError(f"{path}, line {number}: expected {len(header)} finite numbers, found {_start(fields)}")
+            what = f"a timestamp and {len(header) - 1} numbers or blanks" if blanks else f"{len(header)} finite numbers"
+            raise InputError(f"{path}, line {number}: expected {what}, found {_start(fields)}")
         if row[0] <= last:
             raise InputError(f"{path}, line {number}: timestamps must increase, found {row[0]} after {last}")
         values.extend(row)
@@ -92,13 +107,14 @@ def _read_table(path: Path, header: tuple[str, ...]) -> Array | None:
     return np.array(values).reshape(-1, len(header))
 
 
-def _numbers(fields: list[str]) -> list[float]:
-    """Return the fields as numbers; an empty list if one is not a finite number."""
+def _numbers(fields: list[str], blanks: bool) -> list[float]:
+    """Return the fields as numbers, NaN if blank; an empty list if one cannot be in a table."""
     try:
-        row = [float(text) for text in fields]
+        row = parse_numbers_or_blanks(fields) if blanks else parse_numbers(fields)
     except ValueError:
         return []
-    return row if all(map(math.isfinite, row)) else []
+    known = map(math.isfinite, row) if not blanks else [math.isfinite(row[0]), not any(map(math.isinf, row))]
+    return row if all(known) else []
 
 
 def _start(fields: list[str]) -> str:

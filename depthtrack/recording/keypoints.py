@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines
 from depthtrack.hand.shape import Side
+from depthtrack.number_text import parse_number
 from depthtrack.recording.colour_association import MAX_COLOUR_DELAY, associate
 from depthtrack.recording.sequence import Frame, ImageKeypoints
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
@@ -188,6 +189,6 @@ def _number(text: str, name: str, where: str) -> float:
 
 def _float(text: str) -> float:
     try:
-        return float(text)
+        return parse_number(text)
     except ValueError:
         return math.nan

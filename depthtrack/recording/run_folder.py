@@ -7,7 +7,6 @@ Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -21,11 +20,13 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_text, write_atomic
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS, POSE_SIZE
+from depthtrack.number_text import parse_numbers
 from depthtrack.outputs import locked
 from depthtrack.recording.branches import BRANCH_COLUMNS, branch_rows
 from depthtrack.recording.run_rows import ROW_COLUMNS, RunRow, read_rows, row_cells
 from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.recording.status import Status
+from depthtrack.strict_data import exact_json_text, parse_json
 from depthtrack.types import Array, Index
 
 
@@ -65,7 +66,7 @@ class RunWriter(Closing):
             before = read_configuration(folder)
             check_same(before, configuration, folder)
             if before.get("on_damage") != configuration.get("on_damage"):
-                write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
+                write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
             kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
@@ -76,7 +77,7 @@ class RunWriter(Closing):
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, ())
             rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
-            write_atomic(folder / "run.json", json.dumps(configuration, indent=2) + "\n")
+            write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
 
     def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
         """Append the next frame and the milliseconds of its stages."""
@@ -153,10 +154,10 @@ def read_configuration(folder: Path) -> dict[str, Any]:
         InputError: if the file is missing or malformed.
     """
     try:
-        configuration = json.loads(read_text(folder / "run.json"))
+        configuration = parse_json(read_text(folder / "run.json"))
     except InputError as error:
         raise InputError(f"{folder} holds no run ({error}); make one with `depthtrack track`") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(f"{folder} holds no run (run.json: {error}); make one with `depthtrack track`") from error
     if not isinstance(configuration, dict):
         raise InputError(f"{folder / 'run.json'} must hold a JSON object")
@@ -171,7 +172,7 @@ def _read_timings(path: Path, count: int) -> dict[str, Array]:
     rows = []
     for number, cells in enumerate(lines[:count], start=2):
         try:
-            rows.append([float(cell) for cell in cells[1:]])
+            rows.append(parse_numbers(cells[1:]))
         except ValueError as error:
             raise InputError(f"{path}, line {number}: expected milliseconds: {error}") from error
         if len(cells) != len(header):

@@ -10,6 +10,7 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import KEYPOINT_NAMES
 from depthtrack.hand.pose import FINGERS, ORIENTATION, POSE_NAMES, POSE_SIZE
+from depthtrack.number_text import parse_numbers, parse_whole_number
 from depthtrack.recording.branches import Branch, read_branches
 from depthtrack.recording.run_tables import header_of, read_table
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
@@ -84,9 +85,10 @@ def _row(named: Mapping[str, str]) -> RunRow:
     """Return the row of cells by column, also of earlier runs. Raises ValueError."""
 
     def numbers(columns: Sequence[str]) -> tuple[float, ...]:
-        return tuple(float(named.get(column, "nan")) for column in columns)
+        return tuple(parse_numbers([named.get(column, "nan") for column in columns]))
 
-    if not 0 <= int(named["index"]) < MAX_FRAMES:
+    index = parse_whole_number(named["index"])
+    if not 0 <= index < MAX_FRAMES:
         raise ValueError(f"frames are numbered from 0 to {MAX_FRAMES - 1}")
     today = "agreement" in named
     timestamp, energy, agreement, confidence = numbers(
@@ -94,7 +96,7 @@ def _row(named: Mapping[str, str]) -> RunRow:
     )
     has_pose = any(named[column] for column in POSE_NAMES)
     return RunRow(
-        int(named["index"]),
+        index,
         timestamp,
         Status(named["status"]),
         energy,

@@ -1,6 +1,5 @@
 """Writing of sequence folders, complete or absent; equal input gives equal bytes."""
 
-import json
 import os
 import secrets
 import shutil
@@ -32,6 +31,7 @@ from depthtrack.recording.images import write_jpeg, write_png
 from depthtrack.recording.keypoints import HEADER, KEYPOINTS_FILE, keypoint_cells
 from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.recording.sequences.tum import EXACT_DEPTH_SCALE
+from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array, Image, Mask
 
 ColourFormat = Literal["jpg", "png"]
@@ -73,7 +73,7 @@ class SequenceWriter:
         self._overwrite = overwrite
         self._threads = threads
         self._work = self._path.parent / f".{self._path.name}.writing-{os.getpid()}-{secrets.token_hex(4)}"
-        json.dumps(self._description, allow_nan=False)  # fail before the first frame
+        exact_json_text(self._description)  # fail before the first frame
         self._tables: dict[str, TextIO] = {}
         self._annotation: set[_Table] | None = None
         self._last_stem: str | None = None
@@ -224,7 +224,7 @@ class SequenceWriter:
         for table in self._tables.values():
             table.close()
         self._write_text("camera.json", self._camera.to_json())
-        self._write_text("sequence.json", json.dumps(self._description, indent=2) + "\n")
+        self._write_text("sequence.json", exact_json_text(self._description, indent=2) + "\n")
         if self._hand is not None:
             self._write_text(HAND_FILE, self._hand.to_json())
         self._check_target()

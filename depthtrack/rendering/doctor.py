@@ -1,6 +1,5 @@
 """Diagnosis of this machine: versions, processor, and a trial of every backend."""
 
-import json
 import os
 import platform
 import signal
@@ -15,6 +14,7 @@ import depthtrack
 from depthtrack.compilation import cache_folder
 from depthtrack.machine import installed_version, processor_name, system_name, usable_cores
 from depthtrack.rendering.selfcheck import SelfCheck
+from depthtrack.strict_data import exact_json_text, parse_json
 
 _LIBRARIES = (
     *("numpy", "scipy", "numba", "llvmlite", "opencv-python-headless", "PyOpenGL", "trimesh", "matplotlib", "tyro"),
@@ -111,7 +111,8 @@ def attempt(trial: Trial, time_limit: float = 60.0) -> Outcome:
 
     time_limit: seconds, after which the process is killed.
     """
-    command = [sys.executable, "-P", "-m", "depthtrack.rendering.selfcheck", trial.backend, json.dumps(trial.options)]
+    program = [sys.executable, "-P", "-m", "depthtrack.rendering.selfcheck"]
+    command = [*program, trial.backend, exact_json_text(trial.options)]
     # A child process finds the package of a checkout by this path.
     path = [str(Path(depthtrack.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, path))}
@@ -144,7 +145,7 @@ def _outcome(trial: Trial, code: int, output: str, errors: str) -> Outcome:
         return Outcome(trial, None, f"crashed with {signal.Signals(-code).name}: {last_line}")
     try:
         # Drivers may print to standard output too; the result is the last line.
-        answer = json.loads((output.strip().splitlines() or [""])[-1])
+        answer = parse_json((output.strip().splitlines() or [""])[-1])
         if "error" in answer:
             return Outcome(trial, None, str(answer["error"]))
         check = SelfCheck(**answer)

@@ -4,7 +4,6 @@
 A separate process contains a driver that crashes or hangs.
 """
 
-import json
 import sys
 import time
 from dataclasses import asdict, dataclass
@@ -23,6 +22,7 @@ from depthtrack.rendering.options import Objective
 from depthtrack.rendering.oracle import OracleScorer
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.rendering.target import Target
+from depthtrack.strict_data import json_text, parse_json
 from depthtrack.types import Array
 
 HYPOTHESES, SIDE = 64, 64
@@ -124,10 +124,10 @@ def main() -> int:
     """Print the self-check of the backend named on the command line; return the exit code."""
     name, *rest = sys.argv[1:]
     try:
-        result: dict[str, Any] = asdict(self_check(name, **(json.loads(rest[0]) if rest else {})))
+        result: dict[str, Any] = asdict(self_check(name, **(parse_json(rest[0]) if rest else {})))
     except DepthtrackError as error:
         result = {"error": str(error)}
-    print(json.dumps(result))
+    print(json_text(result))
     return 0
 
 

@@ -3,7 +3,6 @@
 Argyros and Lourakis, "Real-time tracking of multiple skin-colored objects with a possibly moving camera", ECCV 2004.
 """
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +17,7 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.chroma import BINS, CHROMA, bins_of_colours, count_chroma
 from depthtrack.segmentation.options import SkinColourOptions
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
+from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array, Labels, Mask
 
 _LARGEST_FILE = 4 << 20
@@ -90,7 +90,7 @@ class SkinColourModel:
         Raises:
             InputError: the file cannot be written.
         """
-        text = json.dumps({"prior": self.prior, "skin": self.skin.tolist(), "other": self.other.tolist()})
+        text = exact_json_text({"prior": self.prior, "skin": self.skin.tolist(), "other": self.other.tolist()})
         write_atomic(path, text + "\n")
 
     @classmethod

@@ -1,7 +1,6 @@
 """Reading and validation of motion files (TOML): those of `sequences/` and a user's own."""
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -13,6 +12,7 @@ from depthtrack.files import read_text
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import ANGLE_NAMES, FINGERS
 from depthtrack.resources import resource_folder
+from depthtrack.strict_data import parse_toml
 from depthtrack.types import Array
 
 POSTURES_FILE = "postures.toml"
@@ -42,8 +42,8 @@ def read_table(path: Path) -> dict[str, Any]:
     Raises: InputError if the file is missing, larger than 1 MiB, or not TOML.
     """
     try:
-        return tomllib.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
+        return parse_toml(read_text(path))
+    except ValueError as error:
         raise InputError(f"cannot read the motion file {path}: {error}") from error
 
 

@@ -5,7 +5,6 @@ figures of the frame. `tools/fit_confidence.py` fits it on the tuning seeds of t
 of a reported figure takes part.
 """
 
-import json
 import math
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +15,7 @@ import cv2
 import numpy as np
 
 from depthtrack.rendering.target import Target
+from depthtrack.strict_data import parse_json
 from depthtrack.tracking.spread import BonesInView
 from depthtrack.types import Array, Depth
 
@@ -53,7 +53,7 @@ class ConfidenceModel:
 @cache
 def fitted_model() -> ConfidenceModel:
     """Return the fitted model, which `confidence.json` holds."""
-    fields = json.loads(files("depthtrack.tracking").joinpath("confidence.json").read_text())
+    fields = parse_json(files("depthtrack.tracking").joinpath("confidence.json").read_text())
     weights = tuple(float(fields["weights"][name]) for name in Evidence._fields)
     return ConfidenceModel(weights, float(fields["bias"]))
 

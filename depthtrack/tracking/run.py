@@ -1,6 +1,5 @@
 """One run: a recording, its configuration, and the pipeline that tracks it."""
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -17,6 +16,7 @@ from depthtrack.recording.run_folder import RunWriter, check_unused
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.strict_data import parse_json
 from depthtrack.tracking.configuration import LiftConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker
@@ -40,7 +40,7 @@ def configure(
     return RunConfiguration(
         str(path.resolve()),
         camera_fields(sequence.camera),
-        json.loads(hand.to_json()),
+        parse_json(hand.to_json()),
         tracker,
         segmentation or SegmentationOptions(),
         **entries,

@@ -17,6 +17,7 @@ from depthtrack.hand.synergies import Synergies
 from depthtrack.posture_databases.mat import REST
 from depthtrack.posture_databases.posture_set import MAX_POSTURES
 from depthtrack.posture_databases.registry import read_postures
+from depthtrack.recording.numpy_arrays import read_arrays
 
 
 def random_angles(seed: int, count: int) -> np.ndarray:
@@ -200,12 +201,15 @@ def write_member(path: Path, header: str, data: bytes = b"") -> None:
     ("header", "reason"),
     [
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000, 21, 3)}", "must have at most"),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -21, 3)}", "must have at most|undamaged"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -21, 3)}", "as NumPy writes it"),
         ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 21, 3)}", "numbers or names"),
         ("{'descr': [('x', '<f8')], 'fortran_order': False, 'shape': (1, 21, 3)}", "numbers or names"),
         ("{'descr': '<U0', 'fortran_order': False, 'shape': (1, 21, 3)}", "undamaged|found"),
-        ("{'shape': __import__('os')}", "undamaged"),
-        ("(" * 110, "undamaged"),
+        ("{'shape': __import__('os')}", "as NumPy writes it"),
+        ("(" * 110, "as NumPy writes it"),
+        ("{'descr': '\0', 'fortran_order': False, 'shape': (1, 21, 3)}", "as NumPy writes it"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 21, 3)}", "must be numbers"),
+        ("{'descr': '<f3', 'fortran_order': False, 'shape': (1, 21, 3)}", "as NumPy writes it|undamaged"),
     ],
 )
 def test_false_headers_reserve_no_memory(tmp_path: Path, header: str, reason: str) -> None:
@@ -213,6 +217,32 @@ def test_false_headers_reserve_no_memory(tmp_path: Path, header: str, reason: st
     write_member(path, header)
     with pytest.raises(InputError, match=reason):
         read_postures(path)
+
+
+@pytest.mark.parametrize("dtype", ["<f4", ">f8", "<i2", "|u1", "<f2", "<U5", ">U3", "|b1"])
+@pytest.mark.parametrize("shape", [(), (0,), (7,), (2, 3, 4)])
+@pytest.mark.parametrize("version", [(1, 0), (2, 0)])
+def test_arrays_are_read_as_numpy_writes_them(
+    tmp_path: Path, dtype: str, shape: tuple[int, ...], version: tuple[int, int]
+) -> None:
+    rng, path = np.random.default_rng(1), tmp_path / "arrays.npz"
+    for written in (rng.integers(0, 2, shape), np.asfortranarray(rng.integers(0, 2, shape))):
+        array = written.astype(dtype)
+        member = io.BytesIO()
+        np.lib.format.write_array(member, array, version)
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("a.npy", member.getvalue())
+        found = read_arrays(path, ("a", "b"))
+        assert list(found) == ["a"]
+        assert found["a"].dtype == array.dtype
+        np.testing.assert_array_equal(found["a"], array)
+
+
+def test_names_of_half_characters_and_short_arrays_are_rejected(tmp_path: Path) -> None:
+    header = "{'descr': '<U1', 'fortran_order': False, 'shape': (1,), }"
+    write_member(tmp_path / "a.npz", header, b"\0\xd8\0\0")
+    with pytest.raises(InputError, match="Unicode characters"):
+        read_arrays(tmp_path / "a.npz", ("joints",))
 
 
 def test_damaged_archives_are_rejected(tmp_path: Path) -> None:

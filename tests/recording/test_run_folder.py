@@ -136,7 +136,9 @@ def test_damaged_runs_are_rejected_in_one_sentence(tmp_path: Path, name: str, te
         ("tracked,0", "tracked,x", "line 2: expected 59 values"),
         ("tracked,0", 'tracked,"0', "line 2: expected 59 values"),
         ("tracked,0", "tracked", "line 2: expected 59 columns, found 58"),
-        ("\n0,", f"\n{10**30},", "line 2: .* frames are numbered from 0 to"),
+        ("\n0,", f"\n{10**15},", "line 2: .* frames are numbered from 0 to"),
+        ("\n0,", f"\n{10**30},", "line 2: .* expected a whole number"),
+        ("\n0,", "\n1_0,", "line 2: .* expected a whole number"),
     ],
 )
 def test_a_malformed_row_is_named(tmp_path: Path, found: str, damaged: str, message: str) -> None:

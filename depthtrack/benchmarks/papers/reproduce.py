@@ -5,7 +5,6 @@ The folder contains `rows.jsonl` with one row per cell, from which an interrupte
 """
 
 import csv
-import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from io import StringIO
@@ -21,6 +20,7 @@ from depthtrack.evaluation.sweep.run import Workers, run_sweep
 from depthtrack.files import write_atomic
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.outputs import locked
+from depthtrack.strict_data import json_text
 
 RowProgress = Callable[[Iterator[Row], int, int], Iterable[Row]]
 """Wraps the new rows, as a progress bar does. Takes the rows, the number of all rows, and that of existing rows."""
@@ -93,7 +93,7 @@ def reproduce(
     )
     write_atomic(folder / "table.csv", as_csv(done.table).encode())
     write_atomic(folder / "figure.png", draw_png(experiment, rows, done.comparisons, as_note(done, cells[0])))
-    write_atomic(folder / "summary.json", json.dumps(done.to_json(), indent=2).encode() + b"\n")
+    write_atomic(folder / "summary.json", json_text(done.to_json(), indent=2).encode() + b"\n")
     return done
 
 

@@ -44,13 +44,12 @@ class Command:
     """Print figures as JSON instead of a table."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.cli.progress import percent_bar
         from depthtrack.evaluation.gap_comparison import compare_filling
         from depthtrack.markers.filling.options import FillMethod
         from depthtrack.markers.folder.reading import MarkerFolder
         from depthtrack.options import check_seed
+        from depthtrack.strict_data import json_text
 
         unknown = [method for method in self.methods if method not in get_args(FillMethod)]
         if unknown:
@@ -64,7 +63,7 @@ class Command:
         with percent_bar() as show:
             scores = compare_filling(captures, *self.frames, self.seeds, methods, show)
         if self.json:
-            print(dumps([score.row() for score in scores], indent=2, allow_nan=False))
+            print(json_text([score.row() for score in scores], indent=2))
         else:
             self._print(scores)
 

@@ -62,13 +62,12 @@ class FillCommand:
 
 def print_gaps(folder: Path, filled: "FilledCapture", as_json: bool) -> None:
     """Print the gaps of each marker and what became of them, as a table or as strict JSON."""
-    from json import dumps
-
     from depthtrack.markers.filling.fill_report import fill_report
+    from depthtrack.strict_data import json_text
 
     rows = fill_report(filled)
     if as_json:
-        print(dumps({"folder": str(folder), "markers": rows}, indent=2, allow_nan=False))
+        print(json_text({"folder": str(folder), "markers": rows}, indent=2))
         return
     print(f"{folder}: {sum(row['gaps'] for row in rows)} gaps, {sum(row['filled'] for row in rows)} filled")
     print(f"  {'marker':24}{'gaps':>6}{'filled':>8}{'longest':>10}{'samples':>9}{'expected error':>16}  how")

@@ -24,16 +24,16 @@ class Command:
 
     def run(self) -> None:
         from dataclasses import asdict
-        from json import dumps
 
         from depthtrack.markers.formats.registry import find_format
         from depthtrack.markers.summary import summarise_capture
+        from depthtrack.strict_data import json_text
 
         capture = self.capture.read()
         summary, path = summarise_capture(capture), self.capture.path
         if self.json:
             fields = {"capture": str(path), "format": find_format(path).description, **asdict(summary)}
-            print(dumps(fields, indent=2, allow_nan=False))
+            print(json_text(fields, indent=2))
         else:
             print(_text(f"{path.name}, {find_format(path).description}", summary))
 

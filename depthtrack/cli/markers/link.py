@@ -26,13 +26,12 @@ class Command:
     """Print figures as JSON instead of a sentence."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.markers.formats.registry import write_capture
         from depthtrack.markers.labelling.linking import LinkingOptions, link_capture
+        from depthtrack.strict_data import json_text
 
         linked = link_capture(self.capture.read(), LinkingOptions(longest_gap=self.longest_gap))
         write_capture(self.out, linked)
         figures = {"frames": len(linked), "rate_hz": linked.rate, "trajectories": len(linked.labels)}
         text = f"{self.out}: {len(linked)} frames, {len(linked.labels)} trajectories"
-        print(dumps({"file": str(self.out), **figures}) if self.json else text)
+        print(json_text({"file": str(self.out), **figures}) if self.json else text)

@@ -47,10 +47,9 @@ class Command:
     """Print figures as JSON instead of text."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.files import write_atomic
         from depthtrack.markers.folder.contents import check_names
+        from depthtrack.strict_data import json_text
 
         if bool(self.body) == bool(self.chosen.models):
             raise InputError("give either the markers of a rigid body (--body) or the layout of a hand (-m)")
@@ -60,7 +59,7 @@ class Command:
         model, figures = self._body(capture) if self.body else self._hand(capture)
         write_atomic(self.out, model.to_json())
         figures = {"model": str(self.out), "name": model.name, "markers": len(model.labels), **figures}
-        print(dumps(figures, indent=2, allow_nan=False) if self.json else _text(figures))
+        print(json_text(figures, indent=2) if self.json else _text(figures))
 
     def _body(self, capture: "MarkerCapture") -> "tuple[MarkerModel, dict[str, Any]]":
         from depthtrack.markers.models.rigid_body import body_from_markers

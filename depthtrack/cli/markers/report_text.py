@@ -1,8 +1,9 @@
 """The figures that the marker commands print."""
 
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from depthtrack.strict_data import json_text
 
 if TYPE_CHECKING:
     from depthtrack.markers.labelled_capture import LabelledCapture
@@ -17,7 +18,7 @@ def print_report(folder: Path, labelled: "LabelledCapture", as_json: bool, **ent
 
     report = label_report(labelled)
     if as_json:
-        print(dumps({"folder": str(folder), **report, **entries}, indent=2, allow_nan=False))
+        print(json_text({"folder": str(folder), **report, **entries}, indent=2))
         return
     print(
         f"{folder}: {report['frames']} frames at {report['rate_hz']:g} Hz, "

@@ -1,7 +1,6 @@
 """Results of a comparison: per run as CSV and JSON, per tracker and recording as a table."""
 
 import csv
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
@@ -17,6 +16,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.evaluation.sweep.run import Workers
 from depthtrack.files import write_atomic
 from depthtrack.recording.status import Status
+from depthtrack.strict_data import json_text
 from depthtrack.text_table import aligned
 
 TRUTH_METRICS = ("endpoint_error_mm", "joint_error_mm")
@@ -145,7 +145,7 @@ def tracker_results(evaluations: Sequence[Evaluation]) -> list[TrackerResult]:
 def write_results(evaluations: Sequence[Evaluation], folder: Path) -> None:
     """Write `results.json` with one object per run, and `results.csv` with the same in columns."""
     rows = [run_record(evaluation) for evaluation in evaluations]
-    write_atomic(folder / "results.json", json.dumps(rows, indent=2) + "\n")
+    write_atomic(folder / "results.json", json_text(rows, indent=2) + "\n")
     flat = [dict(_flat(row)) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
     text = StringIO()

@@ -1,6 +1,5 @@
 """Runs of a comparison: a tracker on a recording with a seed, in its own run folder."""
 
-import json
 import math
 import time
 from collections.abc import Sequence as Rows
@@ -27,6 +26,7 @@ from depthtrack.recording.run_rows import read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.strict_data import exact_json_text, parse_json
 from depthtrack.tracking.configuration import CONFIGURATIONS, TrackerConfig
 from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
@@ -153,7 +153,7 @@ class PlannedRun:
         if not (folder / "run.json").exists():
             return "new"
         # The round trip turns tuples into lists, as in the stored file.
-        expected = json.loads(json.dumps(self.configuration(self.source.open()).to_fields()))
+        expected = parse_json(exact_json_text(self.configuration(self.source.open()).to_fields()))
         check_same(read_configuration(folder), expected, folder)
         return "done" if (folder / DONE).exists() else "begun"
 
@@ -167,7 +167,7 @@ def track_cell(cell: Cell) -> Row:
     with TrackingRun(plan.configuration(sequence), sequence, wrap=CpuTimed, clock=time.process_time, ahead=0) as run:
         tracked_now = sum(1 for _ in run.write(folder, resume=True))
         done = {"frames": len(read_rows(folder)), "damaged": [asdict(damage) for damage in sequence.damaged]}
-    write_atomic(folder / DONE, json.dumps(done) + "\n")
+    write_atomic(folder / DONE, exact_json_text(done) + "\n")
     return {"frames": done["frames"], "tracked_now": tracked_now}
 
 

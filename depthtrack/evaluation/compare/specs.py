@@ -1,7 +1,6 @@
 """Read the trackers of a comparison and their options from text or a TOML file."""
 
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.options import parameters
+from depthtrack.strict_data import parse_toml
 from depthtrack.tracking.configuration import CONFIGURATIONS, RUN_CONFIGURATIONS, RunConfig, TrackerConfig
 from depthtrack.tracking.registry import tracker_config
 
@@ -73,8 +73,8 @@ def _from_text(text: str) -> list[TrackerSpec]:
 
 def _from_file(path: Path) -> list[TrackerSpec]:
     try:
-        tables = tomllib.loads(read_text(path))
-    except (InputError, tomllib.TOMLDecodeError, RecursionError) as error:
+        tables = parse_toml(read_text(path))
+    except (InputError, ValueError) as error:
         raise InputError(f"cannot read the trackers in {path}: {error}") from error
     found = []
     for label, table in tables.items():
@@ -88,8 +88,8 @@ def _from_file(path: Path) -> list[TrackerSpec]:
 def _value(text: str) -> Any:
     """Return the value of TOML text, or the text itself, so that strings need no quotes."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_toml(f"value = {text}")["value"]
+    except ValueError:
         return text
 
 

@@ -1,18 +1,18 @@
 """Journal of a sweep: one JSON object per line, readable after a kill at any time."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
+from depthtrack.strict_data import json_text, parse_json
 
 Cell = dict[str, Any]
 """Parameters of one measurement: plain JSON values by name."""
 
 Row = dict[str, Any]
-"""A cell and its measured values: plain JSON values by name."""
+"""A cell and its measured values: plain JSON values by name; None for a value that is not finite."""
 
 
 class Journal(Closing):
@@ -46,22 +46,22 @@ class Journal(Closing):
 
     def append(self, row: Row) -> None:
         """Add a row and flush it to the operating system."""
-        self._file.write(json.dumps(row).encode() + b"\n")
+        self._file.write(json_text(row).encode() + b"\n")
         self._file.flush()
-        # The round trip turns tuples into lists, as in the file.
-        self._rows[self._key(row)] = json.loads(json.dumps(row))
+        # The round trip turns tuples into lists and NaN into None, as in the file.
+        self._rows[self._key(row)] = parse_json(json_text(row))
 
     def close(self) -> None:
         """Close the file."""
         self._file.close()
 
     def _key(self, row: Row) -> str:
-        return json.dumps([row.get(name) for name in self._names])
+        return json_text([row.get(name) for name in self._names])
 
 
 def _parse(line: bytes) -> Row | None:
     try:
-        row = json.loads(line)
+        row = parse_json(line)
     except ValueError:
         return None
     return row if isinstance(row, dict) else None

@@ -8,6 +8,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.markers.filled_capture import FilledCapture, Filling
+from depthtrack.number_text import parse_number_or_blank, parse_whole_number
 from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.types import Array, Index, Mask
 
@@ -55,8 +56,8 @@ def read_filled(path: Path, labels: Sequence[str], first_frame: int, positions: 
     column = {label: m for m, label in enumerate(labels)}
     for number, (frame, label, how, error) in enumerate(read_table(path, COLUMNS), start=2):
         try:
-            t, m, way = int(frame) - first_frame, column[label], _WAYS[how]
-            expected = float(error) / 1000 if error else np.nan
+            t, m, way = parse_whole_number(frame) - first_frame, column[label], _WAYS[how]
+            expected = parse_number_or_blank(error) / 1000
         except (ValueError, KeyError) as reason:
             raise InputError(f"{path}, line {number}: expected frame, label, way, error: {reason!s:.80}") from reason
         if not 0 <= t < len(known) or not known[t, m] or expected < 0 or np.isinf(expected):

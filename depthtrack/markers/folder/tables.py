@@ -7,6 +7,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.hand.pose import POSE_NAMES, POSE_SIZE
+from depthtrack.number_text import parse_numbers_or_blanks
 from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.types import Array
 
@@ -78,7 +79,7 @@ def _cell(value: float) -> str:
 
 def _numbers(path: Path, rows: list[list[str]], part: slice) -> Array:
     try:
-        found = np.array([[float(cell) if cell else np.nan for cell in row[part]] for row in rows], dtype=np.float64)
+        found = np.array([parse_numbers_or_blanks(row[part]) for row in rows], dtype=np.float64)
     except ValueError as error:
         raise InputError(f"{path}: expected numbers or blanks: {error!s:.120}") from error
     if np.isinf(found).any():

@@ -13,6 +13,7 @@ import numpy as np
 from depthtrack.errors import InputError
 from depthtrack.files import check_size
 from depthtrack.markers.formats.stored_capture import FARTHEST, MAX_SAMPLES, check_dimensions
+from depthtrack.number_text import parse_number, parse_numbers
 from depthtrack.types import Array, Index
 
 MAX_BYTES = 1 << 31
@@ -113,11 +114,10 @@ def read_rows(lines: Iterable[Line], separator: str, columns: Columns, path: Pat
         where = f"{path}, line {number}"
         cells = _cells(line, separator, least, columns.width, where)
         try:
-            # Python reads 1_0 as a number, other programs do not.
-            numbers = [] if "_" in line else list(map(float, select(cells)))
+            found = parse_numbers(select(cells))
         except ValueError:
-            numbers = []
-        values.extend(numbers or [_number(cells[column], column, where) for column in chosen])
+            found = [_number(cells[column], column, where) for column in chosen]
+        values.extend(found)
         places.append(number)
         if len(places) * trajectories > MAX_SAMPLES:
             check_dimensions(len(places), trajectories, where)
@@ -179,6 +179,6 @@ def _number(cell: str, column: int, where: str) -> float:
 
 def _float(text: str) -> float:
     try:
-        return math.nan if "_" in text else float(text)
+        return parse_number(text)
     except ValueError:
         return math.nan

@@ -1,6 +1,5 @@
 """Models by the words of a command: an included layout, a layout file or a model file."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
@@ -10,6 +9,7 @@ from depthtrack.files import read_text
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.markers.models.layout import find_layout
 from depthtrack.markers.models.marker_model import MarkerModel
+from depthtrack.strict_data import parse_json
 
 
 def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
@@ -49,7 +49,7 @@ def _model(word: str, hand: HandShape | None) -> MarkerModel:
 def _is_layout(path: Path) -> bool:
     """Return whether a JSON file is a layout; its reader states what else is wrong with it."""
     try:
-        fields = json.loads(read_text(path))
+        fields = parse_json(read_text(path))
         return "like" in fields or "bone" in fields["markers"][0]
-    except (InputError, ValueError, RecursionError, TypeError, KeyError, IndexError):
+    except (InputError, ValueError, TypeError, KeyError, IndexError):
         return False

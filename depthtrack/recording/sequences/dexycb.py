@@ -15,7 +15,6 @@ Source: Chao et al., "DexYCB: a benchmark for capturing hand grasping of objects
 
 import re
 from glob import escape
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +24,13 @@ from numpy.typing import NDArray
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_text
 from depthtrack.geometry.camera import Camera
+from depthtrack.number_text import parse_number
 from depthtrack.recording.images import read_colour, read_depth
+from depthtrack.recording.numpy_arrays import read_arrays
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import GroundTruth, OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import first_size, has_file, nominal_times, numbered_files
-from depthtrack.recording.zip_members import ZipMembers
 from depthtrack.types import Depth, Image, Mask
 
 _DEPTH = re.compile(r"aligned_depth_to_color_(\d{6})\.png")
@@ -128,7 +128,7 @@ def _parsed_camera(path: Path, width: int, height: int) -> Camera:
     block = re.search(r"^color:(.*?)(?=^\S|\Z)", read_text(path), re.DOTALL | re.MULTILINE)
     found = dict(re.findall(r"\b(fx|fy|ppx|ppy):\s*([-+.\deE]+)", block[1] if block else ""))
     try:
-        fx, fy, cx, cy = (float(found[name]) for name in ("fx", "fy", "ppx", "ppy"))
+        fx, fy, cx, cy = (parse_number(found[name]) for name in ("fx", "fy", "ppx", "ppy"))
     except (KeyError, ValueError) as error:
         raise InputError(f"{path} must hold fx, fy, ppx and ppy below color, found {sorted(found)}") from error
     return Camera(width, height, fx, fy, cx, cy, 0.001)
@@ -149,11 +149,7 @@ def _array(path: Path, name: str) -> NDArray[Any]:
     Raises:
         DamagedFrameError: if it is missing, damaged, or holds no numbers.
     """
-    data = ZipMembers.of(path).read(f"{name}.npy", _MAX_ARRAY_BYTES)
-    try:
-        array: NDArray[Any] = np.lib.format.read_array(BytesIO(data), allow_pickle=False)
-    except Exception as error:  # NumPy raises many types for damaged headers
-        raise DamagedFrameError(f"{path}: {name} is no array of numbers") from error
-    if array.dtype.kind not in "biuf":
-        raise DamagedFrameError(f"{path}: {name} must hold numbers, found {array.dtype}")
+    array = read_arrays(path, (name,), _MAX_ARRAY_BYTES).get(name)
+    if array is None or array.dtype.kind not in "biuf":
+        raise DamagedFrameError(f"{path}: {name} must hold numbers, found {'none' if array is None else array.dtype}")
     return array

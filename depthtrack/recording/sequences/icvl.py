@@ -19,6 +19,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import read_lines
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
+from depthtrack.number_text import parse_numbers
 from depthtrack.recording.images import read_depth
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import BenchmarkJoints, GroundTruth, OnDamage
@@ -114,7 +115,7 @@ def _labels(folder: Path) -> dict[int, Array]:
             if match is None:
                 continue
             try:
-                row = np.array(fields, dtype=np.float64)
+                row = np.array(parse_numbers(fields))
             except ValueError:
                 row = np.zeros(0)
             if row.shape != (48,) or not np.all(np.abs(row) < 1e6):

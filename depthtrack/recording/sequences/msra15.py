@@ -19,6 +19,7 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_bounded, read_lines
 from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
+from depthtrack.number_text import parse_numbers
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import GroundTruth, OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
@@ -98,7 +99,7 @@ def read_joints(path: Path) -> Array:
     """
     lines = [line for line in read_lines(path, _MAX_JOINTS_BYTES) if line.strip()]
     stated = lines[0].strip() if lines else ""
-    if not stated.isdecimal() or int(stated) != len(lines) - 1 or len(lines) < 2:
+    if stated != str(len(lines) - 1) or len(lines) < 2:
         raise InputError(
             f"{path} must begin with the number of lines below it, found {stated[:20]!r} and {max(0, len(lines) - 1)}"
             " lines: copy the file again"
@@ -106,7 +107,7 @@ def read_joints(path: Path) -> Array:
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         try:
-            row = np.array(line.split(), dtype=np.float64)
+            row = np.array(parse_numbers(line.split()))
         except ValueError:
             row = np.zeros(0)
         if row.shape != (63,) or not np.all(np.abs(row) < 1e5) or not np.all(row[2::3] < 0):

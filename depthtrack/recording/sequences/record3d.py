@@ -10,10 +10,8 @@
 Source: M. Simonik, Record3D, and its documentation of the format.
 """
 
-import json
 import re
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +26,7 @@ from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.zip_members import ZipMembers
+from depthtrack.strict_data import parse_json
 from depthtrack.types import Array, Depth, Image
 
 _DEPTH, _COLOUR = re.compile(r"rgbd/(\d{1,9})\.depth"), re.compile(r"rgbd/(\d{1,9})\.jpe?g")
@@ -187,9 +186,9 @@ def _metadata(members: ZipMembers) -> Mapping[str, Any]:
         raise InputError(f"{where} is missing, because the file is cut short: copy it again from the device")
     data = members.read(_METADATA, _MAX_METADATA_BYTES)
     try:
-        fields = json.loads(data, parse_constant=partial(float))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{where} must be JSON, found {data[:20]!r}") from error
+        fields = parse_json(data, undefined=True)
+    except ValueError as error:
+        raise InputError(f"{where} must be JSON, found {data[:20]!r}: {error}") from error
     if not isinstance(fields, dict):
         raise InputError(f"{where} must be a JSON object, found {type(fields).__name__}")
     return fields

@@ -16,6 +16,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import read_lines
+from depthtrack.number_text import parse_number
 from depthtrack.recording.sequences.inside import Inside
 from depthtrack.types import Array
 
@@ -123,7 +124,7 @@ def images_of(path: Path, images: list[tuple[str, str, int]]) -> ImageList:
         if len(files) == MAX_FRAMES:
             raise InputError(f"{path} lists more than {MAX_FRAMES:,} images: split the recording")
         whole = whole and text.lstrip("+-").isdigit()
-        files.append(ListedFile(float(text), name, line))
+        files.append(ListedFile(parse_number(text), name, line))
     return ImageList(path, files, whole)
 
 
@@ -176,7 +177,7 @@ def _fields(line: str) -> list[str]:
 
 def _is_time(text: str) -> bool:
     try:
-        return len(text) <= 64 and math.isfinite(float(text))
+        return math.isfinite(parse_number(text))
     except ValueError:
         return False
 
