@@ -46,6 +46,7 @@ COMMANDS = {
     "synergies": CommandEntry("depthtrack.cli.synergies", "fit or show principal components of hand postures"),
     "view": CommandEntry("depthtrack.cli.view", "show a recording or a run: viewer, video, contact sheet"),
     "video": CommandEntry("depthtrack.cli.video", "write a video of a run: the tracked hand over the recording"),
+    "convert": CommandEntry("depthtrack.cli.convert", "write a recording as a folder of images or an MCAP file"),
     "export": CommandEntry("depthtrack.cli.export", "write the joints of a run for other programs"),
     "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat experiments of the papers, with both figures"),
     "bench": CommandEntry("depthtrack.cli.bench", "measure the speed of scoring, fitting and segmentation"),

@@ -48,15 +48,24 @@ def read_depth(path: Path, shape: tuple[int, int]) -> NDArray[np.uint16]:
     Raises:
         DamagedFrameError: if the file is missing or damaged, or has another size or type.
     """
-    data, header = _read(path, shape)
+    return decode_depth(path, _read_bytes(path, shape), shape)
+
+
+def decode_depth(where: Path | str, data: bytes, shape: tuple[int, int]) -> NDArray[np.uint16]:
+    """Return the stored depth units (h, w) of the bytes of a 16-bit PNG, whose name is `where`.
+
+    Raises:
+        DamagedFrameError: if they are damaged, or the image has another size or type.
+    """
+    header = _check(where, data, shape)
     if header.image_format != "PNG" or header.mode not in _DEPTH_MODES:
         raise DamagedFrameError(
-            f"{path} must be a 16-bit PNG with one channel, found a {header.image_format} of mode {header.mode}:"
+            f"{where} must be a 16-bit PNG with one channel, found a {header.image_format} of mode {header.mode}:"
             " save the depth again without converting it to a picture"
         )
-    image = _decode(path, data, cv2.IMREAD_UNCHANGED)
+    image = _decode(where, data, cv2.IMREAD_UNCHANGED)
     if image.dtype != np.uint16 or image.shape != shape:
-        raise DamagedFrameError(f"{path} must decode to 16-bit depth {shape}, found {image.dtype} {image.shape}")
+        raise DamagedFrameError(f"{where} must decode to 16-bit depth {shape}, found {image.dtype} {image.shape}")
     return image.astype(np.uint16, copy=False)
 
 
@@ -115,9 +124,18 @@ def read_size(path: Path) -> tuple[int, int]:
     """
     try:
         with path.open("rb") as file:
-            header, _ = _open(path, file.read(_HEADER_BYTES))
+            return decode_size(path, file.read(_HEADER_BYTES))
     except OSError as error:
         raise DamagedFrameError(f"{path} cannot be read: {error.strerror}") from error
+
+
+def decode_size(where: Path | str, data: bytes) -> tuple[int, int]:
+    """Return (width, height) of the bytes of a PNG or JPEG, or of their beginning.
+
+    Raises:
+        DamagedFrameError: if the header is damaged.
+    """
+    header, _ = _open(where, data)
     return header.width, header.height
 
 
