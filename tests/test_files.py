@@ -20,7 +20,7 @@ from depthtrack.files import (
     replace_atomically,
     write_atomic,
 )
-from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.camera_files import read_camera
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies
 from depthtrack.recording.run_folder import read_configuration
@@ -48,7 +48,7 @@ def test_missing_binary_and_long_texts_are_rejected(tmp_path: Path, data: bytes 
         read_text(path, 10)
 
 
-@pytest.mark.parametrize("read", [Camera.from_json, HandShape.from_json, read_configuration, read_rows])
+@pytest.mark.parametrize("read", [read_camera, HandShape.from_json, read_configuration, read_rows])
 def test_files_larger_than_memory_are_rejected_unread(tmp_path: Path, read: Callable[[Path], object]) -> None:
     for name in ("run.json", "poses.csv"):
         (tmp_path / name).touch()

@@ -5,6 +5,7 @@ from pathlib import Path
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import PRESETS, Camera
+from depthtrack.geometry.camera_files import read_camera
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.hand_choice import AVERAGE, chosen_hand
@@ -36,6 +37,7 @@ def open_recording(
     invalid: tuple[int, ...] = (),
     mirror: bool = False,
     depth_only: bool = False,
+    distortion: tuple[float, ...] = (),
 ) -> Sequence:
     """Open a recording; frames are read one at a time.
 
@@ -46,6 +48,7 @@ def open_recording(
     invalid: stored depth values that mean no reading, beside 0.
     mirror: mirror the images left to right; the camera is that of the mirrored images.
     depth_only: ignore colour.
+    distortion: lens distortion of the given camera, k1 k2 p1 p2 k3 k4 k5 k6, which is removed.
 
     Raises:
         InputError: `path` holds no recording, or its camera is unknown.
@@ -57,8 +60,9 @@ def open_recording(
     if isinstance(camera, str) and camera in PRESETS:
         camera = PRESETS[camera]
     elif isinstance(camera, str | Path):
-        camera = Camera.from_json(Path(camera))
-    reading = ReadingOptions(depth_topic, colour_topic, time_unit, invalid, mirror, depth_only)
+        file = read_camera(Path(camera))
+        camera, distortion = file.camera, file.distortion or distortion
+    reading = ReadingOptions(depth_topic, colour_topic, time_unit, invalid, mirror, depth_only, distortion)
     return open_sequence(path, camera, on_damage, reading)
 
 

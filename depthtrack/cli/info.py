@@ -34,7 +34,7 @@ class Command:
 
         if self.sample is not None and self.sample < 1:
             raise InputError(f"--sample must be at least 1 frame, found {self.sample}")
-        sequence = self.recording.open(print_notes=False)
+        sequence = self.recording.open(with_notes=False)
         count = min(len(sequence), self.sample or len(sequence))
         indices = np.linspace(0, len(sequence) - 1, count).round().astype(int).tolist()
         summary = summarise(

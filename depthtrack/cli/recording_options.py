@@ -1,18 +1,19 @@
 """Options of the commands that open one recording."""
 
-import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from depthtrack.cli.reading_arguments import ReadingArguments
+from depthtrack.cli.recording_notes import notes_of, print_notes
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
     from depthtrack.geometry.camera import Camera
+    from depthtrack.geometry.camera_files import CameraFile
     from depthtrack.recording import Sequence
 
 # Written out, because reading them from depthtrack.geometry.camera would make `--help` wait for numpy.
@@ -26,8 +27,9 @@ class RecordingOptions:
 
     path: tyro.conf.Positional[Path]
     """The recording: a folder or a file of any format of docs/formats.md."""
-    camera: Annotated[Path | None, stated_default(metavar="FILE.json")] = None
-    """Camera in place of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON."""
+    camera: Annotated[Path | None, stated_default(metavar="FILE.json|.yaml")] = None
+    """Camera in place of the recording's own: width, height, fx, fy, cx, cy, depth_scale in JSON, or a file of Open3D,
+    ROS or Kalibr."""
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor or of the TUM RGB-D benchmark, in place of the recording's own."""
     fx: Pixels = None
@@ -44,27 +46,30 @@ class RecordingOptions:
     """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
-    def open(self, camera: "Camera | None" = None, print_notes: bool = True) -> "Sequence":
+    def open(self, camera: "Camera | None" = None, with_notes: bool = True) -> "Sequence":
         """Return the recording with the camera of the options, else with `camera`, else its own.
 
-        print_notes: whether to print what the user must know about the recording, on standard error.
+        with_notes: whether to print what the user must know about the recording, on standard error.
 
         Raises:
             InputError: if the recording or the camera of the options is unusable.
         """
         from depthtrack.recording import open_sequence
 
-        sequence = open_sequence(self.path, self._chosen_camera() or camera, self.on_damage, self.reading.options)
-        if print_notes:
-            for note in sequence.notes:
-                print(f"note: {note}", file=sys.stderr)
+        chosen = self._chosen_camera()
+        reading, given = self.reading.options, camera if chosen is None else chosen.camera
+        if chosen is not None and not reading.distortion:
+            reading = replace(reading, distortion=chosen.distortion)
+        sequence = open_sequence(self.path, given, self.on_damage, reading)
+        sequence.notes[:0] = () if chosen is None else chosen.notes
+        if with_notes:
+            print_notes(notes_of(sequence))
         return sequence
 
-    def _chosen_camera(self) -> "Camera | None":
+    def _chosen_camera(self) -> "CameraFile | None":
         """Return the camera that the options describe; None for the recording's own."""
-        from dataclasses import replace
-
         from depthtrack.geometry.camera import PRESETS, Camera
+        from depthtrack.geometry.camera_files import CameraFile, read_camera
         from depthtrack.recording import image_size
 
         numbers = {
@@ -78,12 +83,14 @@ class RecordingOptions:
         if self.camera is not None and self.camera_preset is not None:
             raise InputError("--camera and --camera-preset exclude each other: give one of them")
         if self.camera is not None:
-            return replace(Camera.from_json(self.camera), **given)
+            file = read_camera(self.camera)
+            notes = () if self.depth_scale is not None else file.notes
+            return replace(file, camera=replace(file.camera, **given), notes=notes)
         if self.camera_preset is not None:
-            return replace(PRESETS[self.camera_preset], **given)
+            return CameraFile(replace(PRESETS[self.camera_preset], **given))
         if not given:
             return None
         if self.fx is None or self.depth_scale is None:
             raise InputError("a camera from numbers needs --fx and --depth-scale: give both, or a --camera-preset")
         width, height = image_size(self.path, self.reading.options)
-        return Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given})
+        return CameraFile(Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given}))

@@ -11,6 +11,7 @@ import tyro
 from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.progress import bar
+from depthtrack.cli.recording_notes import print_notes
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
 from depthtrack.cli.stated_default import stated_default
@@ -58,6 +59,7 @@ class SegmentCommand:
 
     def run(self) -> None:
         from depthtrack.evaluation.segmentation import segment_sequence, summary
+        from depthtrack.recording.depth_checks import no_hand_note
         from depthtrack.segmentation.segmenter import Segmenter
         from depthtrack.strict_data import json_text
 
@@ -76,6 +78,8 @@ class SegmentCommand:
             rows = list(self._written(sequence, results, folder))
         report = {"recording": str(self.recording.path), **summary(rows), "written_to": str(folder)}
         print(json_text(report, indent=2) if self.json else _text(report))
+        if not report["frames_with_hand"]:
+            print_notes([no_hand_note(sequence)])
 
     def _tracker(self, hand: "HandShape") -> "AbstractContextManager[Tracker | None]":
         from contextlib import closing, nullcontext

@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.reading_arguments import ReadingArguments
+from depthtrack.cli.recording_notes import notes_of, print_notes
 from depthtrack.cli.recording_options import PresetName
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -46,15 +47,17 @@ class SourceOptions:
             raise InputError(f"--frames must be at least 1, found {self.frames}")
         hand = None if self.hands.hand == AVERAGE else self.hands.hand
         skin_model = self.skin_model
+        camera, distortion = self._camera()
+        reading = self.reading.options
         return Source(
             path=str(path.resolve()),
-            camera=self._camera(),
+            camera=camera,
             on_damage=self.on_damage,
             hand=hand if hand in (None, TRUTH) else str(Path(hand).resolve()),
             skin_model=None if skin_model is None else str(skin_model.resolve()),
             frames=self.frames,
             side=self.hands.given_side,
-            reading=self.reading.options,
+            reading=reading if reading.distortion else replace(reading, distortion=distortion),
         )
 
     def with_side(self, source: "Source") -> "Source":
@@ -63,18 +66,23 @@ class SourceOptions:
         Raises:
             InputError: if the recording is unusable.
         """
+        sequence = source.open()
+        print_notes(notes_of(sequence))
         if source.hand is not None or source.side is not None:
             return source
-        choice = self.hands.choose_side(source.open(), source.segmentation, frames=self.frames)
+        choice = self.hands.choose_side(sequence, source.segmentation, frames=self.frames)
         return source if choice is None else replace(source, side=choice.side)
 
-    def _camera(self) -> dict[str, Any] | None:
+    def _camera(self) -> tuple[dict[str, Any] | None, tuple[float, ...]]:
+        """Return the given camera as plain values, and its distortion. Raises InputError."""
         from dataclasses import asdict
 
-        from depthtrack.geometry.camera import PRESETS, Camera
+        from depthtrack.geometry.camera import PRESETS
+        from depthtrack.geometry.camera_files import read_camera
 
         if self.camera is not None and self.camera_preset is not None:
             raise InputError("--camera and --camera-preset exclude each other: give one of them")
         if self.camera is not None:
-            return asdict(Camera.from_json(self.camera))
-        return None if self.camera_preset is None else asdict(PRESETS[self.camera_preset])
+            file = read_camera(self.camera)
+            return asdict(file.camera), file.distortion
+        return (None if self.camera_preset is None else asdict(PRESETS[self.camera_preset])), ()

@@ -89,7 +89,7 @@ class TrackCommand:
             for each in run.write(self.out, resume=self.resume):
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
-        self._report()
+        self._report(sequence)
 
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
@@ -141,10 +141,13 @@ class TrackCommand:
         check_run(configuration, sequence, self.out, self.resume)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
-    def _report(self) -> None:
+    def _report(self, sequence: "Recording") -> None:
+        from depthtrack.recording.depth_checks import no_hand_note
         from depthtrack.recording.run_rows import read_rows
 
         rows = read_rows(self.out)
+        if sequence.has_depth and not any(row.status.is_trusted for row in rows):
+            print(no_hand_note(sequence))
         print(
             f"{self.out}: {len(rows)} frames, {sum(not row.status.is_trusted for row in rows)} without a trusted pose"
         )

@@ -4,14 +4,13 @@ Camera frame: x right, y down, z forward. Pixel centres have integer coordinates
 """
 
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from depthtrack.errors import InputError
-from depthtrack.files import compact_json, read_json
+from depthtrack.files import compact_json
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Array, Depth
 
@@ -120,15 +119,6 @@ class Camera:
     def to_json(self) -> str:
         """Return the text of `camera.json`."""
         return compact_json(asdict(self))
-
-    @classmethod
-    def from_json(cls, path: Path) -> Self:
-        """Return the camera of a `camera.json`.
-
-        Raises:
-            InputError: if the file is missing or malformed, or a value is out of range.
-        """
-        return read_json(path, "the camera file", cls.from_fields)
 
     @classmethod
     def from_fields(cls, fields: Any) -> Self:

@@ -29,6 +29,15 @@ _JPEG_END = b"\xff\xd9"
 _DEPTH_MODES = ("I;16", "I")
 """Pillow's modes of a PNG with one channel of 16 bits; versions before 11 use the second."""
 _HEADER_BYTES = 1 << 16
+_JPEG_REMEDY = "it changes depths, so save the depth again as PNG"
+_CHANNELS_REMEDY = (
+    "colours of depth have lost it, so export the depth itself; unpack depth in channels to one of 16 bits"
+)
+_DEPTH_REMEDIES = {"L": "8 bits have lost the depth, so export the depth itself, not its picture"}
+"""What to do by Pillow's mode of a PNG."""
+_OTHER_FORMATS = {b"II*\0": "TIFF", b"MM\0*": "TIFF", b"v/1\x01": "EXR", b"\x93NUM": "array of numpy"}
+"""Formats of depth that are not read, by their first bytes."""
+_CONVERSION = "save 16-bit PNG, for metres  cv2.imwrite('1.png', (1000 * depth).round().astype('uint16'))"
 
 
 @dataclass(frozen=True)
@@ -59,9 +68,10 @@ def decode_depth(where: Path | str, data: bytes, shape: tuple[int, int]) -> NDAr
     """
     header = _check(where, data, shape)
     if header.image_format != "PNG" or header.mode not in _DEPTH_MODES:
+        lossy = header.image_format != "PNG"
         raise DamagedFrameError(
             f"{where} must be a 16-bit PNG with one channel, found a {header.image_format} of mode {header.mode}:"
-            " save the depth again without converting it to a picture"
+            f" {_JPEG_REMEDY if lossy else _DEPTH_REMEDIES.get(header.mode, _CHANNELS_REMEDY)}"
         )
     image = _decode(where, data, cv2.IMREAD_UNCHANGED)
     if image.dtype != np.uint16 or image.shape != shape:
@@ -193,6 +203,8 @@ def _open(path: Path | str, data: bytes) -> tuple[_Header, Pictures.Image]:
     try:
         image = Pictures.open(file, formats=("PNG", "JPEG"))
     except UnidentifiedImageError as error:
+        if (other := _OTHER_FORMATS.get(data[:4])) is not None:
+            raise DamagedFrameError(f"{path} is a {other}, no PNG: {_CONVERSION}") from error
         raise DamagedFrameError(
             f"{path} must be a PNG or JPEG image with an intact header,"
             f" found {len(data)} bytes that begin with {data[:4]!r}"

@@ -20,6 +20,9 @@ class ReadingOptions:
     invalid: tuple[int, ...] = option((), "Stored depth values that mean no reading, beside 0")
     mirror: bool = option(False, "Mirror the images left to right; the camera is that of the mirrored images")
     depth_only: bool = option(False, "Ignore colour")
+    distortion: tuple[float, ...] = option(
+        (), "Lens distortion of listed images, which is removed: k1 k2 p1 p2 k3 k4 k5 k6, of the given camera"
+    )
 
     def __post_init__(self) -> None:
         if len(self.invalid) > _MOST_VALUES or not all(0 <= value <= _LARGEST_STORED for value in self.invalid):

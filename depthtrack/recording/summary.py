@@ -9,6 +9,7 @@ import numpy as np
 
 from depthtrack.errors import DamagedFrameError
 from depthtrack.geometry.camera import Camera
+from depthtrack.recording.depth_checks import STORED_VALUES, add_stored, depth_notes
 from depthtrack.recording.sequence import DamagedFrame, Frame, OnDamage, Sequence
 from depthtrack.types import Array, Index
 
@@ -104,7 +105,7 @@ def summarise(
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),
         damaged_colour=sequence.damaged_colour,
-        notes=list(sequence.notes),
+        notes=[*sequence.notes, *counts.depth_notes()],
     )
 
 
@@ -122,13 +123,12 @@ class _Counts:
     def __init__(self, sequence: Sequence, on_damage: OnDamage) -> None:
         self._sequence = sequence
         self._on_damage = on_damage
-        self._histogram: Index = np.zeros(1 << 16, dtype=np.int64)
+        self._histogram: Index = np.zeros(STORED_VALUES, dtype=np.int64)
         self.frames = self.colours = self.masks = self.exact_depths = 0
         self.damaged: list[DamagedFrame] = []
 
     def add(self, frame: Frame) -> None:
-        units = np.rint(frame.depth / np.float32(frame.camera.depth_scale)).clip(0, 65535).astype(np.uint16)
-        self._histogram += np.bincount(units.ravel(), minlength=1 << 16)
+        add_stored(self._histogram, frame)
         self.frames += 1
         self.colours += frame.colour is not None
         self.masks += self._has(self._sequence.hand_mask, frame)
@@ -151,6 +151,9 @@ class _Counts:
         units = np.searchsorted(readings, wanted) + 1
         scale = self._sequence.camera.depth_scale
         return {percent: float(unit * scale) for percent, unit in zip(DEPTH_PERCENTILES, units, strict=True)}
+
+    def depth_notes(self) -> list[str]:
+        return depth_notes(self._histogram, self._sequence.camera) if self._sequence.has_depth else []
 
     def missing_share(self) -> float:
         return float(self._histogram[0] / max(1, self._histogram.sum()))

@@ -80,7 +80,7 @@ REFUSALS: dict[str, tuple[Change, str]] = {
     "camera nests deep": (text("camera.json", "[" * 100_000), "cannot read the camera file"),
     "camera without fx": (text("camera.json", '{"width": 32, "height": 24}'), "must be a JSON object with"),
     "focal length zero": (camera(fx=0), "fx must be a focal length"),
-    "focal length negative": (camera(fy=-30.0), "fy must be a focal length"),
+    "focal length negative": (camera(fx=-30.0), "fx must be a focal length"),
     "focal length in metres": (camera(fx=0.004), "fx must be a focal length"),
     "focal length NaN": (camera(fx=float("nan")), "JSON has no NaN"),
     "focal length beyond floats": (camera(fx=10**400), "whole numbers of at most 64 bits"),

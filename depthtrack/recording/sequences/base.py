@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.distortion import Undistortion
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import DamagedFrame, Frame, GroundTruth, OnDamage
@@ -56,6 +57,7 @@ class BaseSequence(ABC):
         self.on_damage = on_damage
         self.reading = reading or ReadingOptions()
         self.notes: list[str] = []
+        self._undistortion: Undistortion | None = None
         self._damaged: dict[int, DamagedFrame] = {}
         self._damaged_colour: dict[int, DamagedFrame] = {}
 
@@ -131,8 +133,8 @@ class BaseSequence(ABC):
         return Frame(
             index=index,
             timestamp=float(self.timestamps[index]),
-            depth=self._as_read(self._valid(self.read_depth(index))),
-            colour=None if (colour := self._readable_colour(index)) is None else self._as_read(colour),
+            depth=self._corrected_depth(self.read_depth(index)),
+            colour=self._corrected_colour(self._readable_colour(index)),
             camera=self.camera,
         )
 
@@ -144,6 +146,16 @@ class BaseSequence(ABC):
             self._damaged_colour[index] = DamagedFrame(index, float(self.timestamps[index]), str(error))
             return None
 
+    def _corrected_depth(self, depth: Depth) -> Depth:
+        """Return depth (h, w) as the options of reading say."""
+        read = self._mirrored(self._valid(depth))
+        return read if self._undistortion is None else self._undistortion.depth(read)
+
+    def _corrected_colour(self, colour: Image | None) -> Image | None:
+        """Return colour (h, w, 3) as the options of reading say."""
+        read = None if colour is None else self._mirrored(colour)
+        return read if self._undistortion is None or read is None else self._undistortion.colour(read)
+
     def _valid(self, depth: Depth) -> Depth:
         """Return depth (h, w) with 0 in place of the stored values that mean no reading."""
         if not self.reading.invalid:
@@ -151,7 +163,7 @@ class BaseSequence(ABC):
         stored = np.rint(depth / np.float32(self.camera.depth_scale))
         return np.where(np.isin(stored, self.reading.invalid), np.float32(0), depth)
 
-    def _as_read(self, image: NDArray[Value]) -> NDArray[Value]:
+    def _mirrored(self, image: NDArray[Value]) -> NDArray[Value]:
         """Return an image (h, w, ...), mirrored if the options say so."""
         return np.ascontiguousarray(image[:, ::-1]) if self.reading.mirror else image
 

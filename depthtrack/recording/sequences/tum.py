@@ -25,6 +25,8 @@ from typing import Any
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.files import read_json
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.camera_files import read_camera
+from depthtrack.geometry.distortion import Distortion, Undistortion
 from depthtrack.recording.colour_association import ColourAssociation, associate_colour
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
 from depthtrack.recording.images import read_colour, read_depth, read_mask, read_size
@@ -37,6 +39,7 @@ from depthtrack.recording.sequences.tum_lists import ImageList
 from depthtrack.recording.time_units import Clock, clock_of
 from depthtrack.types import Depth, Image, Mask
 
+CAMERA_FILES = ("camera.json", "camera_info.yaml", "camera.yaml", "camera_intrinsic.json", "intrinsic.json")
 EXACT_DEPTH_SCALE = 0.00005
 """Metres per unit of `exact_depth/`: steps of 0.05 mm up to 3.27 m. `sequence.json` may state another."""
 
@@ -56,7 +59,8 @@ class TumSequence(BaseSequence):
     ) -> None:
         """See `BaseSequence`."""
         super().__init__(path, camera, on_damage, reading)
-        self.camera = camera or _read_camera(path)
+        self.camera = camera or self._own_camera()
+        self._undistort()
         self.description = _read_description(path)
         lists = find_lists(path)
         self._files = ImageFiles(path)
@@ -68,6 +72,29 @@ class TumSequence(BaseSequence):
         self.hand = read_hand(path)
         self.ground_truth = self._annotations(clock)
         self._exact_camera = replace(self.camera, depth_scale=_exact_depth_scale(self.description, path))
+
+    def _own_camera(self) -> Camera:
+        """Return the camera of the folder, and store its distortion. Raises InputError."""
+        path = next((self.path / name for name in CAMERA_FILES if (self.path / name).exists()), None)
+        if path is None:
+            raise InputError(
+                f"{self.path} has no camera.json, so the camera is unknown:"
+                " give it with --camera FILE, --camera-preset NAME, or --fx and --depth-scale"
+            )
+        file = read_camera(path)
+        self.notes += file.notes
+        if file.distortion and not self.reading.distortion:
+            self.reading = replace(self.reading, distortion=file.distortion)
+        return file.camera
+
+    def _undistort(self) -> None:
+        """Prepare the removal of lens distortion. Raises InputError."""
+        if not any(self.reading.distortion):
+            return
+        self._undistortion = Undistortion(self.camera, Distortion(self.reading.distortion))
+        self.notes.append(
+            f"lens distortion is removed, which moves points by up to {self._undistortion.pixels:.1f} pixels"
+        )
 
     def _associated(self, colour: ImageList | None) -> tuple[ImageList | None, ColourAssociation]:
         """Return the colour and its association; none if it has another size. Raises InputError."""
@@ -142,7 +169,7 @@ class TumSequence(BaseSequence):
             DamagedFrameError: if the mask exists and cannot be read.
         """
         path = self._beside(index, "hand_mask")
-        return None if path is None else self._as_read(read_mask(path, self.camera.shape))
+        return None if path is None else self._mirrored(read_mask(path, self.camera.shape))
 
     def exact_depth(self, index: int) -> Depth | None:
         """See `Sequence`.
@@ -153,7 +180,7 @@ class TumSequence(BaseSequence):
         path = self._beside(index, "exact_depth")
         if path is None:
             return None
-        return self._as_read(self._exact_camera.metres(read_depth(path, self.camera.shape)))
+        return self._mirrored(self._exact_camera.metres(read_depth(path, self.camera.shape)))
 
     def _beside(self, index: int, kind: str) -> Path | None:
         """Return the image of another kind with a depth image's name; None if there is none."""
@@ -173,16 +200,6 @@ def _sizes(paths: Iterable[Path]) -> Iterator[tuple[int, int]]:
             yield read_size(path)
         except DamagedFrameError:
             continue
-
-
-def _read_camera(folder: Path) -> Camera:
-    path = folder / "camera.json"
-    if not path.exists():
-        raise InputError(
-            f"{folder} has no camera.json, so the camera is unknown:"
-            " give it with --camera FILE.json, --camera-preset NAME, or --fx and --depth-scale"
-        )
-    return Camera.from_json(path)
 
 
 def _read_description(folder: Path) -> Mapping[str, Any]:

@@ -1,0 +1,146 @@
+"""Checks of the depth of a recording: missing readings, units, raw disparity.
+
+They need only the histogram of the stored values. Each finding is a sentence with its remedy.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from depthtrack.errors import DamagedFrameError
+from depthtrack.geometry.camera import Camera
+from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.types import Index
+
+STORED_VALUES = 1 << 16
+"""Number of values of a 16-bit depth image."""
+_LARGEST_STORED = STORED_VALUES - 1
+_SATURATED_SHARE = 0.002
+"""Share of pixels of the largest value of a sensor that is reported."""
+_CONSTANT_SHARE = 0.15
+"""Share of pixels of one value that is reported; noise spreads a wall over many values."""
+_NEAREST_READING = 0.12
+"""Depth that no sensor for hands reads below, metres."""
+_FARTHEST_HAND = 3.0
+"""Depth that no hand is tracked beyond, metres."""
+_HAND_DEPTHS = (0.25, 1.5)
+_COMMON_SCALES = {0.001: "1 mm", 0.0001: "0.1 mm", 0.0002: "0.2 mm", 0.00025: "0.25 mm", 0.000125: "0.125 mm"}
+"""Units of the depth of common sensors and data sets, metres."""
+_DISPARITY_MISSING = 2047
+"""Raw disparity of Kinect v1 without a reading: eleven bits."""
+_DISPARITIES = (250, 1092)
+"""Raw disparities of Kinect v1 between 0.3 m and infinity."""
+_BYTE = 255
+
+
+def depth_notes(histogram: Index, camera: Camera) -> list[str]:
+    """Return what is unusual in the depth of a recording.
+
+    histogram: (65536,) count of the pixels of each stored value.
+    """
+    readings = histogram.copy()
+    readings[0] = 0
+    if not readings.any():
+        return []
+    if (disparity := _disparity(readings)) is not None:
+        return [disparity]
+    if not readings[_BYTE + 1 :].any():
+        return [
+            f"no stored value is above {_BYTE}: depth of 8 bits was saved as 16 bits, which lost its steps,"
+            " so export 16-bit depth again"
+        ]
+    notes = list(_values_without_meaning(readings, int(histogram.sum()), camera))
+    return [*notes, *_units(readings, camera)]
+
+
+def sampled_histogram(sequence: Sequence, count: int = 8) -> Index:
+    """Return the count of pixels (65536,) of each stored value in a few readable frames."""
+    histogram: Index = np.zeros(STORED_VALUES, dtype=np.int64)
+    for index in np.unique(np.linspace(0, len(sequence) - 1, count).astype(int)):
+        try:
+            add_stored(histogram, sequence[int(index)])
+        except DamagedFrameError:
+            continue
+    return histogram
+
+
+def add_stored(histogram: Index, frame: Frame) -> None:
+    """Add the pixels of a frame to the count (65536,) of each stored value."""
+    units = np.rint(frame.depth / np.float32(frame.camera.depth_scale)).clip(0, _LARGEST_STORED).astype(np.uint16)
+    histogram += np.bincount(units.ravel(), minlength=STORED_VALUES)
+
+
+def no_hand_note(sequence: Sequence) -> str:
+    """Return a sentence on a recording without a hand: depth range and likely unit."""
+    histogram = sampled_histogram(sequence)
+    if not histogram[1:].any():
+        return "no hand was found in any frame: the depth images have no readings"
+    scale = sequence.camera.depth_scale
+    low, high = (_percentile(histogram, share) * scale for share in (0.02, 0.98))
+    text = f"no hand was found in any frame: depth runs from {low:.2f} to {high:.2f} m in units of {1000 * scale:g} mm"
+    likely = likely_scale(histogram)
+    if likely is None or np.isclose(likely, scale):
+        return f"{text}; a hand must be one of the nearest objects, 0.2 to 1.5 m away (`depthtrack segment` shows it)"
+    return f"{text}; {_COMMON_SCALES[likely]} is more likely: give --depth-scale {likely:g}"
+
+
+def likely_scale(histogram: Index) -> float | None:
+    """Return a common unit, metres, that puts the nearest surfaces where hands are."""
+    nearest = _percentile(histogram, 0.02)
+    fitting = [scale for scale in _COMMON_SCALES if _HAND_DEPTHS[0] <= nearest * scale <= _HAND_DEPTHS[1]]
+    return fitting[0] if fitting else None
+
+
+def _values_without_meaning(readings: Index, pixels: int, camera: Camera) -> Iterator[str]:
+    """Yield a sentence on the value that may mean no reading."""
+    value, share = int(np.argmax(readings)), float(readings.max() / pixels)
+    saturated = float(readings[_LARGEST_STORED] / pixels)
+    if saturated >= _SATURATED_SHARE:
+        value, share = _LARGEST_STORED, saturated
+    elif share < _CONSTANT_SHARE:
+        return
+    yield (
+        f"the stored value {value} ({value * camera.depth_scale:.3g} m) covers {100 * share:.1f} % of the pixels:"
+        f" if it means no reading, give --invalid {value}"
+    )
+    readings[value] = 0
+
+
+def _units(readings: Index, camera: Camera) -> Iterator[str]:
+    if not readings.any():
+        return
+    low, high = (_percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98))
+    if _NEAREST_READING <= low <= _FARTHEST_HAND:
+        return
+    found = f"depth runs from {low:.2f} to {high:.2f} m, where no hand is tracked"
+    scale = likely_scale(readings)
+    if scale is None:
+        yield f"{found}: state the unit of the depth with --depth-scale METRES"
+        return
+    near, far = (_percentile(readings, share) * scale for share in (0.02, 0.98))
+    unit = f"a unit of {_COMMON_SCALES[scale]} (--depth-scale {scale:g})"
+    yield f"{found}: with {unit} it runs from {near:.2f} to {far:.2f} m"
+
+
+def _disparity(readings: Index) -> str | None:
+    """Return a sentence if the values are raw disparities of Kinect v1."""
+    missing = readings[_DISPARITY_MISSING]
+    rest = readings.sum() - missing
+    within = readings[_DISPARITIES[0] : _DISPARITIES[1] + 1].sum()
+    if not missing or readings[_DISPARITY_MISSING + 1 :].any() or missing < _SATURATED_SHARE * readings.sum():
+        return None
+    if within < 0.98 * rest:
+        return None
+    share = 100 * missing / readings.sum()
+    return (
+        f"values end at {_DISPARITY_MISSING}, which covers {share:.1f} % of the readings: this is raw disparity of"
+        " Kinect v1, so convert it by depth = 1 / (3.33 - 0.00307 * value) metres"
+    )
+
+
+def _percentile(histogram: Index, share: float) -> float:
+    """Return the stored value that a share of the readings does not exceed."""
+    readings = histogram.copy()
+    readings[0] = 0
+    total = np.cumsum(readings)
+    return float(np.searchsorted(total, share * total[-1]))
