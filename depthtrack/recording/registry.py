@@ -18,7 +18,6 @@ from depthtrack.recording.sequences.base import BaseSequence
 _ADVICE = {
     ".svo": "export it to MCAP or to PNG images with ZED's own tools",
     ".svo2": "export it to MCAP or to PNG images with ZED's own tools",
-    ".oni": "record it as a folder of images with OpenNI's own tools",
 }
 """What to do with files that only their maker's library reads, by suffix."""
 

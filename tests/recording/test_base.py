@@ -91,7 +91,7 @@ def test_formats_are_found_by_their_modules() -> None:
     assert [each.is_generic for each in found] == sorted(each.is_generic for each in found)
 
 
-@pytest.mark.parametrize("name", ["film.svo2", "film.SVO", "film.oni"])
+@pytest.mark.parametrize("name", ["film.svo2", "film.SVO"])
 def test_files_of_closed_formats_are_rejected_with_advice(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"anything")
     with pytest.raises(InputError, match="library of its maker"):
