@@ -35,7 +35,7 @@ def seen(camera: Camera, T_camera_world: Array, distortion: Distortion | None = 
     a, b = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
     x, y = a, b
     if distortion is not None:
-        for _ in range(40):
+        for _ in range(15):
             dx, dy = distortion.distort(x, y)
             x, y = x + a - dx, y + b - dy
     T_world_camera = np.linalg.inv(T_camera_world)
