@@ -22,6 +22,11 @@ EXPERIMENTS = {
     "schroeder-11": f"{_HERE}.schroeder_11",
     "schroeder-sec6c": f"{_HERE}.schroeder_sec6c",
     "maycock-6": f"{_HERE}.maycock_6",
+    "schroeder2015-9": f"{_HERE}.schroeder2015_9",
+    "schroeder2015-10": f"{_HERE}.schroeder2015_10",
+    "schroeder2015-11": f"{_HERE}.schroeder2015_11",
+    "schroeder2015-14": f"{_HERE}.schroeder2015_14",
+    "schroeder2015-table1": f"{_HERE}.schroeder2015_table1",
     "crossmodel": "depthtrack.benchmarks.crossmodel.experiment",
 }
 """Modules with an `EXPERIMENT`; those of papers by the first author and the figure or section."""
@@ -31,10 +36,10 @@ PAPERS = tuple(dict.fromkeys(name.partition("-")[0] for name in _FIGURES))
 """Names of the papers: their first authors."""
 
 SHORT_NAMES = {
-    tail if tail.startswith("sec") else f"fig{tail}": name
-    for name, tail in ((name, name.rpartition("-")[2]) for name in _FIGURES)
+    f"fig{tail}" if tail[0].isdigit() else tail: name
+    for name, tail in ((name, name.rpartition("-")[2]) for name in reversed(_FIGURES))
 }
-"""Full names by figure or section, which differ between the papers."""
+"""Full names by figure, section or table; one that two papers have is that of the earlier paper in the list."""
 
 
 def load_experiment(name: str) -> Experiment:

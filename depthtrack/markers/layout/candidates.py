@@ -72,6 +72,14 @@ class Candidates:
         groups = (np.flatnonzero(self.bodies == body) for body in range(BODY_COUNT))
         return tuple(group for group in groups if len(group))
 
+    def random_rows(self, shape: int | tuple[int, ...], generator: np.random.Generator) -> Index:
+        """Return random candidates; each bone is as likely as another."""
+        groups = self.by_body()
+        group, share = generator.integers(len(groups), size=shape), generator.random(shape)
+        sizes = np.array([len(rows) for rows in groups])
+        first = np.cumsum(sizes) - sizes
+        return np.asarray(np.concatenate(groups)[first[group] + (share * sizes[group]).astype(np.int64)])
+
     def layout(self, chosen: Sequence[int] | Index, about: str) -> Layout:
         """Return the layout of chosen candidates of a skin, from thumb to little finger and outward."""
         order = sorted(map(int, chosen), key=lambda v: (self.bodies[v] == 0, self.bodies[v], self.places[v]))

@@ -15,6 +15,9 @@ from depthtrack.types import Index
 _LEAST_GAIN = 1e-12
 """Relative decrease of the energy that an exchange must bring."""
 
+_KICKED = 3
+"""Markers that a random change moves."""
+
 Progress = Callable[[float], None]
 
 
@@ -38,6 +41,31 @@ def added(quality: LayoutQuality, count: int, pool: ThreadPoolExecutor | None = 
         grown = np.concatenate([np.broadcast_to(chosen, (len(every), len(chosen))), every[:, None]], axis=1)
         chosen = np.append(chosen, int(np.argmin(quality.energies(grown, None, pool))))
     return chosen
+
+
+def kicked(
+    quality: LayoutQuality,
+    start: Index,
+    kicks: int,
+    generator: np.random.Generator,
+    pool: ThreadPoolExecutor | None = None,
+    progress: Progress = lambda energy: None,
+) -> FoundLayout:
+    """Return the best layout of exchanges from `start` (K,) and from random changes.
+
+    Each of `kicks` changes moves three random markers of the best layout to random places. This is iterated local
+    search (Lourenco, Martin and Stuetzle 2003).
+    """
+    best = exchanged(quality, start, pool, progress)
+    for _ in range(kicks):
+        changed = best.rows.copy()
+        moved = generator.permutation(len(changed))[:_KICKED]
+        changed[moved] = quality.candidates.random_rows(len(moved), generator)
+        found = exchanged(quality, changed, pool)
+        if found.energy < best.energy - _LEAST_GAIN * abs(best.energy):
+            best = found
+        progress(best.energy)
+    return best
 
 
 def exchanged(

@@ -28,8 +28,9 @@ class QualityOptions:
     """Objective of a layout (Eq. 7) and the subspace that it is for."""
 
     key_frames: int = option(10, "Postures that the objective is evaluated in", source=f"{_PAPER}, Sec. 5.2: 3 to 10")
-    components: int = option(0, "Synergies l of the subspace; 0 for as many as cover `share` of the variance")
-    share: float = option(0.95, "Share of the variance that the synergies cover, if `components` is 0")
+    components: int = option(
+        6, "Synergies l of the subspace, at most; no more than markers", source=f"{_PAPER}, Sec. 3.2: 3 to 6"
+    )
     condition_weight: float = option(0.1, "Weight w1 of the condition number", source=f"{_PAPER}, Sec. 5.1")
     distance_weight: float = option(100.0, "Weight w2 of the least distance", source=f"{_PAPER}, Sec. 5.1")
     occlusion_weight: float = option(0.0, "Weight of the share of samples that too few cameras see; 0 for none")
@@ -39,10 +40,10 @@ class QualityOptions:
     robust: bool = option(False, "Count the condition number after the loss of the worst marker")
 
     def __post_init__(self) -> None:
-        if not (1 <= self.key_frames <= 1000 and 0 <= self.components <= 20 and 0 < self.share <= 1):
+        if not (1 <= self.key_frames <= 1000 and 1 <= self.components <= 20):
             raise InputError(
-                "a layout needs 1 to 1000 key-frames, 0 to 20 components and a share of the variance up to 1, "
-                f"found {self.key_frames}, {self.components} and {self.share}"
+                "a layout needs 1 to 1000 key-frames and 1 to 20 components, "
+                f"found {self.key_frames} and {self.components}"
             )
         if min(self.condition_weight, self.distance_weight, self.occlusion_weight) < 0:
             raise InputError("the weights of the objective of a layout must not be negative")
@@ -58,3 +59,4 @@ class LayoutOptions:
         SwarmOptions(particles=1000, generations=100), f"Particle swarm ({_PAPER}, Sec. 5.2)", advanced=True
     )
     exchange: bool = option(True, "Exchange single markers after the swarm until no exchange improves the layout")
+    kicks: int = option(10, "Times that three markers of the best layout are moved at random, and exchanged again")

@@ -67,7 +67,7 @@ class LayoutQuality:
         """
         options = options or QualityOptions()
         fitted = Synergies.fit(postures) if synergies is None else synergies
-        kept = fitted.truncated(options.components or fitted.components_for(options.share))
+        kept = fitted.truncated(min(options.components, len(fitted)))
         chosen = postures[key_frames(postures, options.key_frames)]
         return cls(candidates, kept, chosen, options, _tables(candidates, kept, chosen, options))
 

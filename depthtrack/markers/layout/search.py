@@ -7,7 +7,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.machine import usable_cores
-from depthtrack.markers.layout.exchange import exchanged
+from depthtrack.markers.layout.exchange import kicked
 from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.surface_swarm import FoundLayout, swarm_layout
@@ -40,4 +40,4 @@ def find_layout_of(
     generator = np.random.Generator(np.random.Philox(key=[seed, count]))
     with ThreadPoolExecutor(usable_cores() if threads is None else threads) as pool:
         found = swarm_layout(quality, count, generator, options.swarm, pool, progress)
-        return exchanged(quality, found.rows, pool, progress) if options.exchange else found
+        return kicked(quality, found.rows, options.kicks, generator, pool, progress) if options.exchange else found

@@ -30,17 +30,9 @@ class SurfaceSwarm:
     def __init__(self, quality: LayoutQuality, count: int, pool: ThreadPoolExecutor | None = None) -> None:
         self._quality, self._count, self._pool = quality, count, pool
         self._points = np.ascontiguousarray(quality.candidates.rest)
-        self._groups = quality.candidates.by_body()
         self._tree = Tree.of(self._points)
         self._rows: Index = np.empty((0, count), np.int64)
         self._least = np.empty(0)
-
-    def random_rows(self, shape: int | tuple[int, ...], generator: np.random.Generator) -> Index:
-        """Return random candidates; each bone is as likely as another."""
-        group, share = generator.integers(len(self._groups), size=shape), generator.random(shape)
-        sizes = np.array([len(rows) for rows in self._groups])
-        first = np.cumsum(sizes) - sizes
-        return np.concatenate(self._groups)[first[group] + (share * sizes[group]).astype(np.int64)]
 
     def positions(self, rows: Index) -> Array:
         """Return the positions (N, 3 K) of layouts (N, K)."""
@@ -77,7 +69,7 @@ class SurfaceSwarm:
         count = round(options.randomise * len(position))
         particles = generator.permutation(len(position))[:count]
         markers = generator.integers(self._count, size=count)
-        self._rows[particles, markers] = self.random_rows(count, generator)
+        self._rows[particles, markers] = self._quality.candidates.random_rows(count, generator)
         position[particles] = self.positions(self._rows[particles])
 
     def score(self, position: Array) -> Array:
@@ -100,6 +92,6 @@ def swarm_layout(
 ) -> FoundLayout:
     """Return the layout of `count` markers that a swarm on the skin finds."""
     swarm = SurfaceSwarm(quality, count, pool)
-    first = swarm.positions(swarm.random_rows((options.particles, count), generator))
+    first = swarm.positions(quality.candidates.random_rows((options.particles, count), generator))
     found = minimise(swarm.score, first, swarm, generator, options, progress)
     return FoundLayout(swarm.rows(found.position[None])[0], found.energy)

@@ -146,6 +146,6 @@ def test_key_frames_are_far_from_each_other() -> None:
 
 
 def test_options_out_of_range_are_rejected() -> None:
-    for wrong in ({"key_frames": 0}, {"components": 21}, {"share": 0.0}, {"condition_weight": -1.0}):
+    for wrong in ({"key_frames": 0}, {"components": 0}, {"components": 21}, {"condition_weight": -1.0}):
         with pytest.raises(InputError):
             QualityOptions(**wrong)

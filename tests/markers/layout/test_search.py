@@ -16,7 +16,7 @@ from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.markers.layout.surface_swarm import SurfaceSwarm
 from depthtrack.solver.options import SwarmOptions
 
-SMALL = LayoutOptions(swarm=SwarmOptions(particles=60, generations=15))
+SMALL = LayoutOptions(swarm=SwarmOptions(particles=60, generations=15), kicks=1)
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.sampled_from([1, 2, 7, 9, 100, 400]))

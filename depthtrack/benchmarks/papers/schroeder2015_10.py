@@ -1,0 +1,109 @@
+"""Fig. 10 of Schroeder et al. 2015: our layouts and those of Wheatland et al. 2013."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
+from depthtrack.benchmarks.papers.schroeder2015 import (
+    SCHROEDER_2015,
+    Search,
+    best_model,
+    motions_tested,
+    quality_of,
+    reconstruction_error,
+    search_of,
+    training_postures,
+)
+from depthtrack.evaluation.sweep.rows import Cell, Row
+from depthtrack.markers.layout.reconstruction import Method
+from depthtrack.markers.layout.wheatland import random_base, wheatland_layout
+
+MARKERS, QUICK_MARKERS = tuple(range(4, 13)), (4, 6, 8)
+TRAININGS = ("grasps", "grasps-2")
+METHOD: Method = "subspace"
+BASES = {"all": "all vertices", "three": "three a bone", "one": "one a bone"}
+"""Base marker sets (a) to (c) of the figure."""
+
+
+def cells(options: ExperimentOptions) -> list[Cell]:
+    """Return a cell for each choice, training set, number of markers and random base set."""
+    counts = QUICK_MARKERS if options.quick else MARKERS
+    choices = [("ours", 0), ("all", 0)] + [(base, seed) for base in ("three", "one") for seed in options.seeds(5, 1)]
+    return [
+        {
+            "training": training,
+            "test": test,
+            "markers": count,
+            "choice": choice,
+            "seed": seed,
+            "search": search_of(options),
+        }
+        for training in TRAININGS
+        for test in motions_tested(training)
+        for count in counts
+        for choice, seed in choices
+    ]
+
+
+def measure(*, training: str, test: str, markers: int, choice: str, seed: int, search: Search) -> Row:
+    """Return mean and largest error of the vertices, mm."""
+    quality = quality_of(training, markers)
+    if choice == "ours":
+        model = best_model(training, markers, search, seed)
+    else:
+        candidates = quality.candidates
+        generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
+        each = {"all": len(candidates), "three": 3, "one": 1}[choice]
+        base = random_base(candidates, each, generator)
+        chosen = wheatland_layout(candidates, base, training_postures(training), markers)
+        model = candidates.layout(chosen, choice).on(candidates.hand)
+    return reconstruction_error(model, quality.synergies, test, METHOD)._asdict()
+
+
+def tabulate(rows: Sequence[Row]) -> list[Row]:
+    names = ("training", "test", "markers", "choice", "seed", "error_mm", "largest_mm")
+    return [{name: row[name] for name in names} for row in rows]
+
+
+def curve(rows: Sequence[Row], choice: str) -> dict[int, float]:
+    """Return the error, mm, by number of markers; the mean over motions and base sets."""
+    chosen = [row for row in rows if row["choice"] == choice]
+    counts = sorted({row["markers"] for row in chosen})
+    return {n: float(np.mean([row["error_mm"] for row in chosen if row["markers"] == n])) for n in counts}
+
+
+def compare(rows: Sequence[Row]) -> list[PaperComparison]:
+    ours = curve(rows, "ours")
+    found = []
+    for base, words in BASES.items():
+        theirs = curve(rows, base)
+        lower = 100 * float(np.mean([ours[n] < theirs[n] for n in ours]))
+        found.append(PaperComparison(f"ours below Wheatland, {words}", "better layouts", lower, "% of the counts"))
+        if 6 in ours:
+            found.append(PaperComparison(f"Wheatland, {words}, 6 markers", "not given", theirs[6], "mm"))
+    if 6 in ours:
+        found.append(PaperComparison("ours, 6 markers", "not given", ours[6], "mm"))
+    return found
+
+
+def draw(axes: Axes, rows: Sequence[Row]) -> None:
+    names = {"ours": "ours"} | {base: f"Wheatland et al., {words}" for base, words in BASES.items()}
+    for choice, label in names.items():
+        errors = curve(rows, choice)
+        axes.plot(list(errors), list(errors.values()), marker="o", label=label)
+    axes.set(xlabel="markers", ylabel="error of the vertices (mm)", yscale="log")
+    axes.legend()
+
+
+EXPERIMENT = Experiment(
+    name="schroeder2015-10",
+    title="Our layouts, against the choice by principal components of trajectories",
+    source=f"{SCHROEDER_2015}, Fig. 10",
+    cells=cells,
+    measure=measure,
+    tabulate=tabulate,
+    compare=compare,
+    draw=draw,
+)
