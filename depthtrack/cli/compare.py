@@ -70,7 +70,7 @@ class Command:
         files: list[str | None] = [str(file.resolve()) for file in self.keypoints]
         files = files or [None] * len(self.sequences)
         sources = (
-            replace(self.recordings.source(each), keypoints=file)
+            replace(self.recordings.checked(self.recordings.source(each)), keypoints=file)
             for each, file in zip(self.sequences, files, strict=True)
         )
         return Comparison(

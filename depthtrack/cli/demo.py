@@ -65,6 +65,7 @@ class Command:
     def _own(self, path: Path) -> "Source":
         """Return the user's recording with its measured hand, or with the hand of --hand."""
         source, file = self.recordings.source(path), self.out / f"hand-of-{path.resolve().name}.json"
+        source = self.recordings.checked(source)
         if source.hand is not None or not self.calibrate:
             return self.recordings.with_side(source)
         if not file.exists() and not _measure_hand(source, file):

@@ -61,7 +61,7 @@ class Command:
         for name, value in (("frames", self.frames), ("threads", self.threads)):
             if value is not None and value < 1:
                 raise InputError(f"--{name} must be at least 1, found {value}")
-        sequence, keypoints = self.recording.open(), read_keypoints(self.file.keypoints)
+        sequence, keypoints = self.recording.open(registered=True), read_keypoints(self.file.keypoints)
         configuration = configure(
             self.recording.path,
             sequence,

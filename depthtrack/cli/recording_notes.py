@@ -1,7 +1,7 @@
 """Notes about a recording, on standard error."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -21,3 +21,18 @@ def notes_of(sequence: "Sequence") -> list[str]:
     if not sequence.has_depth:
         return list(sequence.notes)
     return [*sequence.notes, *depth_notes(sampled_histogram(sequence), sequence.camera)]
+
+
+def with_registered_colour(sequence: "Sequence", open_depth: "Callable[[], Sequence]") -> "Sequence":
+    """Return a recording, without colour that is not registered to the depth.
+
+    open_depth: opens the recording without colour.
+    """
+    from depthtrack.recording.colour_registration import measure_shift
+
+    shift = measure_shift(sequence) if sequence.has_colour and sequence.has_depth else None
+    if shift is None or not shift.is_sure:
+        return sequence
+    depth_only = open_depth()
+    depth_only.notes.append(f"{shift.note}: depth alone")
+    return depth_only

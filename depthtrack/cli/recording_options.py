@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from depthtrack.cli.reading_arguments import ReadingArguments
-from depthtrack.cli.recording_notes import notes_of, print_notes
+from depthtrack.cli.recording_notes import notes_of, print_notes, with_registered_colour
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
 
@@ -46,9 +46,10 @@ class RecordingOptions:
     """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
-    def open(self, camera: "Camera | None" = None, with_notes: bool = True) -> "Sequence":
+    def open(self, camera: "Camera | None" = None, with_notes: bool = True, registered: bool = False) -> "Sequence":
         """Return the recording with the camera of the options, else with `camera`, else its own.
 
+        registered: whether colour that is not registered to the depth is left out.
         with_notes: whether to print what the user must know about the recording, on standard error.
 
         Raises:
@@ -61,6 +62,10 @@ class RecordingOptions:
         if chosen is not None and not reading.distortion:
             reading = replace(reading, distortion=chosen.distortion)
         sequence = open_sequence(self.path, given, self.on_damage, reading)
+        if registered:
+            sequence = with_registered_colour(
+                sequence, lambda: open_sequence(self.path, given, self.on_damage, replace(reading, depth_only=True))
+            )
         sequence.notes[:0] = () if chosen is None else chosen.notes
         if with_notes:
             print_notes(notes_of(sequence))

@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.reading_arguments import ReadingArguments
-from depthtrack.cli.recording_notes import notes_of, print_notes
+from depthtrack.cli.recording_notes import notes_of, print_notes, with_registered_colour
 from depthtrack.cli.recording_options import PresetName
 from depthtrack.cli.stated_default import stated_default
 from depthtrack.errors import InputError
@@ -60,17 +60,28 @@ class SourceOptions:
             reading=reading if reading.distortion else replace(reading, distortion=distortion),
         )
 
+    def checked(self, source: "Source") -> "Source":
+        """Return a source without colour that is not registered, and print its notes.
+
+        Raises:
+            InputError: if the recording is unusable.
+        """
+        from depthtrack.recording.registry import reading_of
+
+        depth_only = replace(source, reading=replace(source.reading, depth_only=True))
+        sequence = with_registered_colour(source.open(), depth_only.open)
+        print_notes(notes_of(sequence))
+        return replace(source, reading=reading_of(sequence))
+
     def with_side(self, source: "Source") -> "Source":
         """Return a source with the side of its hand, which is found if nothing states it.
 
         Raises:
             InputError: if the recording is unusable.
         """
-        sequence = source.open()
-        print_notes(notes_of(sequence))
         if source.hand is not None or source.side is not None:
             return source
-        choice = self.hands.choose_side(sequence, source.segmentation, frames=self.frames)
+        choice = self.hands.choose_side(source.open(), source.segmentation, frames=self.frames)
         return source if choice is None else replace(source, side=choice.side)
 
     def _camera(self) -> tuple[dict[str, Any] | None, tuple[float, ...]]:

@@ -94,7 +94,7 @@ class TrackCommand:
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
         repeated = None if self.config is None else _load(self.config).camera_model()
-        return self.recording.open(repeated)
+        return self.recording.open(repeated, registered=True)
 
     @cached_property
     def _stored(self) -> "HandShape | None":

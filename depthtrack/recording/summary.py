@@ -9,6 +9,7 @@ import numpy as np
 
 from depthtrack.errors import DamagedFrameError
 from depthtrack.geometry.camera import Camera
+from depthtrack.recording.colour_registration import measure_shift
 from depthtrack.recording.depth_checks import STORED_VALUES, add_stored, depth_notes
 from depthtrack.recording.sequence import DamagedFrame, Frame, OnDamage, Sequence
 from depthtrack.types import Array, Index
@@ -105,8 +106,14 @@ def summarise(
         description=dict(sequence.description),
         damaged=sorted([*sequence.damaged, *counts.damaged], key=lambda frame: frame.index),
         damaged_colour=sequence.damaged_colour,
-        notes=[*sequence.notes, *counts.depth_notes()],
+        notes=[*sequence.notes, *counts.depth_notes(), *_shift_note(sequence)],
     )
+
+
+def _shift_note(sequence: Sequence) -> list[str]:
+    """Return a sentence if the colour is not registered to the depth."""
+    shift = measure_shift(sequence) if sequence.has_colour and sequence.has_depth else None
+    return [shift.note] if shift is not None and shift.is_sure else []
 
 
 def field_of_view(camera: Camera) -> tuple[float, float]:
