@@ -3,7 +3,7 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	command -v $$p >/dev/null 2>&1 && $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 
-.PHONY: demo test quick lint kernels docs clean
+.PHONY: demo test quick lint kernels robustness docs clean
 
 # Workers of pytest; 0 runs all tests in one process.
 WORKERS ?= 2
@@ -29,6 +29,10 @@ lint: .venv/.ready-test
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+# The long forms of the campaigns in tests/robustness: hours, at low priority.
+robustness: .venv/.ready-test
+	nice -n 19 $(BIN)/python -m tests.robustness.failing_writes
 
 # Broken links and references between pages are errors. With --quiet, mkdocs would not count them.
 docs: .venv/.ready-docs

@@ -6,6 +6,7 @@ import shutil
 from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TextIO
@@ -139,14 +140,14 @@ class SequenceWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
+        with ExitStack() as stack:
+            stack.callback(shutil.rmtree, self._work, ignore_errors=True)
+            # On a full disk, a table that is closed raises an error too.
+            for table in self._tables.values():
+                stack.callback(table.close)
+            stack.callback(self._pool.shutdown, cancel_futures=True)
             if kind is None:
                 self._finish()
-        finally:
-            self._pool.shutdown(cancel_futures=True)
-            for table in self._tables.values():
-                table.close()
-            shutil.rmtree(self._work, ignore_errors=True)
 
     def _check_target(self) -> None:
         check_replaceable(self._path, "depth.txt", "a sequence folder", self._overwrite)
