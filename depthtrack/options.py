@@ -7,22 +7,35 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar, get_type_hints
 
 from depthtrack.errors import InputError
+from depthtrack.ranges import SEEDS, Range, range_of
 from depthtrack.strict_data import exact_json_text, parse_json
 
 T = TypeVar("T")
 
 _MEANING, _UNIT, _SOURCE, _ADVANCED = "meaning", "unit", "source", "advanced"
+_LEAST, _MOST = "least", "most"
 
 
-def option(default: Any, meaning: str, *, unit: str = "", source: str = "", advanced: bool = False) -> Any:
+def option(
+    default: Any,
+    meaning: str,
+    *,
+    unit: str = "",
+    source: str = "",
+    advanced: bool = False,
+    least: float | None = None,
+    most: float | None = None,
+) -> Any:
     """Return a dataclass field with its documentation; a default dataclass is a nested group.
 
+    least, most: ends of the range of a number, or of each of several ones. `ranges.range_of` states the usual ones.
     advanced: whether `--help` omits the option, or all options of the group.
     """
-    metadata = {_MEANING: meaning, _UNIT: unit, _SOURCE: source, _ADVANCED: advanced}
+    metadata = {_MEANING: meaning, _UNIT: unit, _SOURCE: source, _ADVANCED: advanced, _LEAST: least, _MOST: most}
     if dataclasses.is_dataclass(default):
         return dataclasses.field(default_factory=lambda: default, metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -35,6 +48,7 @@ class Parameter:
     path: dotted names of its groups and its field.
     name: the last part of the path if it is unique among all options, or among those not `advanced`; else the path.
     kind: its type.
+    range: of a number; None of other types.
     """
 
     path: str
@@ -45,6 +59,7 @@ class Parameter:
     unit: str
     source: str
     advanced: bool
+    range: Range | None
 
 
 def parameters(configuration: Any) -> list[Parameter]:
@@ -71,7 +86,36 @@ def _leaves(group: Any, prefix: str, advanced: bool = False) -> Iterator[tuple[s
         else:
             documentation: dict[str, Any] = {key: field.metadata.get(key, "") for key in (_MEANING, _UNIT, _SOURCE)}
             documentation[_ADVANCED] = advanced or bool(field.metadata.get(_ADVANCED))
+            documentation["range"] = _range(field, kinds[field.name])
             yield path, kinds[field.name], value, documentation
+
+
+def check_ranges(configuration: Any) -> None:
+    """Check that the numbers of a configuration and of the groups in it are within their ranges.
+
+    Raises:
+        InputError: if one is not.
+    """
+    kind: Any = type(configuration)
+    for name, found in _ranges(kind).items():
+        value = getattr(configuration, name)
+        if found is not None:
+            found.check(value, name)
+        for part in value if isinstance(value, tuple) else (value,):
+            if dataclasses.is_dataclass(part):
+                check_ranges(part)
+
+
+@cache
+def _ranges(kind: Any) -> dict[str, Range | None]:
+    """Return the ranges of the options of a group by their names, None of options without one."""
+    kinds = get_type_hints(kind)
+    return {field.name: _range(field, kinds[field.name]) for field in dataclasses.fields(kind) if field.metadata}
+
+
+def _range(field: dataclasses.Field[Any], kind: Any) -> Range | None:
+    documentation = field.metadata
+    return range_of(kind, documentation.get(_UNIT, ""), documentation.get(_LEAST), documentation.get(_MOST))
 
 
 def with_options(configuration: T, values: Mapping[str, Any]) -> T:
@@ -121,16 +165,26 @@ def from_data(kind: type[T], data: Any, where: str) -> T:
     Raises:
         InputError: if an option is unknown, or a value has the wrong type or range; it names `where`.
     """
-    from pydantic import ConfigDict, TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
-    strict = ConfigDict(extra="forbid", strict=False)
-    _forbid_extras(kind, strict)
+    typed: Any = kind
     try:
-        return TypeAdapter(kind).validate_python(data)
+        configuration: T = _adapter(typed).validate_python(data)
+        check_ranges(configuration)
+        return configuration
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"])) or "it"
         raise InputError(f"{where}: {place[:80]}: {first['msg']}, found {first.get('input')!r:.60}") from error
+
+
+@cache
+def _adapter(kind: Any) -> Any:
+    """Return what checks the types of plain data; making it takes longer than using it."""
+    from pydantic import ConfigDict, TypeAdapter
+
+    _forbid_extras(kind, ConfigDict(extra="forbid", strict=False))
+    return TypeAdapter(kind)
 
 
 def _forbid_extras(kind: Any, configuration: Any) -> None:
@@ -150,5 +204,4 @@ def check_seed(seed: int) -> None:
     Raises:
         InputError: if it is not within 0 to 2^63 - 1.
     """
-    if not 0 <= seed < 2**63:
-        raise InputError(f"the seed must be a whole number from 0 to 2^63 - 1, found {seed}")
+    SEEDS.check(seed, "the seed")

@@ -72,6 +72,21 @@ def check_folder(path: Path, name: str = "-o", recording: bool = False) -> None:
         raise InputError(f"{name} must not be the folder of a recording, found {path}: choose another name")
 
 
+def check_input(path: Path) -> None:
+    """Check that a path can be followed; whether something is there is left to the reader.
+
+    Raises:
+        InputError: it is a loop of links, or no file can have its name.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot read {path}: {reason}: name a file or folder that exists") from error
+
+
 def check_distinct(outputs: dict[str, Path], inputs: list[Path]) -> None:
     """Check that outputs are neither inputs nor each other.
 

@@ -12,7 +12,7 @@ PACKAGE = "depthtrack"
 
 LAYERS = (
     ("closing", "errors", "number_text", "types"),
-    ("strict_data",),
+    ("ranges", "strict_data"),
     ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine",),
     ("compilation",),

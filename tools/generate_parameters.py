@@ -59,11 +59,12 @@ def page() -> str:
 
 def _table(options: list[Parameter], flag: bool, prefix: str = "") -> str:
     """Return a table with one row per option; names as on the command line if `flag`."""
-    rows = [("option", "unit", "default", "meaning", "source"), ("---",) * 5]
+    rows = [("option", "unit", "default", "range", "meaning", "source"), ("---",) * 6]
     for each in options:
         name = f"`--{prefix}{each.name.replace('_', '-')}`" if flag else f"`{each.path}`"
         star = r" \*" if flag and each.advanced else ""
-        rows.append((name + star, each.unit, _text(each.default), each.meaning, each.source))
+        limits = "" if each.range is None else str(each.range).removeprefix("from ")
+        rows.append((name + star, each.unit, _text(each.default), limits, each.meaning, each.source))
     return "".join("| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |\n" for row in rows)
 
 

@@ -1,6 +1,7 @@
-"""Checks of all arguments of a command before its work: files and folders to write."""
+"""Checks of all arguments of a command before its work: ranges, inputs and outputs."""
 
 import dataclasses
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,8 @@ from typing import Any, Literal, get_type_hints
 
 import tyro
 
-from depthtrack.outputs import check_distinct, check_file, check_folder
+from depthtrack.cli.stated_default import ShownDefault
+from depthtrack.outputs import check_distinct, check_file, check_folder, check_input
 
 
 @dataclass(frozen=True)
@@ -46,18 +48,30 @@ def check_arguments(command: Any) -> None:
     """Check the arguments of a parsed command.
 
     Raises:
-        InputError: an output cannot be written, or is an input or another output.
+        InputError: a number is out of its range. An input is a loop of links, or no file can have its name. An output
+            cannot be written, or is an input or another output.
     """
     outputs, inputs = {}, []
     for argument in _arguments(command):
+        for mark in argument.marks:
+            shown = getattr(mark, "help_behavior_hint", None)
+            if isinstance(shown, ShownDefault) and shown.range is not None:
+                shown.range.check(argument.value, argument.name)
         marks = [each for each in argument.marks if isinstance(each, Output)]
         if marks and isinstance(argument.value, Path):
             marks[0].check(argument.value, argument.name)
             outputs[argument.name] = argument.value
         else:
             values = argument.value if isinstance(argument.value, tuple) else (argument.value,)
-            inputs += [value for value in values if isinstance(value, Path)]
+            inputs += [Path(value) for value in values if isinstance(value, Path) or _is_link(value)]
+    for each in inputs:
+        check_input(each)
     check_distinct(outputs, inputs)
+
+
+def _is_link(value: Any) -> bool:
+    """Return whether a text, such as the name of a hand or its file, is a link."""
+    return isinstance(value, str) and os.path.islink(value)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.progress import bar
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import DepthtrackError
 from depthtrack.files import write_atomic
+from depthtrack.ranges import MOST_SEED
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Benchmark:
-    seconds: float = 1.0
+    seconds: Annotated[float, number(0.01, 3600)] = 1.0
     """Duration of the measurement for each row. The table gives the best and the median call."""
     json: bool = False
     """Print JSON instead of a table."""
@@ -120,9 +121,9 @@ class Starts:
 
     layouts: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LAYOUT ...")] = ("13", "16", "19", "26")
     """Layouts of the synthetic frames."""
-    trials: int = 36
+    trials: Annotated[int, number(1, 10**6)] = 36
     """Frames a row: of synthetic motions, or spread over the capture."""
-    seed: int = 1000
+    seed: Annotated[int, number(0, MOST_SEED)] = 1000
     """Seed of the first frame."""
     capture: Annotated[Path | None, stated_default(metavar="CAPTURE")] = None
     """Labelled capture to use without its labels, in place of synthetic frames."""

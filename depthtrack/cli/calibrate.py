@@ -9,9 +9,10 @@ import tyro
 from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE
 from depthtrack.cli.measuring import calibrate_rig_on_sequence, calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.files import write_atomic
 from depthtrack.outputs import check_distinct, check_file
+from depthtrack.ranges import MOST_SEED
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
@@ -43,9 +44,9 @@ class Command:
     """Picture of the hand before and after calibration to write (default: beside the hand file)."""
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
-    seed: int = 0
+    seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the random numbers. The same seed gives the same hand."""
-    threads: Annotated[int | None, stated_default(metavar="N")] = None
+    threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Number of threads (default: one per core). The result does not depend on it."""
     json: bool = False
     """Print JSON instead of text."""

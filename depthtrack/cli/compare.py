@@ -8,8 +8,9 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.source_options import SourceOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
+from depthtrack.ranges import MOST_SEED
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.compare.comparison import Comparison
@@ -31,12 +32,12 @@ class Command:
     trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="hybrid,pso,ik")] = ("hybrid,pso,ik",)
     """Trackers, each with options after a colon, as in  hybrid,ik:subsample=2 ; or a .toml file with a
     table per tracker: [label], tracker = "ik", and its options."""
-    repeats: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    repeats: Annotated[int, number(1, 1000, metavar="N")] = 1
     """Runs per tracker and recording, each with another seed."""
-    equal_time: Annotated[float | None, stated_default(metavar="MS")] = None
+    equal_time: Annotated[float | None, number(0.01, 10**6, metavar="MS")] = None
     """CPU milliseconds per median frame for every tracker. The work of each is chosen by timing some frames. A search
     after a loss takes extra time. The report warns if even the least work takes longer."""
-    seed: int = 0
+    seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the first run."""
 
     keypoints: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.csv ...")] = ()
@@ -44,7 +45,7 @@ class Command:
 
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
 
-    jobs: Annotated[int | None, stated_default(metavar="N")] = None
+    jobs: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, stated_default(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers track instead (extra: sweep). Each worker
@@ -56,8 +57,8 @@ class Command:
         from depthtrack.cli.comparing import compare_and_report
         from depthtrack.evaluation.sweep.workers import chosen_workers
 
-        comparison = self._comparison()
-        compare_and_report(comparison, self.out, chosen_workers(self.jobs, self.scheduler), as_json=self.json)
+        workers = chosen_workers(self.jobs, self.scheduler)
+        compare_and_report(self._comparison(), self.out, workers, as_json=self.json)
 
     def _comparison(self) -> "Comparison":
         from depthtrack.evaluation.compare.comparison import Comparison

@@ -58,8 +58,10 @@ def _annotation(parameter: Parameter, prefix: str, hidden: bool) -> Any:
     )
     path = parameter.path.replace("_", "-")
     aliases = (f"--{prefix}{path}",) if "." in path and flag != path else ()
-    argument = stated_default(name=prefix + flag, aliases=aliases, help=f"{parameter.meaning}{unit}.{source}")
-    kind = parameter.kind if _is_plain(parameter.kind) else str
+    plain = _is_plain(parameter.kind)
+    text = f"{parameter.meaning}{unit}.{source}"
+    argument = stated_default(parameter.range if plain else None, name=prefix + flag, aliases=aliases, help=text)
+    kind = parameter.kind if plain else str
     if parameter.advanced and hidden:
         return Annotated[kind, tyro.conf.Suppress, argument]
     return Annotated[kind, argument]

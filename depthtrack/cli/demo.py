@@ -10,7 +10,7 @@ from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.cli.progress import bar
 from depthtrack.cli.source_options import SourceOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 from depthtrack.files import write_atomic
 
@@ -35,7 +35,7 @@ class Command:
     out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="DIR")] = Path("depthtrack-demo")
     """Folder to write to. The same folder continues an interrupted demo."""
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)
-    jobs: Annotated[int | None, stated_default(metavar="N")] = None
+    jobs: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     calibrate: bool = True
     """Measure the hand of your recording first if --hand is absent. This takes one to two minutes on two cores."""

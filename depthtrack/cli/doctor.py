@@ -1,10 +1,11 @@
 """`depthtrack doctor`: check the renderers of this machine."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from depthtrack.cli.progress import bar
-from depthtrack.errors import DepthtrackError, InputError
+from depthtrack.cli.stated_default import number
+from depthtrack.errors import DepthtrackError
 from depthtrack.text_table import aligned
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ class Command:
     drivers may crash or hang. EGL and OSMesa are optional. The default renderer needs neither.
     """
 
-    time_limit: float = 60.0
+    time_limit: Annotated[float, number(0.1, 3600)] = 60.0
     """Seconds that a renderer may take to start, compile and return."""
     json: bool = False
     """Print JSON, in SI units, instead of text."""
@@ -30,8 +31,6 @@ class Command:
         from depthtrack.cli.broken_imports import advice, broken_imports
         from depthtrack.strict_data import json_text
 
-        if not 0 < self.time_limit <= 3600:
-            raise InputError(f"--time-limit must lie between 0 and 3600 seconds, found {self.time_limit:g}")
         if broken := broken_imports():
             raise DepthtrackError("; ".join(advice(module, reason) for module, reason in broken.items()))
 

@@ -7,8 +7,7 @@ import tyro
 
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.stated_default import stated_default
-from depthtrack.errors import InputError
+from depthtrack.cli.stated_default import number
 
 if TYPE_CHECKING:
     from depthtrack.recording.summary import RecordingSummary
@@ -19,7 +18,7 @@ class Command:
     """Summarise a recording: frames, rate, camera, depth, ground truth, damage."""
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    sample: Annotated[int | None, stated_default(metavar="FRAMES")] = None
+    sample: Annotated[int | None, number(1, 10**7, metavar="FRAMES")] = None
     """Number of evenly spaced frames to read (default: all)."""
     json: bool = False
     """Print JSON, in SI units and radians, instead of text."""
@@ -32,8 +31,6 @@ class Command:
         from depthtrack.recording.summary import summarise
         from depthtrack.strict_data import json_text
 
-        if self.sample is not None and self.sample < 1:
-            raise InputError(f"--sample must be at least 1 frame, found {self.sample}")
         sequence = self.recording.open(with_notes=False)
         count = min(len(sequence), self.sample or len(sequence))
         indices = np.linspace(0, len(sequence) - 1, count).round().astype(int).tolist()

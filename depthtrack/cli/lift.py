@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,11 +44,11 @@ class Command:
     side of most rows."""
     refine: bool = True
     """Fit the lifted poses to the surface, and keep those with a lower energy."""
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """Lift only the first N frames."""
     resume: bool = False
     """Continue the run that the folder holds."""
-    threads: Annotated[int | None, stated_default(metavar="N")] = None
+    threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Threads of the renderer (default: one per core). Poses do not depend on it."""
 
     def run(self) -> None:
@@ -58,9 +58,6 @@ class Command:
         from depthtrack.tracking.configuration import LiftConfig
         from depthtrack.tracking.run import TrackingRun, configure
 
-        for name, value in (("frames", self.frames), ("threads", self.threads)):
-            if value is not None and value < 1:
-                raise InputError(f"--{name} must be at least 1, found {value}")
         sequence, keypoints = self.recording.open(registered=True), read_keypoints(self.file.keypoints)
         configuration = configure(
             self.recording.path,

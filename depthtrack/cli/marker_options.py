@@ -4,9 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,25 +24,25 @@ class MarkerOptions:
     """Add the other hand, which moves through the motion backward."""
     touching: bool = False
     """Let two hands approach until they touch, every 2.5 seconds."""
-    rigid_bodies: int = 0
+    rigid_bodies: Annotated[int, number(0, 100)] = 0
     """Number of rigid bodies with markers below the hands."""
-    rigid_markers: int = 4
+    rigid_markers: Annotated[int, number(3, 100)] = 4
     """Number of markers on each."""
-    start: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 0.0
+    start: Annotated[float, number(0, 10**6, metavar="SECONDS")] = 0.0
     """Time in the motion of the first frame."""
-    marker_noise: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.5
+    marker_noise: Annotated[float, number(0, 100, metavar="MM")] = 0.5
     """Standard deviation of the markers along each axis."""
-    dropouts: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 5.0
+    dropouts: Annotated[float, number(0, 100, metavar="PERCENT")] = 5.0
     """Share of the samples that are missing, in bursts."""
-    bursts: Annotated[tuple[float, float], tyro.conf.arg(metavar="SECONDS SECONDS")] = (0.02, 0.25)
+    bursts: Annotated[tuple[float, float], number(0, 3600, metavar="SECONDS SECONDS")] = (0.02, 0.25)
     """Shortest and longest burst."""
-    ghosts: int = 2
+    ghosts: Annotated[int, number(0, 1000)] = 2
     """Number of ghosts in each frame: points near a marker for a short time."""
     incomplete_start: bool = False
     """Let markers be missing, and ghosts appear, in the first frame too."""
-    size_spread: float = 1.0
+    size_spread: Annotated[float, number(0, 10)] = 1.0
     """Spread of the subject's hand sizes about those of the models, as a share of that among people."""
-    placement: Annotated[float, tyro.conf.arg(metavar="MM")] = 2.0
+    placement: Annotated[float, number(0, 100, metavar="MM")] = 2.0
     """Standard deviation along each axis of the subject's markers about the layout."""
     capture: Literal["csv", "c3d", "trc"] = "csv"
     """Format of the capture."""

@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_notes import notes_of, print_notes, with_registered_colour
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # Written out, because reading them from depthtrack.geometry.camera would make `--help` wait for numpy.
 PresetName = Literal["kinect1", "kinect2", "realsense", "tum"]
-Pixels = Annotated[float | None, stated_default(metavar="PIXELS")]
+Pixels = Annotated[float | None, number(-(10**6), 10**6, metavar="PIXELS")]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RecordingOptions:
     """Column of the principal point (default: the centre of the image)."""
     cy: Pixels = None
     """Row of the principal point (default: the centre of the image)."""
-    depth_scale: Annotated[float | None, stated_default(metavar="METRES")] = None
+    depth_scale: Annotated[float | None, number(1e-9, 10, metavar="METRES")] = None
     """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""

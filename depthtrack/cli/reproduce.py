@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.progress import bar
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,11 +37,11 @@ class Command:
     """Trackers of this program, or those of the papers."""
     renderer: Literal["raster", "egl", "osmesa"] = "raster"
     """Renderer of the swarm's hypotheses."""
-    repetitions: Annotated[int | None, stated_default(metavar="N")] = None
+    repetitions: Annotated[int | None, number(1, 10000, metavar="N")] = None
     """Measurements of the swarm per cell, each with another seed (default: as many as in the paper)."""
-    resolution: Annotated[int | None, stated_default(metavar="PIXELS")] = None
+    resolution: Annotated[int | None, number(1, 10000, metavar="PIXELS")] = None
     """Longest side of the rendered hypotheses of the swarm (default: the resolution of the sensor)."""
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """Use only the first N frames of the motion."""
     synergies: Annotated[str | None, stated_default(metavar="NAME|PATH")] = None
     """Synergies in place of those of each figure: the name of a set, as leap, or of a motion, as signs; a .json from
@@ -50,7 +50,7 @@ class Command:
     """Rigged meshes for `crossmodel` (default: hands drawn from the prior of sizes)."""
     split: Literal["tuning", "report"] = "report"
     """Seeds of `crossmodel`: those that thresholds are tuned on, or those of reported figures."""
-    jobs: Annotated[int | None, stated_default(metavar="N")] = None
+    jobs: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Processes on this machine (default: one per core)."""
     scheduler: Annotated[str | None, stated_default(metavar="ADDRESS")] = None
     """Address of a Dask scheduler, as tcp://127.0.0.1:8786, whose workers measure instead (extra: sweep)."""

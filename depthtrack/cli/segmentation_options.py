@@ -9,8 +9,7 @@ from typing import Annotated, Any
 import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
-from depthtrack.cli.stated_default import stated_default
-from depthtrack.errors import InputError
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.segmentation.options import SegmentationOptions
 
 PREFIX = "segmentation."
@@ -22,21 +21,15 @@ class SegmentationShortcuts:
 
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
-    wrist_margin: Annotated[float | None, stated_default(metavar="MM")] = None
+    wrist_margin: Annotated[float | None, number(-50, 200, metavar="MM")] = None
     """Length of the forearm to keep beyond the wrist (default: 0), for comparison with silhouettes that include it."""
 
     def applied(self, options: SegmentationOptions) -> SegmentationOptions:
-        """Return the options with those that were given.
-
-        Raises:
-            InputError: if the margin is out of range.
-        """
+        """Return the options with those that were given."""
         changed: dict[str, Any] = {}
         if self.skin_model is not None:
             changed["skin_model"] = str(self.skin_model)
         if self.wrist_margin is not None:
-            if not -50 <= self.wrist_margin <= 200:
-                raise InputError(f"--wrist-margin must be from -50 to 200 mm, found {self.wrist_margin:g}")
             changed["wrist_margin"] = self.wrist_margin / 1000
         return dataclasses.replace(options, **changed)
 

@@ -10,7 +10,7 @@ from depthtrack.cli.hand_options import HandOptions
 from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_notes import notes_of, print_notes, with_registered_colour
 from depthtrack.cli.recording_options import PresetName
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class SourceOptions:
     """Frames to track, and the hand, skin colours and camera of all recordings."""
 
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """Track only the first N frames of each recording."""
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = field(default_factory=HandOptions)
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
@@ -38,13 +38,11 @@ class SourceOptions:
         """Return the recording at `path` with these options.
 
         Raises:
-            InputError: if the number of frames is below 1, or two cameras or an unreadable one are given.
+            InputError: if two cameras or an unreadable one are given.
         """
         from depthtrack.evaluation.compare.running import Source
         from depthtrack.recording.hand_choice import AVERAGE, TRUTH
 
-        if self.frames is not None and self.frames < 1:
-            raise InputError(f"--frames must be at least 1, found {self.frames}")
         hand = None if self.hands.hand == AVERAGE else self.hands.hand
         skin_model = self.skin_model
         camera, distortion = self._camera()

@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE
 from depthtrack.cli.progress import bar
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Fit:
     """File to write."""
     tracks: Annotated[tuple[str, ...], stated_default(metavar="NAME ...")] = ()
     """Names of the tracks to use, for files with named tracks (default: all)."""
-    components: Annotated[int | None, stated_default(metavar="COUNT")] = None
+    components: Annotated[int | None, number(1, 20, metavar="COUNT")] = None
     """Number of first components to keep (default: all 20)."""
     within_limits: bool = False
     """Clip angles to the joint limits before the fit."""
@@ -79,7 +79,7 @@ class Info:
     """File from `fit`, or the name of an included set: leap, leap-grasps."""
     picture: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png")] = None
     """Picture to write: the hand from -2 to +2 standard deviations along each of the first components."""
-    components: Annotated[int, tyro.conf.arg(metavar="COUNT")] = 4
+    components: Annotated[int, number(1, 20, metavar="COUNT")] = 4
     """Number of components in the picture."""
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Hand of the picture (default: the average adult's)."""

@@ -9,8 +9,9 @@ import tyro
 from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.marker_options import MarkerOptions
 from depthtrack.cli.progress import bar
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
+from depthtrack.ranges import MOST_SEED
 
 if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
@@ -47,46 +48,46 @@ class Command:
 
     held_object: Literal["none", "sphere", "box", "cylinder"] = "none"
     """Object in the palm, of another colour than skin. It moves with the palm, and the fingers stop at it."""
-    held_size: Annotated[float, tyro.conf.arg(metavar="MM")] = 60.0
+    held_size: Annotated[float, number(1, 1000, metavar="MM")] = 60.0
     """Size of that object: the diameter of a sphere, the longest side of a box, 1.4 diameters of a cylinder."""
-    distance: Annotated[float | None, stated_default(metavar="METRES")] = None
+    distance: Annotated[float | None, number(0.05, 100, metavar="METRES")] = None
     """Camera-to-hand distance (default: 0.5, 0.65 for kinect2, or farther to keep the hand in the sensor's range)."""
-    viewpoint: Annotated[int, tyro.conf.arg(metavar="0..7")] = 0
+    viewpoint: Annotated[int, number(0, 7, metavar="0..7")] = 0
     """Camera on the hemisphere around the hand: 0 is frontal; 1 to 4 are 40 degrees to the right, above, left, below; 5
     to 7 are 75 degrees to the right, above, left."""
-    frames: Annotated[int | None, stated_default(metavar="COUNT")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="COUNT")] = None
     """Number of frames (default: the whole motion; of the random one 360, or 5 s of markers)."""
-    fps: Annotated[float | None, stated_default(metavar="HZ")] = None
+    fps: Annotated[float | None, number(0.01, 10**4, metavar="HZ")] = None
     """Frames per second (default: 30, or 200 of markers)."""
 
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of the hand (default: the average adult's)."""
-    scale: float = 1.0
+    scale: Annotated[float, number(0.1, 10)] = 1.0
     """Factor on all sizes of the hand."""
     side: Annotated[Literal["right", "left"] | None, stated_default(metavar="{right,left}")] = None
     """Side of the hand (default: that of --hand or --model, or right), or of the hand to read from a rigged mesh."""
 
-    depth_noise: Annotated[float, tyro.conf.arg(metavar="MM")] = 0.0
+    depth_noise: Annotated[float, number(0, 10**4, metavar="MM")] = 0.0
     """Standard deviation of Gaussian noise to add to the depth of the sensor."""
-    skin_flips: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 0.0
+    skin_flips: Annotated[float, number(0, 100, metavar="PERCENT")] = 0.0
     """Share of the pixels whose skin label is inverted."""
-    seed: int = 0
+    seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the person, room, noise and random motion."""
 
     keypoints: bool = False
     """Write 2D keypoints too, as a detector finds them: `keypoints.csv`, for `track --keypoints`."""
-    keypoint_noise: Annotated[float, tyro.conf.arg(metavar="PIXELS")] = 3.0
+    keypoint_noise: Annotated[float, number(0, 10**4, metavar="PIXELS")] = 3.0
     """Standard deviation of the keypoints."""
-    missing_keypoints: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 10.0
+    missing_keypoints: Annotated[float, number(0, 100, metavar="PERCENT")] = 10.0
     """Share of the keypoints that are unknown."""
-    swapped_fingers: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 2.0
+    swapped_fingers: Annotated[float, number(0, 100, metavar="PERCENT")] = 2.0
     """Share of the frames in which the keypoints of two neighbouring fingers are exchanged."""
 
     marker_options: tyro.conf.OmitArgPrefixes[MarkerOptions] = field(default_factory=MarkerOptions)
 
     overwrite: bool = False
     """Replace the recording in OUT."""
-    threads: int = 2
+    threads: Annotated[int, number(1, 1024)] = 2
     """Number of threads. The result does not depend on it."""
 
     def run(self) -> None:
@@ -95,8 +96,6 @@ class Command:
             return
         if self.out is None:
             raise InputError(f"expected a folder to write to: use  depthtrack synth {self.motion} OUT")
-        if self.threads < 1:
-            raise InputError(f"--threads must be at least 1, found {self.threads}")
         if self.marker_options.is_unused:
             raise InputError("options of markers need a layout: give --markers, such as --markers 26")
         if self.marker_options.markers is not None:

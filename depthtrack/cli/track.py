@@ -15,9 +15,8 @@ from depthtrack.cli.hand_options import HandOptions, side_text
 from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.cli.tracker_options import requested_run, requested_tracker
-from depthtrack.errors import InputError
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 
@@ -47,13 +46,13 @@ class TrackCommand:
     hands: tyro.conf.OmitArgPrefixes[HandOptions] = dataclasses.field(default_factory=HandOptions)
     start: Literal["auto", "truth"] = "auto"
     """Start with a search, or from the recording's true pose of its first frame."""
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """Track only the first N frames."""
     keypoints: Annotated[Path | None, stated_default(metavar="FILE.csv")] = None
     """2D keypoints of the hand from another detector (docs/keypoints.md)."""
     resume: bool = False
     """Continue the run that the folder holds."""
-    threads: Annotated[int | None, stated_default(metavar="N")] = None
+    threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Threads of the renderer (default: one per core). Poses do not depend on it."""
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts
@@ -74,10 +73,6 @@ class TrackCommand:
         from depthtrack.machine import usable_cores
         from depthtrack.tracking.run import TrackingRun
 
-        if self.frames is not None and self.frames < 1:
-            raise InputError(f"--frames must be at least 1, found {self.frames}")
-        if self.threads is not None and self.threads < 1:
-            raise InputError(f"--threads must be at least 1, found {self.threads}")
         tracker = self.tracker_config  # checked before the recording is opened
         sequence = self._open()
         configuration = self._configuration(sequence, tracker)

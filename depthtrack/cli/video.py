@@ -8,7 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import VIDEO
 from depthtrack.cli.progress import bar
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 
@@ -26,9 +26,9 @@ class Command:
     """Video to write."""
     sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None
     """Recording of the run, if it was moved."""
-    height: Annotated[int, tyro.conf.arg(metavar="PIXELS")] = 360
+    height: Annotated[int, number(48, 1080, metavar="PIXELS")] = 360
     """Height of each of the four views."""
-    speed: float = 1.0
+    speed: Annotated[float, number(0.01, 100)] = 1.0
     """Factor on the playback speed."""
     codec: Literal["quick", "web"] = "quick"
     """Video encoding: "quick" for video players; "web" also for browsers, but it takes much longer."""
@@ -41,10 +41,6 @@ class Command:
         from depthtrack.viewing.run_video import write_run_video
         from depthtrack.viewing.video import WEB_CODECS
 
-        if not 48 <= self.height <= 1080:
-            raise InputError(f"--height must be from 48 to 1080 pixels, found {self.height}")
-        if not 0.01 <= self.speed <= 100:
-            raise InputError(f"--speed must be from 0.01 to 100, found {self.speed}")
         codecs = WEB_CODECS if self.codec == "web" else None
         if is_marker_folder(self.path):
             write_video(open_scene(self.path), self.out, codecs, 2 * self.height, self.speed)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from depthtrack.cli.progress import bar
-from depthtrack.cli.view_options import ViewOptions
+from depthtrack.cli.view_options import MOST_FRAMES, ViewOptions
 from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
 
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from depthtrack.recording import Sequence
     from depthtrack.viewing.annotated_frame import AnnotatedFrame, MaskEstimator
     from depthtrack.viewing.rerun_viewer import RerunViewer
-
-MOST_FRAMES = 200
-"""Largest number of frames on a contact sheet or strip."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +60,6 @@ class Command(ViewOptions):
             print(f"skipped frame {frame.index} at {frame.timestamp:.3f} s: {frame.reason}")
 
     def _check_options(self) -> None:
-        if self.count is not None and not 1 <= self.count <= MOST_FRAMES:
-            raise InputError(f"--count must be from 1 to {MOST_FRAMES} frames, found {self.count}")
         if len(self.frames) > MOST_FRAMES:
             raise InputError(f"--frames must name at most {MOST_FRAMES} frames, found {len(self.frames)}")
         if self.depth_range is not None and not 0 < self.depth_range[0] < self.depth_range[1] < float("inf"):

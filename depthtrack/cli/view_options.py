@@ -8,7 +8,10 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE, VIDEO
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
+
+MOST_FRAMES = 200
+"""Largest number of frames on a contact sheet or strip."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +29,11 @@ class ViewOptions:
     """File of the interactive viewer to write (rerun FILE.rrd opens it)."""
     web: bool = False
     """Serve the interactive viewer to browsers, on all network interfaces, until interrupted."""
-    frames: Annotated[tuple[int, ...], stated_default(metavar="INDEX...")] = ()
+    frames: Annotated[tuple[int, ...], number(0, 10**7, metavar="INDEX...")] = ()
     """Indices of the frames on sheet and strip (default: evenly spaced frames)."""
-    count: Annotated[int | None, stated_default(metavar="COUNT")] = None
+    count: Annotated[int | None, number(1, MOST_FRAMES, metavar="COUNT")] = None
     """Number of evenly spaced frames (default: 12 on a sheet, 7 on a strip)."""
-    depth_range: Annotated[tuple[float, float] | None, stated_default(metavar="NEAR FAR")] = None
+    depth_range: Annotated[tuple[float, float] | None, number(0, 100, metavar="NEAR FAR")] = None
     """Metres at the ends of the depth colours (default: the range of the recording)."""
     estimate: bool = True
     """Show the segmented hand in another colour if the recording has no true masks."""

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from depthtrack.errors import InputError
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 
 RendererName = Literal["raster", "egl", "osmesa", "oracle"]
 
@@ -16,33 +15,40 @@ class Objective:
     """Constants of Oikonomidis et al. 2011, Eq. (1) and (2).
 
     Raises:
-        InputError: if a depth, the unit or epsilon is not above 0 and at most 10, or the cost not within 0 to 100.
+        InputError: if one is out of its range.
     """
 
-    match_depth: float = option(0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS)
-    clamp_depth: float = option(0.04, "d_M: larger depth differences cost no more", unit="m", source=_OIKONOMIDIS)
-    silhouette_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS)
-    kinematic_weight: float = option(10.0, "lambda_k: weight of crossing fingers", source=_OIKONOMIDIS)
-    depth_unit: float = option(
-        0.001, "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20", unit="m"
+    match_depth: float = option(
+        0.01, "d_m: depths closer than this match", unit="m", source=_OIKONOMIDIS, least=1e-6, most=10
     )
-    epsilon: float = option(1e-6, "Keeps the quotients of Eq. (2) finite")
+    clamp_depth: float = option(
+        0.04, "d_M: larger depth differences cost no more", unit="m", source=_OIKONOMIDIS, least=1e-6, most=10
+    )
+    silhouette_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS, most=10000)
+    kinematic_weight: float = option(10.0, "lambda_k: weight of crossing fingers", source=_OIKONOMIDIS, most=10000)
+    depth_unit: float = option(
+        0.001,
+        "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20",
+        unit="m",
+        least=1e-6,
+        most=10,
+    )
+    epsilon: float = option(1e-6, "Keeps the quotients of Eq. (2) finite", least=1e-12, most=10)
     hidden_depth: float = option(
         0.005,
         "Depth behind an occluder from which it hides the hand: above a sensor's noise, below a finger's radius",
         unit="m",
+        least=1e-6,
+        most=10,
     )
     before_cost: float = option(
         1.0,
         "Further cost of a pixel drawn before or inside an occluder, in costs of a pixel outside the silhouette",
+        most=100,
     )
 
     def __post_init__(self) -> None:
-        for name in ("match_depth", "clamp_depth", "depth_unit", "epsilon", "hidden_depth"):
-            if not 0 < getattr(self, name) <= 10:
-                raise InputError(f"objective {name} must be above 0 and at most 10, found {getattr(self, name)!r}")
-        if not 0 <= self.before_cost <= 100:
-            raise InputError(f"objective before_cost must lie between 0 and 100, found {self.before_cost!r}")
+        check_ranges(self)
 
     @property
     def clamp(self) -> float:
@@ -60,10 +66,12 @@ class ScoringOptions:
 
     renderer: RendererName = option("raster", "Backend that renders and scores hypotheses")
     resolution: int | None = option(
-        None, "Longest side of the region that hypotheses are rendered at; the sensor's own if absent", unit="px"
+        None,
+        "Longest side of the region that hypotheses are rendered at; the sensor's own if absent",
+        unit="px",
+        least=1,
     )
     objective: Objective = option(Objective(), "Objective function", advanced=True)
 
     def __post_init__(self) -> None:
-        if self.resolution is not None and self.resolution < 1:
-            raise InputError(f"the resolution must be at least 1 pixel, found {self.resolution}")
+        check_ranges(self)

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from depthtrack.errors import InputError
-from depthtrack.options import check_seed, option
+from depthtrack.options import check_ranges, option
+from depthtrack.ranges import MOST_SEED
 from depthtrack.rendering.options import ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 from depthtrack.tracking.options import (
@@ -78,8 +79,8 @@ _ROUTINE_SWARMS = SwarmSearchOptions(
 
 
 def _check_predictions(shares: tuple[float, ...]) -> None:
-    if not shares or not all(map(math.isfinite, shares)):
-        raise InputError(f"predictions must be one or more finite numbers, such as 0 0.5 1, found {shares}")
+    if not shares:
+        raise InputError("predictions must be one or more numbers, such as 0 0.5 1, found none")
 
 
 @dataclass(frozen=True)
@@ -110,10 +111,10 @@ class PsoConfig:
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers")
+    seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,9 @@ class IkConfig:
     name: ClassVar[str] = "ik"
 
     fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
-    predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
+    predictions: tuple[float, ...] = option(
+        (0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions", least=-10, most=10
+    )
     retry_ratio: float = option(
         1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
     )
@@ -156,10 +159,10 @@ class IkConfig:
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers")
+    seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
         _check_predictions(self.predictions)
 
 
@@ -174,7 +177,9 @@ class HybridConfig:
     search_points: int = option(
         3500, "Most points that the fits of searches use; 0: no limit", unit="points", advanced=True
     )
-    predictions: tuple[float, ...] = option((0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions")
+    predictions: tuple[float, ...] = option(
+        (0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions", least=-10, most=10
+    )
     retry_ratio: float = option(
         1.3, "Multiple of the last energy above which other predictions are fitted too", advanced=True
     )
@@ -205,13 +210,11 @@ class HybridConfig:
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers")
+    seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
         _check_predictions(self.predictions)
-        if self.search_points < 0:
-            raise InputError(f"search_points must not be negative, found {self.search_points}")
 
 
 @dataclass(frozen=True)
@@ -232,10 +235,10 @@ class Oikonomidis2011Config:
         TrackingThresholds(longest_gap=math.inf), "Trust in a pose; not part of the paper", advanced=True
     )
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers")
+    seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -256,10 +259,10 @@ class Schroeder2014Config:
         TrackingThresholds(longest_gap=math.inf), "Trust in a pose; not part of the paper", advanced=True
     )
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers")
+    seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -273,10 +276,10 @@ class LiftConfig:
     fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the lifted pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
-    seed: int = option(0, "Seed of the random numbers, which the lift does not use")
+    seed: int = option(0, "Seed of the random numbers, which the lift does not use", most=MOST_SEED)
 
     def __post_init__(self) -> None:
-        check_seed(self.seed)
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -286,7 +289,7 @@ class MarkersConfig:
     name: ClassVar[str] = "markers"
 
     surface: SurfaceName = option("skin", "Surface that pictures show")
-    seed: int = option(0, "Seed of the random numbers, which labelling does not use")
+    seed: int = option(0, "Seed of the random numbers, which labelling does not use", most=MOST_SEED)
 
 
 DEFAULT_TRACKER = "hybrid"

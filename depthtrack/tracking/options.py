@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, replace
 
 from depthtrack.errors import InputError
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 
 Spread = tuple[float, float, float]
@@ -33,37 +33,37 @@ class TrackingThresholds:
         0.025,
         "A start with a lower confidence is lost, and a track after two such frames",
         source="half of the lowest confidence of a good pose among the tuning recordings of the cross-model benchmark",
+        most=1,
     )
-    agreement: float = option(0.5, "A track with a lower agreement of the silhouettes is lost")
+    agreement: float = option(0.5, "A track with a lower agreement of the silhouettes is lost", most=1)
     energy: float = option(
         0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
     )
     lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
-    guide_agreement: float = option(0.6, "Least agreement of a pose that guides the segmentation")
+    guide_agreement: float = option(0.6, "Least agreement of a pose that guides the segmentation", most=1)
     guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
-    median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames")
+    median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames", least=1)
     memory: float = option(0.5, "Time after a loss in which the hand is searched near its last pose", unit="s")
     search_interval: float = option(
-        0.1, "Time after a search without success until the next one; it doubles each time", unit="s"
+        0.1, "Time after a search without success until the next one; it doubles each time", unit="s", least=1e-3
     )
-    longest_interval: float = option(1.0, "Longest time between two searches of a lost hand", unit="s")
+    longest_interval: float = option(1.0, "Longest time between two searches of a lost hand", unit="s", least=1e-3)
     longest_gap: float = option(
-        0.3, "Time without a pose after which a start competes with the last pose, and no motion is predicted", unit="s"
+        0.3,
+        "Time without a pose after which a start competes with the last pose, and no motion is predicted",
+        unit="s",
+        most=math.inf,
     )
 
     def __post_init__(self) -> None:
-        if not min(self.search_interval, self.longest_interval) > 0:
-            raise InputError(
-                "search_interval and longest_interval must be positive, "
-                f"found {self.search_interval} and {self.longest_interval}"
-            )
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
 class SwarmRound:
     """One round of a search by swarms: the best `starts` poses continue, each as a swarm."""
 
-    starts: int = option(48, "Poses that continue")
+    starts: int = option(48, "Poses that continue", least=1)
     swarm: SwarmOptions = option(damped_swarm(32, 12), "Swarm around each pose")
     spread: tuple[float, float, float] = option(
         (0.015, 0.3, 0.3), "Standard deviation of the first generation: position, rotation, angles", unit="m, rad, rad"
@@ -93,9 +93,9 @@ class SwarmSearchOptions:
 class FitRound:
     """Round of a coarse-to-fine fit: fit the best `keep` poses in `synergies` dimensions."""
 
-    keep: int = option(48, "Poses that continue")
-    synergies: int | None = option(8, "Synergies that are solved for; all angles if absent")
-    icp_iterations: int = option(3, "Rounds of correspondences")
+    keep: int = option(48, "Poses that continue", least=1)
+    synergies: int | None = option(8, "Synergies that are solved for; all angles if absent", least=1, most=20)
+    icp_iterations: int = option(3, "Rounds of correspondences", least=1, most=1000)
     coarse: bool = option(False, "Use a quarter of the points")
 
 
@@ -112,12 +112,12 @@ class FitSearchOptions:
 class GlobalSearchOptions:
     """Global search without a known pose, over the orientations that the forearm allows."""
 
-    proposals: int = option(4000, "Poses scored first")
+    proposals: int = option(4000, "Poses scored first", least=1, most=1000000)
     resolution: int | None = option(
-        None, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels"
+        None, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels", least=1
     )
     min_angle: float = option(0.5, "Least angle between the orientations that continue", unit="rad")
-    synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies")
+    synergy_share: float = option(0.0, "Share of the proposals whose angles are drawn from the synergies", most=1)
     position_spread: Spread = option(
         (0.025, 0.025, 0.012),
         "Standard deviation of the palm about the observed centre, along the camera's axes",
@@ -126,11 +126,11 @@ class GlobalSearchOptions:
     angle_spread: float = option(0.15, "Standard deviation of the angles about typical postures", unit="rad")
     follow_arm: bool = option(True, "Prefer orientations that the observed forearm allows")
     least_along_arm: float = option(
-        0.17, "Cosine of the largest bend of a wrist, 80 degrees", source="Greene and Heckman 1994"
+        0.17, "Cosine of the largest bend of a wrist, 80 degrees", source="Greene and Heckman 1994", least=-1, most=1
     )
     good_energy: float = option(0.2, "An energy that ends the search", unit="clamp")
     good_ratio: float = option(0.0, "Multiple of the track's median energy that ends the search too")
-    attempts: int = option(3, "Repetitions, at most")
+    attempts: int = option(3, "Repetitions, at most", least=1, most=1000)
     min_gain: float = option(0.0, "Relative gain of a repetition below which the search ends")
 
     def accepted_energy(self, clamp: float, median_energy: float) -> float:
@@ -153,10 +153,12 @@ class RecoveryOptions:
     every: int = option(
         5, "Search locally in every n-th frame if its energy is elevated; 0 only in doubtful frames", unit="frames"
     )
-    proposals: int = option(4000, "Poses near the last one that a local search scores")
-    routine_proposals: int = option(300, "Poses that it scores in a frame that is not doubtful, if it is smaller there")
+    proposals: int = option(4000, "Poses near the last one that a local search scores", least=1, most=1000000)
+    routine_proposals: int = option(
+        300, "Poses that it scores in a frame that is not doubtful, if it is smaller there", least=1, most=1000000
+    )
     resolution: int | None = option(
-        64, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels"
+        64, "Longest side at which they are rendered; that of the scorer if absent", unit="pixels", least=1
     )
     elevated_ratio: float = option(
         0.0, "Multiple of the track's median energy above which an energy is elevated; 0: any is"
@@ -164,12 +166,12 @@ class RecoveryOptions:
     position_spread: float = option(0.02, "Standard deviation of their position", unit="m")
     rotation_spread: float = option(0.3, "Standard deviation of their rotation", unit="rad")
     angle_spread: float = option(0.15, "Standard deviation of their angles about typical postures", unit="rad")
-    keep_angles_every: int = option(4, "Every n-th of them keeps the finger angles")
+    keep_angles_every: int = option(4, "Every n-th of them keeps the finger angles", least=1)
     min_angle: float = option(0.1, "Least angle between the orientations that continue; 0 for any", unit="rad")
     accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
     accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
     accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
-    doubt_agreement: float = option(0.6, "A lower agreement triggers a local search")
+    doubt_agreement: float = option(0.6, "A lower agreement triggers a local search", most=1)
     doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
 
     @property
@@ -182,19 +184,22 @@ class RecoveryOptions:
 class FingerOptions:
     """Search of the posture of a single finger."""
 
-    proposals: int = option(96, "Postures of one finger that are scored together")
-    kept: int = option(8, "Postures that lead to the next ones")
+    proposals: int = option(96, "Postures of one finger that are scored together", least=1, most=100000)
+    kept: int = option(8, "Postures that lead to the next ones", least=1)
     spreads: tuple[float, ...] = option((0.2, 0.1), "Standard deviations of the following postures", unit="rad")
-    resolution: int | None = option(None, "Longest side at which they are rendered; that of the scorer if absent")
+    resolution: int | None = option(
+        None, "Longest side at which they are rendered; that of the scorer if absent", least=1
+    )
     stop_early: bool = option(True, "Stop as soon as the energy is good")
-    shift_iterations: int = option(0, "Rounds of a first, coarse fit of shifted fingers; 0: one full fit at once")
+    shift_iterations: int = option(
+        0, "Rounds of a first, coarse fit of shifted fingers; 0: one full fit at once", most=1000
+    )
     shift_margin: float = option(1.1, "Energy ratio below which a coarse fit of shifted fingers is continued")
-    turns: int = option(1, "Frames over which the fingers and the shifts are searched in turn", unit="frames")
-    usual_turns: int = option(1, "The same in frames whose energy is not elevated", unit="frames")
+    turns: int = option(1, "Frames over which the fingers and the shifts are searched in turn", unit="frames", least=1)
+    usual_turns: int = option(1, "The same in frames whose energy is not elevated", unit="frames", least=1)
 
     def __post_init__(self) -> None:
-        if min(self.turns, self.usual_turns) < 1:
-            raise InputError(f"turns and usual_turns must be at least 1, found {self.turns} and {self.usual_turns}")
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -205,12 +210,12 @@ class BranchOptions:
     search: GlobalSearchOptions = option(
         GlobalSearchOptions(proposals=400, resolution=64, synergy_share=0.5), "Proposals of such a search"
     )
-    turned: int = option(32, "Postures in which the tracked hand is turned over")
+    turned: int = option(32, "Postures in which the tracked hand is turned over", most=100000)
     fits: FitSearchOptions = option(
         FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 6))), "Surface fits of such a search"
     )
     least_distance: float = option(0.015, "Least mean distance of its joints from those of the tracked pose", unit="m")
-    carried: int = option(2, "Alternatives that are followed, at most")
+    carried: int = option(2, "Alternatives that are followed, at most", most=1000)
     admit: float = option(1.3, "Energy ratio to the tracked pose below which an alternative is followed")
     give_up: float = option(1.4, "Mean energy ratio above which it is given up")
     decide_after: float = option(0.3, "Time that an alternative is followed before it may be accepted", unit="s")
@@ -225,7 +230,7 @@ class SynergyOptions:
     """Hand synergies that a fit uses (Schroeder et al. 2014, Sec. V)."""
 
     synergies: str | None = option(None, "Set of synergies: leap, leap-grasps, or a file of `depthtrack synergies fit`")
-    components: int | None = option(None, "Use only the first n synergies")
+    components: int | None = option(None, "Use only the first n synergies", least=1, most=20)
     synergy_prior: bool = option(False, "Solve for all angles with the synergies as a prior instead of a subspace")
 
     def __post_init__(self) -> None:
@@ -241,9 +246,9 @@ class SurfaceChoiceOptions:
     surfaces: tuple[SurfaceName, ...] = option(
         ("skin", "primitives"), "Surfaces to choose from, the preferred one first"
     )
-    good_residual: float = option(0.02, "Residual below which no other surface is tried; robust cost, 0 to 1")
-    iterations: int = option(3, "Rounds of correspondences of each brief fit")
-    scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m")
+    good_residual: float = option(0.02, "Residual below which no other surface is tried; robust cost, 0 to 1", most=1)
+    iterations: int = option(3, "Rounds of correspondences of each brief fit", least=1, most=1000)
+    scale: float = option(0.004, "Scale of the robust cost that compares the fits", unit="m", least=1e-4)
     accept: float = option(0.85, "Residual ratio below which another surface than the preferred one is used")
 
 
@@ -255,8 +260,10 @@ class KeypointOptions:
     """
 
     lift: LiftOptions = option(LiftOptions(), "Fit of the hand to keypoints and the depth near them")
-    contradicted: float = option(0.25, "Robust cost of the keypoints above which they are lifted to other poses")
-    finger: float = option(0.5, "Robust cost of a finger's keypoints above which its lifted angles are tried")
+    contradicted: float = option(
+        0.25, "Robust cost of the keypoints above which they are lifted to other poses", most=1
+    )
+    finger: float = option(0.5, "Robust cost of a finger's keypoints above which its lifted angles are tried", most=1)
     accept: float = option(0.97, "Energy ratio below which a lifted pose is accepted")
     tie: float = option(0.1, "Share of its energy that the robust cost of 1 adds to a pose that is compared")
 
@@ -271,6 +278,6 @@ class SwarmProposalOptions:
         "Standard deviation of the first generation: position, rotation, angles",
         unit="m, rad, rad",
     )
-    keep: int = option(2, "Particles that are fitted")
+    keep: int = option(2, "Particles that are fitted", least=1)
     accept: float = option(0.97, "Energy ratio below which a fitted particle is accepted")
     skip_ratio: float = option(1.1, "Skip the swarm in frames whose energy is lower than this multiple of the last one")

@@ -107,21 +107,21 @@ def test_a_folder_to_write_is_checked_first(
     assert snapshot(place) == before
 
 
-def _arguments(kind: type[Any]) -> Iterator[tuple[str, Any]]:
+def arguments_of(kind: type[Any]) -> Iterator[tuple[str, Any]]:
     """Yield name and annotation of all arguments of a command and of the groups in it."""
     for name, hint in get_type_hints(kind, include_extras=True).items():
-        found = [each for each in _types(hint) if dataclasses.is_dataclass(each)]
+        found = [each for each in types_in(hint) if dataclasses.is_dataclass(each)]
         for each in found:
             assert isinstance(each, type)
-            yield from _arguments(each)
+            yield from arguments_of(each)
         if not found:
             yield name, hint
 
 
-def _types(hint: Any) -> Iterator[Any]:
+def types_in(hint: Any) -> Iterator[Any]:
     yield hint
     for part in getattr(hint, "__args__", ()):
-        yield from _types(part)
+        yield from types_in(part)
 
 
 def test_every_path_to_write_is_marked() -> None:
@@ -135,8 +135,8 @@ def test_every_path_to_write_is_marked() -> None:
     for entry in entries:
         module = import_module(entry.module)
         kind = module.command([])[0] if hasattr(module, "command") else module.Command
-        for name, hint in _arguments(kind):
-            if Path not in _types(hint):
+        for name, hint in arguments_of(kind):
+            if Path not in types_in(hint):
                 continue
             marks = [each for each in getattr(hint, "__metadata__", ()) if isinstance(each, Output)]
             assert bool(marks) != (name in inputs), f"{entry.module}: {name}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 
 if TYPE_CHECKING:
     from depthtrack.markers.capture import MarkerCapture
@@ -18,7 +18,7 @@ class CaptureOptions:
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(name="capture", metavar="CAPTURE")]
     """Marker capture: C3D, Qualisys TSV, Vicon or Motive CSV, TRC, or CSV with columns name-X, name-Y, name-Z."""
-    rate: Annotated[float | None, stated_default(metavar="HZ")] = None
+    rate: Annotated[float | None, number(0.01, 10**5, metavar="HZ")] = None
     """Frames a second (default: as the file states, else 120)."""
     unit: Annotated[Literal["m", "cm", "mm"] | None, stated_default(metavar="m|cm|mm")] = None
     """Unit of the file (default: as the file states, else the one that fits a hand)."""

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import tyro
 
+from depthtrack.cli.stated_default import number
 from depthtrack.errors import InputError
+from depthtrack.ranges import MOST_SEED
 
 if TYPE_CHECKING:
     from depthtrack.evaluation.gap_comparison import FillScore
@@ -28,9 +30,9 @@ class Command:
     """
 
     labelled: tyro.conf.OmitArgPrefixes[FoldersArgument]
-    frames: Annotated[tuple[int, int], tyro.conf.arg(metavar="FRAMES FRAMES")] = (100, 200)
+    frames: Annotated[tuple[int, int], number(1, 10**7, metavar="FRAMES FRAMES")] = (100, 200)
     """Shortest and longest stretch."""
-    seeds: Annotated[tuple[int, ...], tyro.conf.arg(metavar="SEED ...")] = (1000, 1001, 1002)
+    seeds: Annotated[tuple[int, ...], number(0, MOST_SEED, metavar="SEED ...")] = (1000, 1001, 1002)
     """Seeds of the places; each cuts the whole capture once."""
     methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = (
         "smooth",

@@ -8,6 +8,8 @@ import tyro
 
 from depthtrack.cli.argument_checks import CAPTURE
 from depthtrack.cli.markers.capture_options import CaptureOptions
+from depthtrack.cli.stated_default import number
+from depthtrack.ranges import MOST_SEED
 
 
 @dataclass(frozen=True)
@@ -20,11 +22,11 @@ class Command:
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, CAPTURE, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
-    frames: Annotated[tuple[int, int], tyro.conf.arg(metavar="FRAMES FRAMES")] = (16, 57)
+    frames: Annotated[tuple[int, int], number(1, 10**7, metavar="FRAMES FRAMES")] = (16, 57)
     """Shortest and longest stretch."""
-    share: Annotated[float, tyro.conf.arg(metavar="PERCENT")] = 5.0
+    share: Annotated[float, number(0, 100, metavar="PERCENT")] = 5.0
     """Share of the labelled samples to cut."""
-    seed: int = 0
+    seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the places."""
 
     def run(self) -> None:

@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import CAPTURE
 from depthtrack.cli.markers.capture_options import CaptureOptions
+from depthtrack.cli.stated_default import number
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Command:
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, CAPTURE, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
-    longest_gap: float = 1.0
+    longest_gap: Annotated[float, number(0, 3600)] = 1.0
     """Longest gap over which trajectories are joined, seconds; 0 joins none."""
     json: bool = False
     """Print figures as JSON instead of a sentence."""

@@ -9,7 +9,7 @@ import tyro
 from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.markers.capture_options import CaptureOptions
 from depthtrack.cli.markers.model_options import ModelOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Command:
     """File to write."""
     body: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LABEL ...")] = ()
     """Markers of a rigid body; the first one is its origin."""
-    frame: Annotated[int | None, stated_default(metavar="FRAME")] = None
+    frame: Annotated[int | None, number(1, 10**9, metavar="FRAME")] = None
     """Frame that the body is taken from, counted from 1 (default: the median of all frames)."""
     chosen: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
     name: Annotated[str | None, stated_default()] = None
@@ -41,7 +41,7 @@ class Command:
     """Start of the labels in the capture that those of the layout lack, such as `L-`."""
     unlabelled: bool = False
     """Label the capture although it has the labels of the layout."""
-    rounds: int = 1
+    rounds: Annotated[int, number(0, 100)] = 1
     """Times that an unlabelled capture is labelled again with the calibrated hand before the last calibration."""
     json: bool = False
     """Print figures as JSON instead of text."""

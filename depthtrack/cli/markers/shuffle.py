@@ -8,6 +8,8 @@ import tyro
 
 from depthtrack.cli.argument_checks import CAPTURE
 from depthtrack.cli.markers.capture_options import CaptureOptions
+from depthtrack.cli.stated_default import number
+from depthtrack.ranges import MOST_SEED
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Command:
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, CAPTURE, tyro.conf.arg(aliases=("-o",), metavar="FILE")]
     """Capture to write: .csv, .c3d or .trc."""
-    seed: int = 0
+    seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the order."""
 
     def run(self) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from depthtrack.cli.markers.labelling_options import Method
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ class StartOptions:
 
     method: Method = "offline"
     """`offline` uses the whole capture, `online` only the frames before each, `paper` is Maycock et al. 2015."""
-    frames: Annotated[tuple[int, int] | None, stated_default(metavar="FIRST LAST")] = None
+    frames: Annotated[tuple[int, int] | None, number(1, 10**9, metavar="FIRST LAST")] = None
     """Use only these frames of the capture, both included, counted from 1."""
     start: Annotated[Path | None, stated_default(metavar="START.json")] = None
     """The start.json of an earlier folder of the same frames, in place of a search for the models."""

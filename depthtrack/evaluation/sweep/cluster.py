@@ -1,5 +1,6 @@
 """Workers of an existing Dask cluster."""
 
+import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from importlib import import_module
@@ -11,6 +12,8 @@ from depthtrack.evaluation.sweep.run import Measure, SweepError, timed
 
 TIMEOUT = 20
 """Seconds to wait for the scheduler, and for its first worker."""
+_ADDRESS = re.compile(r"(?:tcp://)?(?:\[[0-9a-fA-F:.]+\]|[\w.-]+):\d{1,5}")
+"""Host and port; other schemes need keys or libraries that no option states."""
 
 
 class DaskWorkers:
@@ -21,10 +24,13 @@ class DaskWorkers:
     The scheduler reassigns the cells of a killed worker.
 
     Raises:
+        InputError: if the address is none.
         MissingExtraError: if Dask is not installed.
     """
 
     def __init__(self, address: str) -> None:
+        if not _ADDRESS.fullmatch(address):
+            raise InputError(f"the Dask scheduler must have an address as tcp://127.0.0.1:8786, found '{address:.60}'")
         try:
             self._dask: Any = import_module("distributed")
         except ImportError as error:

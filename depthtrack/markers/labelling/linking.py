@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from depthtrack.errors import InputError
 from depthtrack.geometry.alignment import rigid_alignment
 from depthtrack.markers.capture import UNLABELLED, MarkerCapture
 from depthtrack.markers.labelling.packed import PackedPoints
 from depthtrack.markers.labelling.tracklets import LinkSettings, make_tracklets
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 from depthtrack.types import Array, Index
 
 
@@ -24,26 +23,22 @@ from depthtrack.types import Array, Index
 class LinkingOptions:
     """Trajectories without models."""
 
-    noise: float = option(0.0007, "Standard deviation of a measured coordinate", unit="m")
-    acceleration: float = option(50.0, "Standard deviation of a marker's acceleration", unit="m/s^2")
-    speed: float = option(0.5, "Standard deviation of the speed of a point without a known motion", unit="m/s")
+    noise: float = option(0.0007, "Standard deviation of a measured coordinate", unit="m", least=1e-6)
+    acceleration: float = option(50.0, "Standard deviation of a marker's acceleration", unit="m/s^2", least=1e-4)
+    speed: float = option(
+        0.5, "Standard deviation of the speed of a point without a known motion", unit="m/s", least=1e-4
+    )
     gate: float = option(3.0, "Largest distance of a link between frames", unit="standard deviations")
     clear: float = option(2.0, "By how much farther the next best link must be", unit="standard deviations")
     longest_gap: float = option(1.0, "Longest gap that is joined", unit="s")
-    neighbours: int = option(6, "Neighbours whose rigid motion is used")
-    neighbour_range: float = option(0.15, "Distance at which a neighbour has 0.6 of its weight", unit="m")
+    neighbours: int = option(6, "Neighbours whose rigid motion is used", least=3, most=1000)
+    neighbour_range: float = option(0.15, "Distance at which a neighbour has 0.6 of its weight", unit="m", least=1e-4)
     deformation: float = option(0.1, "Growth of the neighbours' uncertainty over a gap", unit="m/s")
-    clutter: float = option(20.0, "Expected density of points without a marker", unit="1/m^3")
-    rounds: int = option(8, "Rounds of joining, each over longer gaps")
+    clutter: float = option(20.0, "Expected density of points without a marker", unit="1/m^3", least=1e-6, most=1000000)
+    rounds: int = option(8, "Rounds of joining, each over longer gaps", least=1, most=1000)
 
     def __post_init__(self) -> None:
-        if min(self.noise, self.acceleration, self.speed, self.neighbour_range, self.clutter) <= 0:
-            raise InputError("lengths, speeds, accelerations and densities of the linking must be positive")
-        if self.neighbours < 3 or not self.longest_gap >= 0:
-            raise InputError(
-                "linking needs at least 3 neighbours and a gap of at least 0 s, "
-                f"found {self.neighbours} and {self.longest_gap:g} s"
-            )
+        check_ranges(self)
 
 
 def link_capture(capture: MarkerCapture, options: LinkingOptions | None = None) -> MarkerCapture:

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from depthtrack.errors import InputError
-from depthtrack.options import option
-from depthtrack.segmentation.options.checks import check_numbers
+from depthtrack.options import check_ranges, option
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,10 @@ class ForearmOptions:
         0.02, "Depth by which an arm that vanishes near the sensor is nearer than the palm", unit="m"
     )
     direction_start: float = option(0.05, "Distance behind the wrist at which the direction is measured", unit="m")
-    least_cosine: float = option(0.5, "Cosine of the largest turn of an arm between frames")
+    least_cosine: float = option(0.5, "Cosine of the largest turn of an arm between frames", least=-1, most=1)
 
     def __post_init__(self) -> None:
-        check_numbers(self)
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -38,13 +37,15 @@ class BreadthOptions:
     """Sampling of the breadth of an arm along its axis."""
 
     half_breadth: float = option(0.07, "Largest distance of a node of the arm from its axis", unit="m")
-    bin_width: float = option(0.004, "Distance between samples of the breadth", unit="m")
-    bins: int = option(50, "Number of samples from the palm's centre outward")
-    margin_bins: int = option(4, "Samples beyond either end, and half width of the smoothing kernel")
-    sigma_bins: float = option(1.5, "Standard deviation of the smoothing: nodes are about one bin wide", unit="bins")
+    bin_width: float = option(0.004, "Distance between samples of the breadth", unit="m", least=1e-4)
+    bins: int = option(50, "Number of samples from the palm's centre outward", least=1, most=1000)
+    margin_bins: int = option(4, "Samples beyond either end, and half width of the smoothing kernel", least=1, most=100)
+    sigma_bins: float = option(
+        1.5, "Standard deviation of the smoothing: nodes are about one bin wide", unit="bins", least=1e-4
+    )
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("bin_width", "bins", "margin_bins", "sigma_bins"), {"bins": 1000})
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,16 @@ class WristOptions:
     breadth: BreadthOptions = option(BreadthOptions(), "Breadth of the arm", advanced=True)
     forearm_from: float = option(0.03, "Distance from which the narrowest place separates hand and elbow", unit="m")
     narrow_ratio: float = option(
-        1.09, "Ratio to the narrowest breadth behind it at which the hand ends; some forearms hardly taper"
+        1.09, "Ratio to the narrowest breadth behind it at which the hand ends; some forearms hardly taper", least=1e-4
     )
     broad_ratio: float = option(1.05, "Smallest ratio of the hand's breadth to that of its end")
     broadest_ratio: float = option(1.5, "Ratio from which a broader hand is no better")
     flare_ratio: float = option(1.4, "Largest ratio of breadths behind the wrist; beyond it, the hand follows")
-    neighbours: int = option(12, "Samples before and behind a place that are compared with it", unit="bins")
-    least_behind: int = option(4, "Samples behind a place that must be visible", unit="bins")
-    place_scale: float = option(0.03, "Distance from the expected place that costs 1", unit="m")
+    neighbours: int = option(
+        12, "Samples before and behind a place that are compared with it", unit="bins", least=1, most=100
+    )
+    least_behind: int = option(4, "Samples behind a place that must be visible", unit="bins", most=100)
+    place_scale: float = option(0.03, "Distance from the expected place that costs 1", unit="m", least=1e-4)
     breadth_weight: float = option(4.0, "Weight of the ratio of the hand's breadth")
     fade_out: float = option(0.01, "Length at the end of the visible arm where its breadth is unreliable", unit="m")
     axis_section: float = option(0.008, "Half length of the section through the wrist", unit="m")
@@ -72,10 +75,12 @@ class WristOptions:
         unit="m",
     )
     shortest_axis: float = option(0.01, "Smallest distance from palm to wrist that defines a direction", unit="m")
-    least_bend_cosine: float = option(0.94, "Cosine of the largest accepted angle between hand and forearm")
+    least_bend_cosine: float = option(
+        0.94, "Cosine of the largest accepted angle between hand and forearm", least=-1, most=1
+    )
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("narrow_ratio", "place_scale", "neighbours"))
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -86,27 +91,31 @@ class ForeshortenedWristOptions:
     """
 
     least_cosine: float = option(
-        0.85, "Cosine of the largest angle between such an arm and the line of sight", source="as the ratios"
+        0.85,
+        "Cosine of the largest angle between such an arm and the line of sight",
+        source="as the ratios",
+        least=-1,
+        most=1,
     )
     before: float = option(0.16, "Distance before the palm's centre from which the breadth is measured", unit="m")
     half_breadth: float = option(0.08, "Largest distance of a node from the axis", unit="m")
-    bin_width: float = option(0.004, "Distance between samples of the breadth", unit="m")
-    bins: int = option(90, "Number of samples")
-    margin_bins: int = option(6, "Half width of the smoothing kernel", unit="bins")
+    bin_width: float = option(0.004, "Distance between samples of the breadth", unit="m", least=1e-4)
+    bins: int = option(90, "Number of samples", least=1, most=1000)
+    margin_bins: int = option(6, "Half width of the smoothing kernel", unit="bins", least=1, most=100)
     sigma_bins: float = option(
-        2.5, "Standard deviation of the smoothing: nodes are far apart along the arm", unit="bins"
+        2.5, "Standard deviation of the smoothing: nodes are far apart along the arm", unit="bins", least=1e-4
     )
-    narrow_ratio: float = option(1.4, "Ratio to the narrowest breadth behind it at which the hand ends")
+    narrow_ratio: float = option(1.4, "Ratio to the narrowest breadth behind it at which the hand ends", least=1e-4)
     broad_ratio: float = option(1.2, "Smallest ratio of the hand's breadth to that of its end")
     broadest_ratio: float = option(2.0, "Ratio from which a broader hand is no better")
     flare_ratio: float = option(1.7, "Largest ratio of breadths behind the wrist; beyond it, the hand follows")
-    neighbours: int = option(12, "Samples before and behind a place that are compared with it", unit="bins")
-    least_behind: int = option(4, "Samples behind a place that must be visible", unit="bins")
+    neighbours: int = option(
+        12, "Samples before and behind a place that are compared with it", unit="bins", least=1, most=100
+    )
+    least_behind: int = option(4, "Samples behind a place that must be visible", unit="bins", most=100)
 
     def __post_init__(self) -> None:
-        check_numbers(
-            self, ("bin_width", "bins", "margin_bins", "sigma_bins", "narrow_ratio", "neighbours"), {"bins": 1000}
-        )
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -121,14 +130,14 @@ class WristFilterOptions:
     )
     nearest_guess: float = option(0.04, "Smallest distance of an edge-on palm from its wrist by anatomy", unit="m")
     farthest_guess: float = option(0.13, "Largest distance by anatomy", unit="m")
-    guess_sigma: float = option(0.035, "Standard deviation of the distance by anatomy", unit="m")
+    guess_sigma: float = option(0.035, "Standard deviation of the distance by anatomy", unit="m", least=1e-4)
     step_sigma: float = option(0.0022, "Standard deviation of the wrist's motion along the arm in a frame", unit="m")
     measurement_sigma: float = option(
-        0.012, "Standard deviation of a measured wrist; large, because errors persist over frames", unit="m"
+        0.012, "Standard deviation of a measured wrist; large, because errors persist over frames", unit="m", least=1e-4
     )
     gate: float = option(2.0, "Innovation, in standard deviations, that is clipped; of an edge-on palm, it is rejected")
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("guess_sigma", "measurement_sigma"))
+        check_ranges(self)
         if self.nearest_guess > self.farthest_guess:
             raise InputError(f"nearest_guess must not exceed {self.farthest_guess:g} m, found {self.nearest_guess:g}")

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from depthtrack.options import option
-from depthtrack.segmentation.options.checks import check_numbers
+from depthtrack.options import check_ranges, option
 
 _CHOSEN = "chosen by hand on 425 single frames, 90 of them real: the hand costs least in 423; no script is kept"
 
@@ -20,16 +19,21 @@ class PalmOptions:
         "Largest distance along the surface from the palm's centre to a fingertip",
         unit="m",
         source="95th percentile of men: hand length 211 mm, less 50 mm of palm; Greiner 1991",
+        least=1e-4,
     )
     tip_to_palm: float = option(
         0.15, "Largest distance from a fingertip, or a fist's knuckles, to the palm's centre", unit="m"
     )
-    tip_to_wrist: float = option(0.20, "Largest distance from a fingertip to the wrist", unit="m")
-    exit_reach: float = option(0.24, "Distance from the palm's centre up to which limbs are searched", unit="m")
+    tip_to_wrist: float = option(0.20, "Largest distance from a fingertip to the wrist", unit="m", least=1e-4)
+    exit_reach: float = option(
+        0.24, "Distance from the palm's centre up to which limbs are searched", unit="m", least=1e-4
+    )
     exit_tolerance: float = option(0.01, "Distance before `exit_reach` from which a limb continues", unit="m")
-    path_limit: float = option(3.0, "Length of the longest path along a surface to one of its tips", unit="m")
+    path_limit: float = option(
+        3.0, "Length of the longest path along a surface to one of its tips", unit="m", least=1e-4
+    )
     least_area: float = option(
-        20e-4, "Smallest visible area of a hand: half of a fist seen from its side (40 cm^2)", unit="m^2"
+        20e-4, "Smallest visible area of a hand: half of a fist seen from its side (40 cm^2)", unit="m^2", least=1e-4
     )
     least_radius: float = option(
         0.012, "Smallest inscribed radius of a palm: half the thickness of a child's palm", unit="m"
@@ -45,12 +49,12 @@ class PalmOptions:
     exit_area: float = option(
         150e-4, "Largest area of an arm between these distances: 8 cm of a 12 cm wide arm, times 1.5", unit="m^2"
     )
-    tips_per_surface: int = option(4, "Number of geodesic extrema of a surface that are tried")
+    tips_per_surface: int = option(4, "Number of geodesic extrema of a surface that are tried", most=100)
     least_protrusion: float = option(0.05, "Smallest geodesic distance of an extremum from the rest", unit="m")
     finger_half_breadth: float = option(0.013, "Radius of the disc that does not fit into a finger", unit="m")
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("hand_reach", "tip_to_wrist", "exit_reach", "path_limit", "least_area"))
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,12 @@ class DetectionOptions:
     A start chooses among all candidates of the nearest slice of depth; following chooses near the last position.
     """
 
-    slice_depth: float = option(0.35, "Thickness of a slice of depth: a hand and a forearm that points away", unit="m")
-    slice_step: float = option(0.2, "Distance between slices, which are searched from near to far", unit="m")
+    slice_depth: float = option(
+        0.35, "Thickness of a slice of depth: a hand and a forearm that points away", unit="m", least=1e-4
+    )
+    slice_step: float = option(
+        0.2, "Distance between slices, which are searched from near to far", unit="m", least=1e-4
+    )
     largest_step: float = option(0.12, "Largest motion of a palm between frames: 3.6 m/s at 30 Hz", unit="m")
     accepted_cost: float = option(
         0.05, "Cost of a candidate near the last position below which no other is tried", unit="m"
@@ -78,7 +86,9 @@ class DetectionOptions:
         0.042, "Inscribed radius from which a followed palm has no cost of narrowness", unit="m", source=_CHOSEN
     )
     finger_bonus: float = option(0.2, "Bonus of a hand with all fingers visible", unit="m", source=_CHOSEN)
-    all_fingers_area: float = option(40e-4, "Area of narrow parts with the full bonus", unit="m^2", source=_CHOSEN)
+    all_fingers_area: float = option(
+        40e-4, "Area of narrow parts with the full bonus", unit="m^2", source=_CHOSEN, least=1e-4
+    )
     wrist_cost: float = option(1.5, "Cost of a metre by which the narrowest place is too far away", source=_CHOSEN)
     usual_wrist: float = option(
         0.06, "Distance of the narrowest place from the palm's centre without a cost", unit="m", source=_CHOSEN
@@ -87,4 +97,4 @@ class DetectionOptions:
     no_arm_cost: float = option(0.1, "Cost of a candidate without a visible arm", unit="m", source=_CHOSEN)
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("slice_step", "slice_depth", "all_fingers_area"))
+        check_ranges(self)

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from depthtrack.errors import InputError
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 from depthtrack.segmentation.options.arm import (
     ForearmOptions,
     ForeshortenedWristOptions,
@@ -30,7 +29,9 @@ class SegmentationOptions:
     skin_model: str | None = option(
         None, "File of skin colours from `depthtrack train-skin`; published statistics (Jones and Rehg 2002) if absent"
     )
-    wrist_margin: float = option(0.0, "Length of forearm that is kept beyond the wrist", unit="m")
+    wrist_margin: float = option(
+        0.0, "Length of forearm that is kept beyond the wrist", unit="m", least=-0.05, most=0.2
+    )
     search: SearchWindowOptions = option(SearchWindowOptions(), "Searched part of a frame")
     roi: RoiOptions = option(RoiOptions(), "Region of interest")
     grid: GridOptions = option(GridOptions(), "Surface grid", advanced=True)
@@ -49,5 +50,4 @@ class SegmentationOptions:
     point_cloud: PointCloudOptions = option(PointCloudOptions(), "Point cloud", advanced=True)
 
     def __post_init__(self) -> None:
-        if not -0.05 <= self.wrist_margin <= 0.2:
-            raise InputError(f"wrist_margin must be from -0.05 to 0.2 m, found {self.wrist_margin:g}")
+        check_ranges(self)
