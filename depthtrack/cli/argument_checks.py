@@ -17,6 +17,7 @@ from depthtrack.outputs import check_distinct, check_file, check_folder, check_i
 class Output:
     """Mark of an argument that names what a command writes.
 
+    kind: a file, a folder, or a recording: a folder that may hold one, or a file with one of the suffixes.
     suffixes: of a file; any if empty.
     """
 
@@ -31,7 +32,7 @@ class Output:
         Raises:
             InputError: if it cannot.
         """
-        if self.kind == "file":
+        if self.kind == "file" or path.suffix.lower() in self.suffixes:
             check_file(path, name, self.suffixes)
         else:
             check_folder(path, name, recording=self.kind == "recording")

@@ -6,17 +6,17 @@ from typing import Annotated, Literal
 
 import tyro
 
+from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.progress import bar
 from depthtrack.cli.recording_options import RecordingOptions
-from depthtrack.cli.stated_default import stated_default
-from depthtrack.errors import InputError
+from depthtrack.cli.stated_default import number
 
 
 @dataclass(frozen=True)
 class OutputArgument:
     """Recording to write, after the one to read."""
 
-    out: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OUT")]
+    out: Annotated[Path, Output("recording", (".mcap",)), tyro.conf.Positional, tyro.conf.arg(metavar="OUT")]
     """Folder to write, or a file whose name ends in .mcap."""
 
 
@@ -30,7 +30,7 @@ class Command:
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     output: tyro.conf.OmitArgPrefixes[OutputArgument]
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """Write only the first N frames."""
     colour: Literal["png", "jpg"] = "png"
     """Format of the colour images in a folder: png loses nothing, jpg is smaller."""
@@ -40,8 +40,6 @@ class Command:
     def run(self) -> None:
         from depthtrack.recording.convert import convert
 
-        if self.frames is not None and self.frames < 1:
-            raise InputError(f"--frames must be at least 1, found {self.frames}")
         sequence, out = self.recording.open(), self.output.out
         total = min(len(sequence), self.frames or len(sequence))
         count = convert(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 from depthtrack.export.registry import EXPORTERS, export_joints, find_exporter, suffixes
 
@@ -32,7 +32,7 @@ class Command:
 
     smooth: bool = False
     """Filter the poses over time (one-euro filter). They lag behind, and the delay is printed."""
-    smooth_cutoff: Annotated[float | None, stated_default(metavar="HZ")] = None
+    smooth_cutoff: Annotated[float | None, number(0.001, 1000, metavar="HZ")] = None
     """Cut-off of --smooth for a hand at rest (default: 4); lower is smoother and later."""
 
     def run(self) -> None:

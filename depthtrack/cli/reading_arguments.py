@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 
 if TYPE_CHECKING:
     from depthtrack.recording.reading import ReadingOptions
@@ -20,7 +20,7 @@ class ReadingArguments:
 
     time_unit: Literal["auto", "s", "ms", "us", "ns", "frames", "index"] = "auto"
     """Unit of the times in lists. `frames` are numbers of frames at 30 Hz; `index` ignores the times."""
-    invalid: Annotated[tuple[int, ...], stated_default(metavar="VALUE...")] = ()
+    invalid: Annotated[tuple[int, ...], number(0, 65535, metavar="VALUE...")] = ()
     """Stored depth values that mean no reading, beside 0."""
     mirror: bool = False
     """Mirror the images left to right. The camera is that of the mirrored images."""

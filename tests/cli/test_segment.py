@@ -97,7 +97,7 @@ def test_options_of_the_segmentation_are_parsed(
     assert main([*command, "--segmentation.farthest", "0.3"]) == 0
     assert json.loads(capsys.readouterr().out)["frames_with_hand"] == 0
     assert main([*command, "--segmentation.detection.slice-step", "0"]) == 2
-    assert "slice_step must be from 0.0001" in capsys.readouterr().err
+    assert "slice-step must be from 0.0001" in capsys.readouterr().err
 
 
 def test_a_model_trained_on_a_recording_segments_it(

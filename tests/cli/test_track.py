@@ -199,7 +199,7 @@ def test_errors_are_one_sentence_without_traceback(
         (["track", str(recording), "-o", str(run)], "--resume"),
         (["track", str(recording), "-o", str(run), *_QUICK, "--resume", "--seed", "9"], "options.seed"),
         (["track", str(tmp_path / "nothing"), "-o", str(tmp_path / "r")], "nothing"),
-        (["track", str(recording), "-o", str(tmp_path / "r"), "--frames", "-1"], "--frames must be at least 1"),
+        (["track", str(recording), "-o", str(tmp_path / "r"), "--frames", "-1"], "--frames must be from 1"),
         (["evaluate", str(tmp_path)], "holds no run"),
         (["evaluate", str(run), "--sequence", str(tmp_path)], str(tmp_path)),
     ):

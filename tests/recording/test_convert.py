@@ -78,7 +78,7 @@ def test_mistakes_give_one_sentence(sample: Path, tmp_path: Path, capsys: pytest
     assert main(["convert", str(sample), str(tmp_path / "nowhere" / "film.mcap")]) == 2
     assert "does not exist" in capsys.readouterr().err
     assert main(["convert", str(sample), str(tmp_path / "film.mcap"), "--frames", "0"]) == 2
-    assert "--frames must be at least 1" in capsys.readouterr().err
+    assert "--frames must be from 1" in capsys.readouterr().err
 
 
 def test_depth_beyond_16_bits_becomes_none(sample: Path, tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ def test_a_sample_reads_frames_from_end_to_end(info: Any, sample: Path) -> None:
 
 
 def test_an_empty_sample_is_rejected(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--sample must be at least 1" in refusal(capsys, sample, "--sample", 0)
+    assert "--sample must be from 1" in refusal(capsys, sample, "--sample", 0)
 
 
 def test_control_characters_of_a_recording_are_not_printed(sample: Path, capsys: pytest.CaptureFixture[str]) -> None:

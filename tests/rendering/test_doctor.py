@@ -147,7 +147,7 @@ def test_a_default_renderer_that_fails_ends_with_code_2(
 
 def test_a_time_limit_out_of_range_is_rejected(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--time-limit", "0"]) == 2
-    assert "--time-limit must lie between" in capsys.readouterr().err
+    assert "--time-limit must be from 0.1 to 3600" in capsys.readouterr().err
 
 
 def test_every_backend_has_a_trial() -> None:

@@ -59,7 +59,7 @@ def test_a_pose_behind_an_object_scores_as_without_it_and_one_before_it_costs_mo
 
 @pytest.mark.parametrize("cost", [-0.1, 101, np.nan])
 def test_costs_beyond_their_range_are_rejected(cost: float) -> None:
-    with pytest.raises(InputError, match="objective before_cost must lie between 0 and 100"):
+    with pytest.raises(InputError, match="before_cost must be from 0 to 100"):
         Objective(before_cost=cost)
 
 
