@@ -33,6 +33,9 @@ lint: .venv/.ready-test
 # The long forms of the campaigns in tests/robustness: hours, at low priority.
 robustness: .venv/.ready-test
 	nice -n 19 $(BIN)/python -m tests.robustness.failing_writes
+	nice -n 19 $(BIN)/python -m tests.robustness.option_matrix
+	nice -n 19 $(BIN)/python -m tests.robustness.flat_resources
+	nice -n 19 $(BIN)/python -m tests.robustness.flat_resources --frames 1 --opened 0 --tracker ik --seconds 3600
 
 # Broken links and references between pages are errors. With --quiet, mkdocs would not count them.
 docs: .venv/.ready-docs

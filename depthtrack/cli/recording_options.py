@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 # Written out, because reading them from depthtrack.geometry.camera would make `--help` wait for numpy.
 PresetName = Literal["kinect1", "kinect2", "realsense", "tum"]
-Pixels = Annotated[float | None, number(-(10**6), 10**6, metavar="PIXELS")]
+FocalLength = Annotated[float | None, number(0.01, 10**6, metavar="PIXELS")]
+Place = Annotated[float | None, number(-(10**6), 10**6, metavar="PIXELS")]
 
 
 @dataclass(frozen=True)
@@ -32,13 +33,13 @@ class RecordingOptions:
     ROS or Kalibr."""
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor or of the TUM RGB-D benchmark, in place of the recording's own."""
-    fx: Pixels = None
+    fx: FocalLength = None
     """Horizontal focal length. Replaces that of the file or preset, or defines a camera together with --depth-scale."""
-    fy: Pixels = None
+    fy: FocalLength = None
     """Vertical focal length (default: --fx)."""
-    cx: Pixels = None
+    cx: Place = None
     """Column of the principal point (default: the centre of the image)."""
-    cy: Pixels = None
+    cy: Place = None
     """Row of the principal point (default: the centre of the image)."""
     depth_scale: Annotated[float | None, number(1e-9, 10, metavar="METRES")] = None
     """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
