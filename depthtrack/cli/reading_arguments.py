@@ -26,7 +26,7 @@ class ReadingArguments:
     """Mirror the images left to right. The camera is that of the mirrored images."""
     depth_only: bool = False
     """Ignore colour."""
-    distortion: Annotated[tuple[float, ...], stated_default(metavar="K1 K2 P1 P2 K3...")] = ()
+    distortion: Annotated[tuple[float, ...], number(-10_000, 10_000, metavar="K1 K2 P1 P2 K3...")] = ()
     """Lens distortion of the given camera, to be removed (default: that of the camera file)."""
 
     @property

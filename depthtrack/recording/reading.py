@@ -21,7 +21,10 @@ class ReadingOptions:
     mirror: bool = option(False, "Mirror the images left to right; the camera is that of the mirrored images")
     depth_only: bool = option(False, "Ignore colour")
     distortion: tuple[float, ...] = option(
-        (), "Lens distortion of listed images, which is removed: k1 k2 p1 p2 k3 k4 k5 k6, of the given camera"
+        (),
+        "Lens distortion of listed images, which is removed: k1 k2 p1 p2 k3 k4 k5 k6, of the given camera",
+        least=-10_000,
+        most=10_000,
     )
 
     def __post_init__(self) -> None:
