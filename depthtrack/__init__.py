@@ -43,6 +43,15 @@ if TYPE_CHECKING:
     from depthtrack.hand.one_euro import OneEuroOptions as OneEuroOptions
     from depthtrack.hand.shape import HandShape as HandShape
     from depthtrack.hand.synergies import Synergies as Synergies
+    from depthtrack.live.frame_queue import queue_frames as queue_frames
+    from depthtrack.live.frames import LiveFrame as LiveFrame
+    from depthtrack.live.frames import LiveSource as LiveSource
+    from depthtrack.live.late_frames import LateFrames as LateFrames
+    from depthtrack.live.played_recording import PlayedRecording as PlayedRecording
+    from depthtrack.live.realsense import RealSenseSource as RealSenseSource
+    from depthtrack.live.tracking import LiveEstimate as LiveEstimate
+    from depthtrack.live.tracking import LiveReport as LiveReport
+    from depthtrack.live.tracking import track_live as track_live
     from depthtrack.markers.capture import MarkerCapture as MarkerCapture
     from depthtrack.markers.filled_capture import FilledCapture as FilledCapture
     from depthtrack.markers.filling.options import FillOptions as FillOptions
@@ -84,6 +93,12 @@ _MODULES = {
     "export.registry": ("EXPORTERS",),
     "geometry.camera": ("Camera",),
     "hand.kinematics": ("KEYPOINT_NAMES", "HandModel"),
+    "live.frame_queue": ("queue_frames",),
+    "live.late_frames": ("LateFrames",),
+    "live.frames": ("LiveFrame", "LiveSource"),
+    "live.played_recording": ("PlayedRecording",),
+    "live.realsense": ("RealSenseSource",),
+    "live.tracking": ("LiveEstimate", "LiveReport", "track_live"),
     "hand.one_euro": ("OneEuroFilter", "OneEuroOptions"),
     "hand.shape": ("HandShape",),
     "hand.synergies": ("Synergies",),

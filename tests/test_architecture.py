@@ -34,6 +34,7 @@ LAYERS = (
     ("viewing",),
     ("report",),
     ("api",),
+    ("live",),
     ("cli",),
 )
 """Packages and modules in import order. A layer imports from layers before it, never from its own or later ones."""

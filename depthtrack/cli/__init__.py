@@ -38,6 +38,7 @@ COMMANDS = {
     "segment": CommandEntry("depthtrack.cli.segment", "segment the hand in every frame: video, contact sheet, table"),
     "train-skin": CommandEntry("depthtrack.cli.train_skin", "train a skin colour model on labelled images"),
     "track": CommandEntry("depthtrack.cli.track", "track the hand of a recording and write a run folder"),
+    "live": CommandEntry("depthtrack.cli.live", "track a camera, or a recording played like one, and report latency"),
     "lift": CommandEntry("depthtrack.cli.lift", "lift 2D keypoints and depth images to metric poses"),
     "compare": CommandEntry("depthtrack.cli.compare", "compare trackers on recordings: table, results, report"),
     "evaluate": CommandEntry("depthtrack.cli.evaluate", "measure errors and time of runs"),
