@@ -38,7 +38,7 @@ class Command:
     """Replace the recording in OUT."""
 
     def run(self) -> None:
-        from depthtrack.recording.convert import convert
+        from depthtrack.recording.convert import MCAP, convert
 
         sequence, out = self.recording.open(), self.output.out
         total = min(len(sequence), self.frames or len(sequence))
@@ -48,3 +48,6 @@ class Command:
         skipped = len(sequence.damaged)
         left_out = f", {skipped} damaged ones left out" if skipped else ""
         print(f"wrote {out}: {count} frames{left_out}")
+        truth = sequence.ground_truth
+        if truth is not None and truth.benchmark is not None and out.suffix.lower() != MCAP:
+            print(f"left out: joints of {truth.benchmark.benchmark.name} that are no keypoints of docs/joints.md")

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.errors import DamagedFrameError, InputError
-from depthtrack.recording.video_frames import VideoFrames, library, video_stream
+from depthtrack.recording.video_frames import VideoFrames, library, open_video, video_stream
 from depthtrack.types import Array
 
 FEWEST_BITS = 10
@@ -33,7 +33,7 @@ class DepthVideo:
         """
         self.path, av = path, library()
         try:
-            with av.open(str(path)) as container:
+            with open_video(path) as container:
                 self.pixel_format, self.bits = _checked_format(video_stream(container, path, number), path)
         except av.FFmpegError as error:
             raise InputError(f"{path} cannot be read as a video: {error.strerror}") from error
@@ -61,7 +61,7 @@ class DepthVideo:
 
 def sample_format(stream: Any) -> tuple[str, int]:
     """Return FFmpeg's name of the pixel format of a stream, and the bits of its first channel."""
-    pixel_format = stream.codec_context.format
+    pixel_format = stream.codec_context and stream.codec_context.format
     return (str(pixel_format.name), int(pixel_format.components[0].bits)) if pixel_format else ("unknown", 0)
 
 

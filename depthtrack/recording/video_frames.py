@@ -44,7 +44,7 @@ class VideoFrames:
         self.path, self._number = path, number
         self._av = library()
         try:
-            with self._av.open(str(path)) as container:
+            with open_video(path) as container:
                 stream = video_stream(container, path, number)
                 self.width, self.height = stream.codec_context.width, stream.codec_context.height
                 self._times, self._keys = _listed(container, stream, path)
@@ -112,7 +112,7 @@ class VideoFrames:
 
     def _from(self, time: int) -> Iterator[Any]:
         """Yield the decoded frames from the key frame at or before a time."""
-        with self._av.open(str(self.path)) as container:
+        with open_video(self.path) as container:
             stream = container.streams.video[self._number]
             container.seek(time, stream=stream)
             yield from container.decode(stream)
@@ -127,11 +127,22 @@ def library() -> Any:
     return av
 
 
+def open_video(path: Path) -> Any:
+    """Return a file that PyAV has opened; text in it that is not UTF-8 is ignored.
+
+    Raises MissingExtraError, or an error of PyAV.
+    """
+    return library().open(str(path), metadata_errors="ignore")
+
+
 def video_stream(container: Any, path: Path, number: int = 0) -> Any:
     """Return a video stream of an opened file by its number. Raises InputError."""
     if len(container.streams.video) <= number:
         raise InputError(f"{path} must hold a video stream, found none")
-    return container.streams.video[number]
+    stream = container.streams.video[number]
+    if stream.codec_context is None:
+        raise InputError(f"{path} must hold a video stream of a known codec, found an unknown one")
+    return stream
 
 
 def _lasts_longer(container: Any, times: Array) -> bool:

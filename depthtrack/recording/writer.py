@@ -1,5 +1,6 @@
 """Writing of sequence folders, complete or absent; equal input gives equal bytes."""
 
+import math
 import os
 import secrets
 import shutil
@@ -109,7 +110,7 @@ class SequenceWriter:
         colour: (h, w, 3) RGB.
         mask: (h, w) of the hand.
         pose: (27,) metres, quaternion, radians, camera frame.
-        joints: (21, 3) metres, camera frame.
+        joints: (21, 3) metres, camera frame; NaN if unknown.
         keypoints: in the depth image, from a detector.
 
         Frames may lack ground truth, but all annotated frames have the same parts.
@@ -133,7 +134,8 @@ class SequenceWriter:
             self._submit(kind, stem, image.copy())
         for (name, header), values in truth.items():
             # repr is the shortest text that reads back as the same float64.
-            self._write_line(name, ",".join(header), ",".join([stem, *map(repr, values.ravel().tolist())]))
+            cells = ["" if math.isnan(value) else repr(value) for value in values.ravel().tolist()]
+            self._write_line(name, ",".join(header), ",".join([stem, *cells]))
         if keypoints is not None:
             self._write_line(KEYPOINTS_FILE, ",".join(HEADER), ",".join([stem, *keypoint_cells(keypoints)]))
 
@@ -180,7 +182,9 @@ class SequenceWriter:
             if values is None:
                 continue
             rows[table] = np.asarray(values, dtype=np.float64)
-            if rows[table].shape != shape or not np.all(np.isfinite(rows[table])):
+            # Joints may be unknown, which the table states as blank cells.
+            bad = np.isinf(rows[table]) if values is joints else ~np.isfinite(rows[table])
+            if rows[table].shape != shape or bad.any():
                 raise InputError(f"a row of {table[0]} must be {shape} finite numbers, found shape {rows[table].shape}")
         if pose is not None and abs(np.linalg.norm(np.asarray(pose)[ORIENTATION]) - 1) > QUATERNION_TOLERANCE:
             raise InputError("a pose's quaternion must have length 1: normalise it first")

@@ -154,6 +154,20 @@ def test_info_states_the_data_set_and_its_joints(tmp_path: Path, capsys: pytest.
         assert "data set" in printed
 
 
+def test_joints_that_are_keypoints_survive_a_conversion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for write in (nyu, icvl, ho3d):
+        path, out = write(tmp_path / write.__name__), tmp_path / f"{write.__name__}-folder"
+        assert main(["convert", str(path), str(out)]) == 0
+        assert ("are no keypoints" in capsys.readouterr().out) == (write is not ho3d)
+        before, after = open_sequence(path).ground_truth, open_sequence(out).ground_truth
+        if write is icvl:
+            assert after is None
+            continue
+        assert before is not None
+        assert after is not None
+        np.testing.assert_array_equal(after.joints, before.joints)
+
+
 # MSRA15
 
 

@@ -96,6 +96,16 @@ def test_a_cut_video_plays_to_the_cut_and_says_so(tmp_path: Path) -> None:
         open_sequence(path, CAMERA)
 
 
+def test_text_of_another_encoding_is_ignored_and_an_unknown_codec_is_refused(tmp_path: Path) -> None:
+    path = sample(tmp_path / "set") / VIDEO
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"Lavf", b"La\xff\xfe"))
+    np.testing.assert_allclose(open_sequence(path, CAMERA)[3].depth, DEPTHS[3], atol=step(1.0))
+    path.write_bytes(data.replace(b"hev1", b"zzzz"))
+    with pytest.raises(InputError, match=r"file-000\.mp4"):
+        open_sequence(path, CAMERA)
+
+
 def test_depth_as_colours_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     root = lerobot.write_info(tmp_path / "set")
     grey = [np.full((24, 32), k, dtype=np.uint16) for k in range(3)]

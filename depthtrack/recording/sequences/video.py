@@ -22,7 +22,7 @@ from depthtrack.recording.depth_video import FEWEST_BITS, DepthVideo, sample_for
 from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
-from depthtrack.recording.video_frames import VideoFrames, library
+from depthtrack.recording.video_frames import VideoFrames, library, open_video
 from depthtrack.types import Depth, Image
 
 _MATROSKA, _MP4, _RIFF = b"\x1a\x45\xdf\xa3", b"ftyp", b"RIFF"
@@ -148,7 +148,7 @@ class _Streams:
         """Read the header. Raises InputError if no stream holds depth."""
         av = library()
         try:
-            with av.open(str(path)) as container:
+            with open_video(path) as container:
                 videos = list(container.streams.video)
                 titles = [str(stream.metadata.get("title", "")).upper() for stream in videos]
                 formats = [sample_format(stream) for stream in videos]
