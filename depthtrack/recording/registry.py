@@ -80,5 +80,7 @@ def _format_of(path: Path) -> type[BaseSequence]:
             return candidate
     if (advice := _ADVICE.get(path.suffix.lower())) is not None:
         raise InputError(f"{path} has a format that only the library of its maker reads: {advice}")
-    known = " or ".join(candidate.format_name for candidate in formats())
-    raise InputError(f"{path} must be {known}, found another format")
+    names = [candidate.format_name for candidate in formats()]
+    # A folder is no file that was mistaken for a recording, and the reverse.
+    alike = [name for name in names if name.startswith("a folder") == path.is_dir()]
+    raise InputError(f"{path} must be {' or '.join(alike or names)}, found another format")

@@ -1,5 +1,6 @@
 """Bags of different makers: topics, units, cameras, and registered colour."""
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from depthtrack.recording import image_size, open_sequence
 from depthtrack.recording.reading import ReadingOptions
 from tests.geometry.test_registration import COLOUR, DEPTH, T_COLOUR_DEPTH, seen
 from tests.support.bags import ORBBEC_PROFILE, Bag, compose, depth_png
-from tests.support.recordings import CAMERA, colour_at, depth_at
+from tests.support.recordings import CAMERA, colour_at, depth_at, write_sample
 
 TIMES = (10.0, 10.033, 10.066)
 BROWN = (-0.28, 0.09, 0.001, -0.0007, -0.01)
@@ -153,6 +154,33 @@ def test_depth_in_metres_keeps_its_precision_and_loses_what_is_not_finite(tmp_pa
     np.testing.assert_array_equal(frame.depth[0, :3], 0)
     np.testing.assert_array_equal(frame.depth[1:], depth_at(0)[1:])
     assert frame.camera.depth_scale == 0.0002
+
+
+def test_compressed_depth_in_metres_is_quantised_inverse_depth(tmp_path: Path) -> None:
+    """The formula of image_transport_plugins, with its usual parameters."""
+    a, b = 100.0 * (100.0 + 1), 1 - 100.0 * (100.0 + 1) / 10.0
+    quantised = np.rint(a / depth_at(0).clip(0.1) + b).astype(np.uint16)
+    quantised[depth_at(0) == 0] = 0
+    png = struct.pack("<iff", 0, a, b) + depth_png(quantised)[12:]
+    bag = Bag()
+    bag.compressed("/depth/compressedDepth", TIMES[0], png, "32FC1; compressedDepth png")
+    bag.info("/camera_info", CAMERA)
+    (frame,) = open_sequence(bag.write(tmp_path / "film.mcap"))
+    np.testing.assert_allclose(frame.depth, depth_at(0), rtol=1e-4, atol=1e-6)
+
+
+def test_depth_compressed_by_rvl_is_rejected_with_advice(tmp_path: Path) -> None:
+    bag = Bag()
+    bag.compressed("/depth/compressedDepth", TIMES[0], bytes(40), "16UC1; compressedDepth rvl")
+    bag.info("/camera_info", CAMERA)
+    with pytest.raises(InputError, match="RVL is not read"):
+        open_sequence(bag.write(tmp_path / "film.mcap"))
+
+
+def test_a_folder_of_images_with_a_bag_in_it_is_a_folder_of_images(tmp_path: Path) -> None:
+    folder = write_sample(tmp_path / "sample")
+    compose(depth_at, None, CAMERA, TIMES).write(folder / "film.db3")
+    assert len(open_sequence(folder)) == 5
 
 
 def test_distortion_is_removed_and_noted(tmp_path: Path) -> None:

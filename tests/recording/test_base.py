@@ -80,8 +80,11 @@ def test_damaged_frames_of_a_new_format_are_skipped_or_rejected(path: Path) -> N
 
 
 def test_the_error_of_an_unknown_format_names_the_known_ones(path: Path) -> None:
-    with pytest.raises(InputError, match=r"must be a folder with depth\.txt .* or a \.npy file"):
+    with pytest.raises(InputError, match=r"must be a folder with depth\.txt \([\w -]+\), found another format"):
         open_sequence(path.parent)
+    (path.parent / "notes.txt").write_text("none")
+    with pytest.raises(InputError, match=r"must be a \.npy file, found another format"):
+        open_sequence(path.parent / "notes.txt")
 
 
 def test_formats_are_found_by_their_modules() -> None:

@@ -73,6 +73,7 @@ def size_of_image(message: Any, where: str) -> tuple[int, int]:
     if hasattr(message, "encoding"):
         width, height = int(message.width), int(message.height)
     else:
+        _check_not_rvl(message, where)
         width, height = decode_size(where, _png_of(bytes(message.data)))
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise DamagedFrameError(f"{where}: an image must have sides from 1 to {MAX_SIDE} pixels")
@@ -88,6 +89,7 @@ def depth_of(message: Any, unit: float, shape: tuple[int, int], where: str) -> D
         DamagedFrameError: if it is no depth, has another size, or is damaged.
     """
     encoding = encoding_of(message)
+    _check_not_rvl(message, where)
     if encoding not in _UNITS | _METRES:
         raise DamagedFrameError(
             f"{where}: depth must have the encoding 16UC1 or 32FC1, found {encoding[:40]!r}:"
@@ -101,6 +103,8 @@ def depth_of(message: Any, unit: float, shape: tuple[int, int], where: str) -> D
     stored = decode_depth(where, _png_of(data), shape)
     if encoding in _UNITS:
         return stored.astype(np.float32) * np.float32(unit)
+    if data[:8] == _PNG_SIGNATURE:
+        raise DamagedFrameError(f"{where}: compressed depth of floats must have a header before its PNG")
     _, a, b = struct.unpack("<iff", data[:_DEPTH_HEADER])
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return _clean(np.where(stored > 0, np.float32(a) / (stored.astype(np.float32) - np.float32(b)), 0))
@@ -123,6 +127,15 @@ def colour_of(message: Any, shape: tuple[int, int], where: str) -> Image:
         pixels = pixels[..., 0]
     converted = pixels if conversion is None else cv2.cvtColor(np.ascontiguousarray(pixels), conversion)
     return np.ascontiguousarray(converted, dtype=np.uint8)
+
+
+def _check_not_rvl(message: Any, where: str) -> None:
+    """Raise DamagedFrameError if depth is compressed by RVL."""
+    if "rvl" in str(getattr(message, "format", "")).lower():
+        raise DamagedFrameError(
+            f"{where}: depth compressed by RVL is not read: record the topic without /compressedDepth, or set the"
+            " format of compressedDepth to png"
+        )
 
 
 def _rows(message: Any, kind: np.dtype[Any], channels: int, shape: tuple[int, int], where: str) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 Messages of ROS 2 are decoded with the standard definitions. A ROS 1 bag states its own, which may extend them.
 """
 
+import re
 import struct
 from typing import Any
 
@@ -13,7 +14,8 @@ from depthtrack.recording.bags.storage import Storage, Topic
 from depthtrack.types import Index
 
 _STAMP_BYTES = 16
-_LONGEST_DEFINITION = 1 << 18
+_LONGEST_DEFINITION, _LONGEST_ARRAY = 1 << 18, 4096
+"""Characters of a message definition, and elements of an array of fixed length in it: code is generated from both."""
 
 
 class Messages:
@@ -101,7 +103,9 @@ class Messages:
         if topic.name not in self._own:
             from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-            if len(topic.definition) > _LONGEST_DEFINITION:
+            lengths = re.findall(r"\[(?:<=)?(\d+)\]", topic.definition)
+            is_long = any(len(length) > 4 or int(length) > _LONGEST_ARRAY for length in lengths)
+            if is_long or len(topic.definition) > _LONGEST_DEFINITION:
                 raise InputError(f"{self.storage.path}: the definition of {topic.name[:60]} is too long")
             store = get_typestore(Stores.EMPTY)
             store.register(get_types_from_msg(topic.definition, topic.kind))

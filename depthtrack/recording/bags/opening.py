@@ -64,7 +64,10 @@ class SplitStorage:
 def is_bag(path: Path) -> bool:
     """Return whether a path holds messages: a file of a known container, or a folder of them."""
     if path.is_dir():
-        return any(_kind_of(part) is not None or _is_compressed(part) for part in _parts_of(path))
+        # A folder with lists of images may hold the file that they were made from.
+        return not (path / "depth.txt").exists() and any(
+            _kind_of(part) is not None or _is_compressed(part) for part in _parts_of(path)
+        )
     return _kind_of(path) is not None or _is_compressed(path)
 
 
