@@ -3,6 +3,7 @@
 A new format is one module in `sequences/` with a subclass of BaseSequence: it is found by its presence there.
 """
 
+from collections import deque
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,8 @@ _ADVICE = {
     ".svo2": "export it to MCAP or to PNG images with ZED's own tools",
 }
 """What to do with files that only their maker's library reads, by suffix."""
+_MOST_FOLDERS = 20
+"""Folders below one that is no recording that are searched for the first recording."""
 
 
 def open_sequence(
@@ -80,7 +83,26 @@ def _format_of(path: Path) -> type[BaseSequence]:
             return candidate
     if (advice := _ADVICE.get(path.suffix.lower())) is not None:
         raise InputError(f"{path} has a format that only the library of its maker reads: {advice}")
+    if (inner := _first_inside(path)) is not None:
+        raise InputError(f"{path} is a folder of recordings, and no recording: give one of them, such as {inner}")
     names = [candidate.format_name for candidate in formats()]
     # A folder is no file that was mistaken for a recording, and the reverse.
     alike = [name for name in names if name.startswith("a folder") == path.is_dir()]
     raise InputError(f"{path} must be {' or '.join(alike or names)}, found another format")
+
+
+def _first_inside(path: Path) -> Path | None:
+    """Return the first recording in a folder or below it; None if the first folders hold none."""
+    waiting = deque([path])
+    for _ in range(_MOST_FOLDERS):
+        if not waiting:
+            return None
+        try:
+            folders = sorted(each for each in waiting.popleft().iterdir() if each.is_dir() and not each.is_symlink())
+        except OSError:
+            continue
+        for folder in folders[:_MOST_FOLDERS]:
+            if any(candidate.matches(folder) for candidate in formats() if not candidate.is_generic):
+                return folder
+        waiting.extend(folders[:_MOST_FOLDERS])
+    return None

@@ -154,6 +154,13 @@ def test_info_states_the_data_set_and_its_joints(tmp_path: Path, capsys: pytest.
         assert "data set" in printed
 
 
+@pytest.mark.parametrize("write", ALL)
+def test_the_folder_of_the_whole_data_set_names_a_recording_in_it(write: Write, tmp_path: Path) -> None:
+    path = write(tmp_path / "set")
+    with pytest.raises(InputError, match=f"give one of them, such as {path}"):
+        open_sequence(tmp_path)
+
+
 def test_joints_that_are_keypoints_survive_a_conversion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for write in (nyu, icvl, ho3d):
         path, out = write(tmp_path / write.__name__), tmp_path / f"{write.__name__}-folder"
