@@ -1,6 +1,7 @@
 """Shared fixtures, and how tests are divided among the workers of pytest-xdist."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.xdist_group(str(item.path.relative_to(item.config.rootpath))))
     if os.environ.get("PYTEST_XDIST_WORKER"):
         items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def failures_in_frames_end_tests() -> Iterator[None]:
+    """Raise unexpected failures inside a frame, which runs record and pass over, so that no test hides one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("depthtrack.tracking.pipeline.failure_text", lambda error: None)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -128,6 +128,8 @@ def _text(evaluation: "Evaluation") -> str:
         f"{evaluation.run.folder}: {evaluation.frames} frames of {evaluation.recording}, "
         f"{evaluation.lost_frames} without a trusted pose"
     ]
+    if failures := evaluation.run.failures:
+        lines.append(f"  {len(failures)} frames failed unexpectedly, first {next(iter(failures.values()))}")
     if losses.losses:
         mean = losses.time_to_recovery().statistics()["mean"]
         after = "" if mean is None else f" after {mean:.2f} s on average"

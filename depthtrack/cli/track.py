@@ -17,6 +17,7 @@ from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
 from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.cli.tracker_options import requested_run, requested_tracker
+from depthtrack.errors import DepthtrackError
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 
@@ -138,14 +139,17 @@ class TrackCommand:
 
     def _report(self, sequence: "Recording") -> None:
         from depthtrack.recording.depth_checks import no_hand_note
+        from depthtrack.recording.frame_failures import FAILURES_FILE, read_failures
         from depthtrack.recording.run_rows import read_rows
 
-        rows = read_rows(self.out)
-        if sequence.has_depth and not any(row.status.is_trusted for row in rows):
+        rows, failures = read_rows(self.out), read_failures(self.out)
+        if failures and len(failures) == len(rows):
+            raise DepthtrackError(f"each of {len(rows)} frames failed: {next(iter(failures.values()))}")
+        untrusted = sum(not row.status.is_trusted for row in rows)
+        if sequence.has_depth and untrusted == len(rows):
             print(no_hand_note(sequence))
-        print(
-            f"{self.out}: {len(rows)} frames, {sum(not row.status.is_trusted for row in rows)} without a trusted pose"
-        )
+        failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""
+        print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}")
         print(f"errors and timing:  depthtrack evaluate {self.out}")
 
 

@@ -90,6 +90,7 @@ class Evaluation:
             "tracker": self.configuration.tracker.name,
             "frames": self.frames,
             **self.losses.to_json(),
+            "failed_frames": len(self.run.failures),
             **{metric.name: metric.statistics() for metric in self.metrics},
             **({} if self.points is None else {f"finger_{self.points.metric}": fingers}),
             **({} if self.success is None else self.success.to_json()),

@@ -3,13 +3,14 @@
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
 agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. The cells of a pose are
 empty if there is none. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose.
+`failures.csv` lists frames in which something failed unexpectedly, if there are any.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,6 +24,7 @@ from depthtrack.hand.pose import FINGERS, POSE_SIZE
 from depthtrack.number_text import parse_numbers
 from depthtrack.outputs import locked
 from depthtrack.recording.branches import BRANCH_COLUMNS, branch_rows
+from depthtrack.recording.frame_failures import append_failure, keep_failures, read_failures
 from depthtrack.recording.run_rows import ROW_COLUMNS, RunRow, read_rows, row_cells
 from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.recording.status import Status
@@ -71,6 +73,7 @@ class RunWriter(Closing):
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
             kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
             rewrite_table(folder / "timings.csv", ("index", *self._stages), kept)
+            keep_failures(folder, frozenset(row.index for row in self.rows))
             branches = [cells for row in self.rows for cells in branch_rows(row.index, row.branches)]
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, branches)
         else:
@@ -79,9 +82,14 @@ class RunWriter(Closing):
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
             write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
 
-    def append(self, row: RunRow, stage_ms: dict[str, float]) -> None:
-        """Append the next frame and the milliseconds of its stages."""
+    def append(self, row: RunRow, stage_ms: dict[str, float], failure: str | None = None) -> None:
+        """Append the next frame and the milliseconds of its stages.
+
+        failure: what failed unexpectedly inside the frame, in one line.
+        """
         # The poses last: a kill between the writes leaves surplus rows in the other tables, which resuming drops.
+        if failure is not None:
+            append_failure(self.folder, row.index, failure)
         if row.branches:
             csv.writer(self._branches).writerows(branch_rows(row.index, row.branches))
             self._branches.flush()
@@ -107,6 +115,7 @@ class Run:
     spread: (T, 21) of the keypoints, metres, see `RunRow`.
     poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
     stage_ms: (T,) milliseconds of each stage.
+    failures: what failed unexpectedly, by the index of the frame.
     """
 
     folder: Path
@@ -121,6 +130,7 @@ class Run:
     spread: Array
     poses: Array
     stage_ms: dict[str, Array]
+    failures: Mapping[int, str] = field(default_factory=dict)
 
     @classmethod
     def load(cls, folder: Path) -> Self:
@@ -144,6 +154,7 @@ class Run:
             np.array([row.spread for row in rows], dtype=np.float64).reshape(-1, len(KEYPOINT_NAMES)),
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
+            read_failures(folder),
         )
 
 

@@ -15,6 +15,7 @@ from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.sequence import Frame
@@ -36,12 +37,14 @@ class TrackedFrame:
     observation: the segmented hand, None if there is none.
     estimate: what the tracker returned.
     segment_ms: time of the segmentation, milliseconds.
+    failure: what failed unexpectedly, in one line; None in a sound frame. A failed frame is absent.
     """
 
     frame: Frame
     observation: Observation | None
     estimate: Estimate
     segment_ms: float
+    failure: str | None = None
 
 
 class Pipeline:
@@ -68,23 +71,29 @@ class Pipeline:
 
         known: estimate that the tracker made of this frame before; the state is restored from it instead.
         """
-        observation, milliseconds = segment(
+        observation, milliseconds, failure = segment(
             frame, self._segmenter, self._model, self._tracker, self._keypoints, self._clock
         )
-        if known is not None:
-            self._tracker.restore([known])
-            estimate = known
-        elif observation is None:
+        estimate = known
+        if estimate is None and observation is not None:
+            try:
+                estimate = self._track(observation)
+            except Exception as error:
+                failure = failure_of(error)
+        elif estimate is not None:
+            self._tracker.restore([estimate])
+        if estimate is None:
             estimate = replace(ABSENT, timestamp=frame.timestamp)
             self._tracker.restore([estimate])
-        elif self._start_pose is not None:
-            estimate = self._tracker.start(observation, self._start_pose)
-        else:
-            estimate = self._tracker.track(observation)
         self._segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         if estimate.pose is not None:
             self._start_pose = None
-        return TrackedFrame(frame, observation, estimate, milliseconds)
+        return TrackedFrame(frame, observation, estimate, milliseconds, failure)
+
+    def _track(self, observation: Observation) -> Estimate:
+        if self._start_pose is not None:
+            return self._tracker.start(observation, self._start_pose)
+        return self._tracker.track(observation)
 
 
 class NoTracker:
@@ -129,10 +138,10 @@ def replay_frames(
     model = HandModel(hand)
     keypoints = KeypointGuide(model)
     for frame, estimate in frames:
-        observation, milliseconds = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
+        observation, milliseconds, failure = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
         segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
-        yield TrackedFrame(frame, observation, estimate, milliseconds)
+        yield TrackedFrame(frame, observation, estimate, milliseconds, failure)
 
 
 def segment(
@@ -142,15 +151,29 @@ def segment(
     guide: Guide,
     keypoints: KeypointGuide,
     clock: Callable[[], float],
-) -> tuple[Observation | None, float]:
-    """Return the observation of a frame, and the time in milliseconds.
+) -> tuple[Observation | None, float, str | None]:
+    """Return the observation of a frame, the time in milliseconds, and an unexpected failure.
 
     It is near the prediction, else near the keypoints of the frame.
     """
-    begun = clock()
-    pose = guide.predicted_pose(frame.timestamp)
-    observation = segmenter.segment(frame, roi_prior(model, keypoints.pose(frame) if pose is None else pose))
-    return observation, 1e3 * (clock() - begun)
+    begun, observation, failure = clock(), None, None
+    try:
+        pose = guide.predicted_pose(frame.timestamp)
+        observation = segmenter.segment(frame, roi_prior(model, keypoints.pose(frame) if pose is None else pose))
+    except Exception as error:
+        failure = failure_of(error)
+    return observation, 1e3 * (clock() - begun), failure
+
+
+def failure_of(error: Exception) -> str:
+    """Return one line on an unexpected error inside a frame.
+
+    Raises:
+        Exception: the error itself, if no frame is its cause, such as a file that cannot be read.
+    """
+    if (text := failure_text(error)) is None:
+        raise error
+    return text
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
@@ -184,7 +207,7 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
             estimate.spread,
             estimate.branches,
         )
-        run.append(row, {"segment": each.segment_ms, **estimate.stage_ms})
+        run.append(row, {"segment": each.segment_ms, **estimate.stage_ms}, each.failure)
         yield each
 
 
