@@ -32,6 +32,7 @@ lint: .venv/.ready-test
 
 # The long forms of the campaigns in tests/robustness: hours, at low priority.
 robustness: .venv/.ready-test
+	nice -n 19 $(BIN)/python -m tests.robustness.campaign --inputs 2000
 	nice -n 19 $(BIN)/python -m tests.robustness.failing_writes
 	nice -n 19 $(BIN)/python -m tests.robustness.option_matrix
 	nice -n 19 $(BIN)/python -m tests.robustness.flat_resources

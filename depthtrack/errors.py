@@ -19,6 +19,15 @@ class DepthtrackError(Exception):
         super().__init__(printable(message))
 
 
+def is_text(text: str) -> bool:
+    """Return whether text can be encoded; bytes of a file's name that are not UTF-8 cannot."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def printable(text: str) -> str:
     """Return text from elsewhere with its line breaks and other control characters escaped."""
     if text.isprintable():

@@ -21,7 +21,7 @@ _LINE_WIDTH = 160
 
 def check_size(path: Path, largest: int) -> None:
     """Raise InputError if `path` is not a regular file of at most `largest` bytes."""
-    if not path.is_file():
+    if not os.path.isfile(path):  # pathlib raises OSError for a name that is too long
         raise InputError(f"{path} is missing or no regular file")
     size = path.stat().st_size
     if size > largest:

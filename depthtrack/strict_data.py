@@ -9,6 +9,7 @@ import math
 import tomllib
 from typing import Any, NoReturn
 
+from depthtrack.errors import is_text
 from depthtrack.number_text import parse_number, shown
 
 DEEPEST = 40
@@ -99,10 +100,8 @@ def _defined(value: Any) -> Any:
 
 
 def _check_text(text: str) -> None:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise ValueError(f"expected Unicode text, found half a character in {shown(text)}") from None
+    if not is_text(text):
+        raise ValueError(f"expected Unicode text, found half a character in {shown(text)}")
 
 
 def _finite(text: str) -> float:

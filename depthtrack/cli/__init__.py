@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 from depthtrack import __version__
+from depthtrack.cli.arguments import check_arguments
 from depthtrack.cli.ending import (
     BROKEN_PIPE,
     INTERRUPTED,
@@ -67,6 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = arguments[0] if arguments else "--help"
     try:
         with terminable():
+            check_arguments(arguments)
             code = _run(name, arguments[1:])
         write_output()
         return code

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from depthtrack.closing import Closing
-from depthtrack.errors import InputError
+from depthtrack.errors import InputError, is_text
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
@@ -37,8 +37,11 @@ def configure(
 
     entries: `start`, `frames`, `on_damage` and `keypoints` of `RunConfiguration`, if not the defaults.
     """
+    place = str(path.resolve())
+    if not is_text(place):
+        raise InputError(f"the path of a recording must be UTF-8 text, found {place[:200]!r}: rename the folder")
     return RunConfiguration(
-        str(path.resolve()),
+        place,
         camera_fields(sequence.camera),
         parse_json(hand.to_json()),
         tracker,

@@ -11,7 +11,7 @@ from typing import Self
 import cv2
 import numpy as np
 
-from depthtrack.errors import InputError
+from depthtrack.errors import InputError, is_text
 from depthtrack.files import replace_atomically
 from depthtrack.types import Image
 
@@ -39,6 +39,8 @@ class VideoWriter:
     def __init__(self, path: Path, rate: float, codecs: tuple[str, ...] | None = None) -> None:
         if path.suffix.lower() not in (".mp4", ".webm"):
             raise InputError(f"a video file must end in .mp4 (or .webm), found '{path.name}'")
+        if not is_text(str(path)):
+            raise InputError(f"the path of a video must be UTF-8 text, found {str(path)[:80]!r}: choose another name")
         if not (np.isfinite(rate) and rate > 0):
             raise InputError(f"the frame rate of a video must be positive, found {rate!r}")
         self.path = path

@@ -106,7 +106,7 @@ KINDS = ("nothing", "plane", "tilted", "noise", "checks", "pixels", "discs", "bo
 @settings(max_examples=50)
 @given(st.lists(st.sampled_from(KINDS), min_size=1, max_size=4), st.booleans(), st.booleans(), seeds)
 def test_any_frames(kinds: list[str], with_colour: bool, guided: bool, seed: int) -> None:
-    """Frames of planes, noise, discs and borders in any order, with and without a predicted pose."""
+    """Frames of planes, noise, discs and borders, with and without a predicted pose."""
     rng = np.random.default_rng(seed)
     segmenter = Segmenter(SkinColourModel.default() if with_colour else None)
     for index, kind in enumerate(kinds):

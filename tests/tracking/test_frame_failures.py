@@ -32,7 +32,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @dataclass
 class Following:
-    """A tracker whose pose depends on the number of poses so far; fails in some frames, with its state half changed."""
+    """A tracker whose pose depends on the number of poses so far; it fails in some frames."""
 
     failing: dict[int, Exception]
     name: str = "following"

@@ -9,6 +9,7 @@ import tyro
 
 from depthtrack.cli.config_options import chosen_config, options_type
 from depthtrack.cli.markers.folder_options import FolderOptions
+from depthtrack.errors import printable
 from depthtrack.markers.filling.options import FillOptions
 
 if TYPE_CHECKING:
@@ -73,8 +74,9 @@ def print_gaps(folder: Path, filled: "FilledCapture", as_json: bool) -> None:
     print(f"  {'marker':24}{'gaps':>6}{'filled':>8}{'longest':>10}{'samples':>9}{'expected error':>16}  how")
     for row in rows:
         error = "-" if row["expected_error_mm"] is None else f"{row['expected_error_mm']:.2f} mm"
+        marker = printable(row["marker"])[:24]
         print(
-            f"  {row['marker'][:24]:24}{row['gaps']:>6}{row['filled']:>8}{row['longest_s']:>8.2f} s{row['samples']:>9}"
+            f"  {marker:24}{row['gaps']:>6}{row['filled']:>8}{row['longest_s']:>8.2f} s{row['samples']:>9}"
             f"{error:>16}  {', '.join(row['how'])}"
         )
 

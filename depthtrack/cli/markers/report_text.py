@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from depthtrack.errors import printable
 from depthtrack.strict_data import json_text
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def print_report(folder: Path, labelled: "LabelledCapture", as_json: bool, **ent
         length = sizes["hand_length"]
         print(f"  {name}: {length['mm']:.1f} mm long, standard deviation {length['sd_mm']:.1f} mm")
     for note in labelled.capture.notes:
-        print(f"  {note}")
+        print(f"  {printable(note)}")
     print(f"show it with  depthtrack view {folder}")
 
 

@@ -160,7 +160,7 @@ class ImageFiles:
     def path(self, name: str) -> Path:
         """Return the path of a listed image, which may not exist."""
         path = self._folder / name
-        if path.exists():
+        if os.path.exists(path):
             return path
         entries = self._entries(name.lower().rpartition("/")[0])
         other = entries.get(name.lower())

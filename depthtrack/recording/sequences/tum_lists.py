@@ -6,6 +6,7 @@ Source: Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IR
 """
 
 import math
+import os
 import re
 from bisect import bisect_left
 from collections.abc import Iterator
@@ -115,7 +116,7 @@ def images_of(path: Path, images: list[tuple[str, str, int]]) -> ImageList:
     files: list[ListedFile] = []
     whole = True
     for text, name, line in images:
-        where = f"{path}, line {line}" if path.is_file() else str(path)
+        where = f"{path}, line {line}" if os.path.isfile(path) else str(path)
         if not inside.holds(name):
             raise InputError(
                 f"{where}: the file {name!r:.80} must lie within the folder of the recording:"
