@@ -12,6 +12,7 @@ from depthtrack.errors import InputError, MissingExtraError
 from depthtrack.files import read_json, read_text
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.distortion import Distortion
+from depthtrack.strict_data import check_plain
 
 _SIZES = (("width", "height"), ("image_width", "image_height"), ("w", "h"))
 _MATRICES = ("intrinsic_matrix", "camera_matrix", "K", "k", "intrinsics")
@@ -21,6 +22,8 @@ _MODELS = {"radtan": "plumb_bob", "brown_conrady": "plumb_bob", "none": ""}
 """Names of the distortion of ROS by those of Kalibr and RealSense."""
 _NESTED = ("intrinsic", "intrinsics", "cam0", "camera", "depth", "depth_intrinsics")
 _MOST_LEVELS = 3
+_MOST_YAML = 1 << 16
+"""Bytes of a YAML file: its library reads a larger one for seconds."""
 
 
 @dataclass(frozen=True)
@@ -151,10 +154,15 @@ def _read_yaml(path: Path) -> Any:
         import yaml
     except ImportError as error:
         raise MissingExtraError("a camera in a YAML file", "yaml") from error
-    lines = (line for line in read_text(path).splitlines() if not line.startswith("%"))
+    lines = (line for line in read_text(path, _MOST_YAML).splitlines() if not line.startswith("%"))
     text = "\n".join(lines).replace("!!opencv-matrix", "")
     try:
-        return _first_document(yaml.safe_load_all(text))
+        # Aliases of aliases are a few bytes for any number of values.
+        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
+            raise InputError(f"{path} must have no aliases (*name), found some: write the values out")
+        fields = _first_document(yaml.safe_load_all(text))
+        check_plain(fields)
+        return fields
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read the camera file {path}: {str(error).splitlines()[0]:.120}") from error
 

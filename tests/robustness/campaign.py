@@ -24,7 +24,7 @@ from tests.robustness.readers import READERS, Reader
 
 KINDS: dict[str, tuple[Mutation, ...]] = {
     **dict.fromkeys((".json", ".gltf"), JSON),
-    **dict.fromkeys((".txt", ".csv", ".toml", ".tsv", ".trc", ".yml", ".jsonl"), TEXT),
+    **dict.fromkeys((".txt", ".csv", ".toml", ".tsv", ".trc", ".yml", ".yaml", ".jsonl"), TEXT),
     **dict.fromkeys((".npz", ".r3d"), ZIP),
     ".png": (change_png, change_png, *BINARY),
 }

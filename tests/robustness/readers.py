@@ -13,6 +13,7 @@ from depthtrack.evaluation.compare.specs import read_specs
 from depthtrack.evaluation.sweep.rows import Journal
 from depthtrack.export.uvd import read_uvd, write_uvd
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.camera_files import read_camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.pose import ANGLE_NAMES
@@ -43,8 +44,9 @@ from tests.markers.formats.test_mutations import FILES as CAPTURES
 from tests.recording import test_data_sets as data_sets
 from tests.support import lerobot
 from tests.support.markers import filled_hands, labelled_hands
+from tests.support.oni import write_oni
 from tests.support.record3d import copy_as_r3d
-from tests.support.recordings import CAMERA, depth_at, pose_at, write_plain_tum, write_sample
+from tests.support.recordings import CAMERA, TIMES, depth_at, pose_at, write_plain_tum, write_sample
 
 Make = Callable[[Path], Path]
 """Writes a sample into an empty folder, and returns the path to read."""
@@ -146,6 +148,31 @@ def _lerobot(folder: Path) -> Path:
     return folder / "set"
 
 
+def _video(folder: Path) -> Path:
+    codes = [np.rint(1000 * depth_at(k)).astype(np.uint16) for k in range(3)]
+    lerobot.write_video(folder / "v.mkv", codes, "ffv1", "gray16le", {}, container_format="matroska")
+    return folder / "v.mkv"
+
+
+def _kinect(folder: Path) -> Path:
+    from tests.support.matroska import calibration, write_azure_kinect
+
+    depth, colour = Camera(320, 288, 252.0, 252.0, 160.0, 166.0), Camera(1280, 720, 605.0, 605.0, 638.0, 366.0)
+    pictures = [np.full((*colour.shape, 3), 90, dtype=np.uint8)] * 2
+    images = [np.full(depth.shape, 600 + k, dtype=np.uint16) for k in range(2)]
+    return write_azure_kinect(folder / "k.mkv", images, pictures, calibration(depth, colour, np.eye(4)), (0.0, 0.04))
+
+
+def _bag(suffix: str, folder: Path) -> Path:
+    from tests.support.bags import compose
+
+    return compose(depth_at, None, CAMERA, TIMES[:3]).write(folder / f"a{suffix}")
+
+
+def _oni(folder: Path) -> Path:
+    return write_oni(folder / "a.oni", [np.rint(1000 * depth_at(k)).astype(np.uint16) for k in range(3)])
+
+
 def _run(folder: Path) -> Path:
     configuration = RunConfiguration(
         "recording", json.loads(CAMERA.to_json()), json.loads(HandShape().to_json()), CONFIGURATIONS["ik"]()
@@ -239,6 +266,10 @@ MAT = "\n".join(" ".join(["0.1"] * 26) for _ in range(3))
 TRACKERS = '["a"]\ntracker = "ik"\nicp_iterations = 3\n["b"]\ntracker = "pso"\nparticles = 20\n'
 JOURNAL = '{"x": 1, "y": 2.5}\n{"x": 2, "y": null}\n'
 MOTION = (resource_folder("sequences") / "everyday.toml").read_bytes()
+BAGS = (".bag", ".db3", ".mcap")
+YAML = (
+    "image_width: 32\nimage_height: 24\nK: [30.0, 0.0, 15.0, 0.0, 30.0, 11.0, 0.0, 0.0, 1.0]\nD: [0.1, 0.0, 0.0, 0.0]\n"
+)
 DATA_SETS = (data_sets.msra15, data_sets.nyu, data_sets.icvl, data_sets.dexycb, data_sets.ho3d)
 READERS = (
     Reader("sequence folder", _sample, read_recording, only=("*.txt", "*.json", "*.csv")),
@@ -248,9 +279,14 @@ READERS = (
     *(Reader(make.__name__, make, read_recording) for make in DATA_SETS),
     Reader("Record3D", _record3d, read_recording, only=("*.r3d",), library="lzfse"),
     Reader("LeRobot", _lerobot, read_lerobot, library="av"),
+    Reader("depth video", _video, read_lerobot, library="av"),
+    Reader("Azure Kinect", _kinect, read_recording, library="av"),
+    *(Reader(f"bag, {each}", partial(_bag, each), read_recording, library="rosbags") for each in BAGS),
+    Reader("OpenNI", _oni, read_recording),
     Reader("run folder", _run, read_run),
     Reader("keypoints.csv", one("k.csv", _keypoints), lambda path: len(read_keypoints(path))),
-    Reader("camera.json", one("camera.json", CAMERA.to_json), whole(Camera.from_json)),
+    Reader("camera.json", one("camera.json", CAMERA.to_json), whole(read_camera)),
+    Reader("camera.yaml", one("camera.yaml", lambda: YAML), whole(read_camera), library="yaml"),
     Reader("hand.json", one("hand.json", HandShape().to_json), whole(load_hand)),
     Reader("rigged hand", _glb, whole(load_hand), library="pygltflib", slow=True),
     Reader("skin model", _skin, whole(SkinColourModel.load)),
