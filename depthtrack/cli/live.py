@@ -64,9 +64,8 @@ class Command:
     """Threads of the renderer (default: one per core)."""
 
     def run(self) -> None:
-        from json import dumps
-
         from depthtrack.live.tracking import LiveReport
+        from depthtrack.strict_data import json_text
 
         self._check()
         report = LiveReport()
@@ -75,7 +74,7 @@ class Command:
             frames = self._warmed_up(source)
             tracker = stack.enter_context(self._tracker(source))
             self._show(source, self._tracked(frames, tracker, report), tracker)
-        print(dumps(report.to_fields(), indent=2, allow_nan=False) if self.json else report.text())
+        print(json_text(report.to_fields(), indent=2) if self.json else report.text())
 
     def _check(self) -> None:
         """Raise InputError if an option is out of range, or options exclude each other."""
