@@ -45,7 +45,7 @@ def page() -> str:
     parts += [
         "## Segmentation\n",
         "Entries of `segmentation` in `run.json`, and options of `track` and `segment`. The short forms are\n"
-        "`--skin-model` and `--wrist-margin` (in millimetres).\n",
+        "`--skin-model`, `--skin-from` and `--wrist-margin` (in millimetres).\n",
         _table(parameters(SegmentationOptions()), flag=True, prefix="segmentation."),
         "## Calibration\n",
         "Fields of `ViewChoiceOptions` and `CalibrationOptions`, which are set in Python.\n",

@@ -21,6 +21,8 @@ class SegmentationShortcuts:
 
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
+    skin_from: Annotated[int | None, number(0, 999_999, metavar="FRAME")] = None
+    """Take the skin colours from the hand in this frame, found by depth alone: a glove, or coloured light."""
     wrist_margin: Annotated[float | None, number(-50, 200, metavar="MM")] = None
     """Length of the forearm to keep beyond the wrist (default: 0), for comparison with silhouettes that include it."""
 
@@ -29,6 +31,8 @@ class SegmentationShortcuts:
         changed: dict[str, Any] = {}
         if self.skin_model is not None:
             changed["skin_model"] = str(self.skin_model)
+        if self.skin_from is not None:
+            changed["skin_from"] = self.skin_from
         if self.wrist_margin is not None:
             changed["wrist_margin"] = self.wrist_margin / 1000
         return dataclasses.replace(options, **changed)

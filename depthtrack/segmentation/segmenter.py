@@ -15,6 +15,7 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.roi_tracking import RoiPrior, segment_roi
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.skin_colour import SkinColourModel
+from depthtrack.segmentation.skin_of_frame import frame_for_skin, skin_of_frame
 
 
 class Segmenter:
@@ -38,9 +39,13 @@ class Segmenter:
         """Return a segmenter that uses skin colour if the recording has colour.
 
         Raises:
-            InputError: the file of skin colours cannot be read.
+            InputError: the file of skin colours cannot be read, or the frame that they are taken from shows no hand.
         """
-        return cls.from_options(options or SegmentationOptions(), sequence.has_colour)
+        options = options or SegmentationOptions()
+        if options.skin_from is None or not options.use_colour:
+            return cls.from_options(options, sequence.has_colour)
+        frame = frame_for_skin(sequence, options.skin_from)
+        return cls(skin_of_frame(frame, cls(None, options).segment(frame)), options)
 
     @classmethod
     def from_options(cls, options: SegmentationOptions, has_colour: bool) -> Self:

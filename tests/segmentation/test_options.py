@@ -26,6 +26,7 @@ def test_all_options_survive_json() -> None:
 def test_each_option_can_be_changed() -> None:
     usual = {each.path: each.default for each in parameters(SegmentationOptions())}
     new = {each.path: each.default for each in parameters(changed_options(skin_model="skin.json"))}
+    new["skin_from"] = changed_options(skin_from=1).skin_from  # excludes skin_model
     assert [path for path, value in usual.items() if new[path] == value] == []
 
 

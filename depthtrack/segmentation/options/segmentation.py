@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from depthtrack.errors import InputError
 from depthtrack.options import check_ranges, option
 from depthtrack.segmentation.options.arm import (
     ForearmOptions,
@@ -29,6 +30,12 @@ class SegmentationOptions:
     skin_model: str | None = option(
         None, "File of skin colours from `depthtrack train-skin`; published statistics (Jones and Rehg 2002) if absent"
     )
+    skin_from: int | None = option(
+        None,
+        "Frame of the recording whose hand, found by depth alone, gives the skin colours, as of a glove",
+        least=0,
+        most=999_999,
+    )
     wrist_margin: float = option(
         0.0, "Length of forearm that is kept beyond the wrist", unit="m", least=-0.05, most=0.2
     )
@@ -51,3 +58,5 @@ class SegmentationOptions:
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        if self.skin_from is not None and self.skin_model is not None:
+            raise InputError(f"skin_from must be without a skin_model, found {self.skin_from} and {self.skin_model!r}")
