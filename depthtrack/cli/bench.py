@@ -145,7 +145,7 @@ class Starts:
 class Command:
     """Measure speed, or the share of right starts, on this machine."""
 
-    what: tyro.conf.OmitSubcommandPrefixes[
+    measurement: tyro.conf.OmitSubcommandPrefixes[
         Annotated[Score, tyro.conf.subcommand("score")]
         | Annotated[Ik, tyro.conf.subcommand("ik")]
         | Annotated[Segment, tyro.conf.subcommand("segment")]
@@ -154,4 +154,4 @@ class Command:
     ]
 
     def run(self) -> None:
-        self.what.run()
+        self.measurement.run()

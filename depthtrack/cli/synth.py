@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 IMAGE_RATE = 30.0
 """Default number of images a second, Hz."""
-_OF_BOTH = {"motion", "out", "frames", "fps", "hand", "scale", "side", "seed", "marker_options", "overwrite", "threads"}
+_OF_BOTH = {"motion", "out", "frames", "fps", "hand", "scale", "side", "seed", "optical", "overwrite", "threads"}
 """Options of images and of markers."""
 
 
@@ -83,7 +83,7 @@ class Command:
     swapped_fingers: Annotated[float, number(0, 100, metavar="PERCENT")] = 2.0
     """Share of the frames in which the keypoints of two neighbouring fingers are exchanged."""
 
-    marker_options: tyro.conf.OmitArgPrefixes[MarkerOptions] = field(default_factory=MarkerOptions)
+    optical: tyro.conf.OmitArgPrefixes[MarkerOptions] = field(default_factory=MarkerOptions)
 
     overwrite: bool = False
     """Replace the recording in OUT."""
@@ -96,12 +96,12 @@ class Command:
             return
         if self.out is None:
             raise InputError(f"expected a folder to write to: use  depthtrack synth {self.motion} OUT")
-        if self.marker_options.is_unused:
+        if self.optical.is_unused:
             raise InputError("options of markers need a layout: give --markers, such as --markers 26")
-        if self.marker_options.markers is not None:
+        if self.optical.markers is not None:
             self._check_no_images()
             print(
-                self.marker_options.write(
+                self.optical.write(
                     self.motion, self.out, self._hand(), self.frames, self.fps, self.seed, self.overwrite
                 )
             )

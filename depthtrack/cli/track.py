@@ -165,10 +165,10 @@ def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]
     config = requested_tracker(arguments, run)
     options = options_type(config, arguments)
     segmentation = SegmentationArguments(arguments, None if run is None else run.segmentation)
-    field = ("options", Annotated[options, tyro.conf.OmitArgPrefixes], dataclasses.field(default_factory=options))
+    field = ("tracking", Annotated[options, tyro.conf.OmitArgPrefixes], dataclasses.field(default_factory=options))
     namespace = {
         "__doc__": TrackCommand.__doc__,
-        "tracker_config": property(lambda self: chosen_config(config, self.options)),
+        "tracker_config": property(lambda self: chosen_config(config, self.tracking)),
         "segmentation_options": property(
             lambda self: segmentation.chosen(self.segmentation, self.segmentation_shortcuts)
         ),

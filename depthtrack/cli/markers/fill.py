@@ -38,7 +38,7 @@ class FillCommand:
     """Print figures as JSON instead of a table."""
 
     @property
-    def filling(self) -> FillOptions:
+    def filling_options(self) -> FillOptions:
         """Options of the filling."""
         raise NotImplementedError
 
@@ -49,7 +49,7 @@ class FillCommand:
         from depthtrack.options import to_data
         from depthtrack.viewing.marker_gaps import gap_pages
 
-        options, given = self.filling, MarkerFolder.load(self.labelled.path)
+        options, given = self.filling_options, MarkerFolder.load(self.labelled.path)
         given.check_source()
         self.folder.check(given.labelled.models)
         filled = fill_gaps(given.labelled, options)
@@ -86,8 +86,8 @@ def command(arguments: Sequence[str]) -> tuple[type[FillCommand], Any]:
     kind = options_type(FillOptions(), arguments)
     namespace = {
         "__doc__": FillCommand.__doc__,
-        "filling": property(lambda self: chosen_config(FillOptions(), self.options)),
+        "filling_options": property(lambda self: chosen_config(FillOptions(), self.filling)),
     }
-    fields = [("options", Annotated[kind, tyro.conf.OmitArgPrefixes], field(default=kind()))]
+    fields = [("filling", Annotated[kind, tyro.conf.OmitArgPrefixes], field(default=kind()))]
     Command = make_dataclass("Command", fields, bases=(FillCommand,), frozen=True, namespace=namespace)
     return Command, Command(labelled=LabelledArgument(tyro.MISSING), folder=FolderOptions(tyro.MISSING))

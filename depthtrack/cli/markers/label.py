@@ -25,7 +25,7 @@ class LabelCommand:
 
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     folder: tyro.conf.OmitArgPrefixes[FolderOptions]
-    chosen: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
+    model: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
     start: tyro.conf.OmitArgPrefixes[StartOptions] = field(default_factory=StartOptions)
     calibrate: bool = True
     """Measure the sizes of the hands first, if enough frames show them; only the offline method does."""
@@ -33,14 +33,14 @@ class LabelCommand:
     """Print figures as JSON instead of a table."""
 
     @property
-    def labelling(self) -> LabellingOptions:
+    def labelling_options(self) -> LabellingOptions:
         """Options of the labelling."""
         raise NotImplementedError
 
     def run(self) -> None:
         from depthtrack.cli.markers.solution import solve_and_write
 
-        measures = self.calibrate and self.labelling.offline.use
+        measures = self.calibrate and self.labelling_options.offline.use
         solve_and_write(self, "label", "none", "if possible" if measures else "never")
 
 

@@ -43,7 +43,7 @@ class LabellingArguments:
     @property
     def field(self) -> tuple[str, Any, Any]:
         """Field of a command's dataclass: name, type and default."""
-        return ("options", Annotated[self.type, tyro.conf.OmitArgPrefixes], dataclasses.field(default=self.type()))
+        return ("labelling", Annotated[self.type, tyro.conf.OmitArgPrefixes], dataclasses.field(default=self.type()))
 
     def chosen(self, values: Any) -> LabellingOptions:
         """Return the options that the command line chose. Raises InputError if one is out of range."""
@@ -53,7 +53,7 @@ class LabellingArguments:
 def labelling_command(base: type[Any], arguments: Sequence[str]) -> tuple[type[Any], Any]:
     """Return a command with the options of the labelling, and its default values.
 
-    base: dataclass with a capture, a folder, and a property `labelling` to replace.
+    base: dataclass with a capture, a folder, and a property `labelling_options` to replace.
 
     Raises:
         InputError: if the arguments name no method.
@@ -61,7 +61,7 @@ def labelling_command(base: type[Any], arguments: Sequence[str]) -> tuple[type[A
     labelling = LabellingArguments(arguments)
     namespace = {
         "__doc__": base.__doc__,
-        "labelling": property(lambda self: labelling.chosen(self.options)),
+        "labelling_options": property(lambda self: labelling.chosen(self.labelling)),
     }
     Command = dataclasses.make_dataclass("Command", [labelling.field], bases=(base,), frozen=True, namespace=namespace)
     return Command, Command(capture=CaptureOptions(tyro.MISSING), folder=FolderOptions(tyro.MISSING))

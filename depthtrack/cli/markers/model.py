@@ -34,7 +34,7 @@ class Command:
     """Markers of a rigid body; the first one is its origin."""
     frame: Annotated[int | None, number(1, 10**9, metavar="FRAME")] = None
     """Frame that the body is taken from, counted from 1 (default: the median of all frames)."""
-    chosen: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
+    model: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
     name: Annotated[str | None, stated_default()] = None
     """Name of the model (default: the name of the file for a body, the side for a hand)."""
     prefix: str = ""
@@ -51,7 +51,7 @@ class Command:
         from depthtrack.markers.folder.contents import check_names
         from depthtrack.strict_data import json_text
 
-        if bool(self.body) == bool(self.chosen.models):
+        if bool(self.body) == bool(self.model.models):
             raise InputError("give either the markers of a rigid body (--body) or the layout of a hand (-m)")
         if self.name is not None:
             check_names([self.name])
@@ -72,7 +72,7 @@ class Command:
         from depthtrack.calibration.marker_sides import with_measured_sides
         from depthtrack.calibration.markers import calibrate_markers
 
-        models = self.chosen.load()
+        models = self.model.load()
         if len(models) != 1 or models[0].is_rigid:
             raise InputError("a hand is calibrated on the layout of one hand: give one -m, such as 13 or left:19")
         if self.rounds < 0:

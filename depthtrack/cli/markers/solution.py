@@ -19,13 +19,13 @@ class SolvingCommand(Protocol):
     @property
     def folder(self) -> "FolderOptions": ...
     @property
-    def chosen(self) -> "ModelOptions": ...
+    def model(self) -> "ModelOptions": ...
     @property
     def start(self) -> "StartOptions": ...
     @property
     def json(self) -> bool: ...
     @property
-    def labelling(self) -> "LabellingOptions": ...
+    def labelling_options(self) -> "LabellingOptions": ...
 
 
 def solve_and_write(
@@ -44,7 +44,7 @@ def solve_and_write(
     from depthtrack.markers.initialisation.started import save_started
     from depthtrack.options import to_data
 
-    models = command.chosen.load()
+    models = command.model.load()
     command.folder.check(models)
     capture = command.start.part(command.capture.read())
     with percent_bar() as show:
@@ -53,7 +53,7 @@ def solve_and_write(
             models,
             labels=labels,
             calibrate=calibrate,
-            labelling=command.labelling,
+            labelling=command.labelling_options,
             initialisation=command.start.initialisation,
             started=command.start.saved(models, len(capture)),
             progress=show,
@@ -63,7 +63,7 @@ def solve_and_write(
         "labels": labels,
         "calibrate": calibrate,
         "method": command.start.method,
-        "labelling": to_data(command.labelling),
+        "labelling": to_data(command.labelling_options),
     }
     measured: dict[str, Any] = {"sizes": _sizes(solution), "measured_sides": solution.measured_sides(models)}
     command.folder.write(solution.labelled, command.capture.path, configuration | measured)

@@ -24,7 +24,7 @@ class SolveCommand:
 
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     folder: tyro.conf.OmitArgPrefixes[FolderOptions]
-    chosen: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
+    model: tyro.conf.OmitArgPrefixes[ModelOptions] = field(default_factory=ModelOptions)
     start: tyro.conf.OmitArgPrefixes[StartOptions] = field(default_factory=StartOptions)
     labels: Literal["auto", "file", "none"] = "auto"
     """Use the labels of the file, find them, or (auto) find them if the file lacks those of a model."""
@@ -34,7 +34,7 @@ class SolveCommand:
     """Print figures as JSON instead of a table."""
 
     @property
-    def labelling(self) -> LabellingOptions:
+    def labelling_options(self) -> LabellingOptions:
         """Options of the labelling."""
         raise NotImplementedError
 
