@@ -64,8 +64,8 @@ def page() -> str:
         "Options of `markers fill`, in `markers.json` under `filling`; fields of `FillOptions` in Python.\n",
         _table(parameters(FillOptions()), flag=True),
         "## Starts and calibration of optical markers\n",
-        "Fields of `InitialisationOptions` and `MarkerCalibrationOptions`, which are set in Python. `--method paper` sets the\n"
-        "method of the start.\n",
+        "Fields of `InitialisationOptions` and `MarkerCalibrationOptions`, which are set in Python. `--method paper`\n"
+        "sets the method of the start.\n",
         _table([*parameters(InitialisationOptions()), *parameters(MarkerCalibrationOptions())], flag=False),
         "## Calibration\n",
         "Fields of `ViewChoiceOptions` and `CalibrationOptions`, which are set in Python.\n",

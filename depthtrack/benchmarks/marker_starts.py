@@ -31,6 +31,8 @@ from depthtrack.types import Array, Index
 MOTIONS = ("everyday", "grasp", "random")
 CONDITIONS = {"complete": (0, 0.0), "5 ghosts": (5, 0.0), "2 ghosts, 10 % missing": (2, 0.1)}
 """Number of ghosts and share of missing markers, by name."""
+TOUCHING = "two hands touch, 2 ghosts, 10 % missing"
+"""Condition of the last row of a layout."""
 SURE = 0.9
 """Confidence from which on a start counts as sure."""
 _PLACEMENT, _NOISE = 0.003, 0.0005
@@ -39,6 +41,8 @@ _GHOSTS_WITHIN = 0.15
 """Largest distance of a ghost from the centre of the markers along each axis, metres."""
 _LONGEST = 5.0
 """Time in a random motion that frames are taken from, seconds."""
+_TOUCH, _TOUCH_RATE = 1.25, 20.0
+"""Time from the first frame of a capture to the middle of a touch, seconds, and rate of the frames, Hz."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class StartsPlan:
     @property
     def row_count(self) -> int:
         """Number of rows of the report."""
-        return len(self.layouts) * len(CONDITIONS) if self.capture is None else len(self.models)
+        return len(self.layouts) * (len(CONDITIONS) + 1) if self.capture is None else len(self.models)
 
 
 @dataclass(frozen=True)
@@ -160,6 +164,11 @@ def _synthetic_rows(plan: StartsPlan) -> Iterator[StartsRow]:
                 points, truth = synthetic_frame(seed, layout, side, ghosts, missing)
                 trials += _trials([searches[side]], points, [truth], options)
             yield _row(layout, condition, trials)
+        trials = []
+        for seed in range(plan.seed, plan.seed + plan.trials):
+            points, truths = touching_frame(seed, layout, *CONDITIONS["2 ghosts, 10 % missing"])
+            trials += _trials([searches["right"], searches["left"]], points, truths, options)
+        yield _row(layout, TOUCHING, trials)
 
 
 def _worn(layout: str, side: Side) -> MarkerModel:
@@ -177,14 +186,42 @@ def synthetic_frame(seed: int, layout: str, side: Side, ghosts: int, missing: fl
     made = synthesise_markers(
         MarkerSynthesis(motion, layout, hand, start=0.9 * time, frames=1, placement=_PLACEMENT, seed=seed)
     )
-    markers = made.positions[0][0] + rng.normal(0, _NOISE, made.positions[0][0].shape)
+    points, (truth,) = _measured(rng, [made.positions[0][0]], ghosts, missing)
+    return points, truth
+
+
+def touching_frame(seed: int, layout: str, ghosts: int, missing: float) -> tuple[Array, list[Index]]:
+    """Return points as `synthetic_frame` does, of a right and a left hand that touch."""
+    rng, motion = np.random.default_rng(seed), MOTIONS[seed % len(MOTIONS)]
+    frame = round(_TOUCH * _TOUCH_RATE)
+    latest = (load_motion(motion).duration or _LONGEST) - _TOUCH
+    made = synthesise_markers(
+        MarkerSynthesis(
+            motion,
+            layout,
+            two_hands=True,
+            touching=True,
+            start=0.9 * rng.uniform(0, latest),
+            frames=frame + 1,
+            rate=_TOUCH_RATE,
+            placement=_PLACEMENT,
+            seed=seed,
+        )
+    )
+    return _measured(rng, [positions[frame] for positions in made.positions], ghosts, missing)
+
+
+def _measured(rng: np.random.Generator, hands: list[Array], ghosts: int, missing: float) -> tuple[Array, list[Index]]:
+    """Return shuffled points (K, 3) with ghosts, and the point (M,) of each marker of each hand."""
+    exact = np.concatenate(hands)
+    markers = exact + rng.normal(0, _NOISE, exact.shape)
     seen = rng.random(len(markers)) >= missing
     clutter = markers.mean(axis=0) + rng.uniform(-_GHOSTS_WITHIN, _GHOSTS_WITHIN, (ghosts, 3))
     points = np.concatenate([markers[seen], clutter])
     order = rng.permutation(len(points))
     truth = np.full(len(markers), -1)
     truth[seen] = np.argsort(order)[: seen.sum()]
-    return points[order], truth
+    return points[order], np.split(truth, np.cumsum([len(hand) for hand in hands])[:-1])
 
 
 def _recorded_rows(plan: StartsPlan, path: Path) -> Iterator[StartsRow]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from depthtrack.benchmarks import marker_starts
-from depthtrack.benchmarks.marker_starts import synthetic_frame
+from depthtrack.benchmarks.marker_starts import synthetic_frame, touching_frame
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.markers.formats.registry import write_capture
@@ -33,8 +33,17 @@ def test_synthetic_frames_have_shuffled_points_and_their_truth() -> None:
 def test_rows_of_a_layout_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "starts", "--layouts", "13", "--trials", "1", "--seed", "3", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
-    assert [row["condition"] for row in rows] == list(marker_starts.CONDITIONS)
+    assert [row["condition"] for row in rows] == [*marker_starts.CONDITIONS, marker_starts.TOUCHING]
     assert rows[0]["right"] == 1
+    assert rows[-1]["trials"] == 2
+
+
+def test_hands_of_a_frame_touch() -> None:
+    points, (right, left) = touching_frame(4, "13", 2, 0.0)
+    assert len({*right.tolist(), *left.tolist()}) == 26
+    assert len(points) == 28
+    apart = np.linalg.norm(points[right][:, None] - points[left], axis=-1)
+    assert apart.min() < 0.05
 
 
 def test_labels_of_a_capture_are_the_truth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

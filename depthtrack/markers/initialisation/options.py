@@ -31,7 +31,7 @@ class SearchOptions:
     noise: float = option(
         0.001, "Standard deviation of a measured point, its marker's spread aside", unit="m", least=1e-6
     )
-    missing: float = option(11.0, "Energy of a marker without a point, half a squared deviation", most=10000)
+    missing: float = option(8.0, "Energy of a marker without a point, half a squared deviation", most=10000)
     coarse: float = option(0.012, "Standard deviation that the steps of the search add", unit="m", least=1e-6)
     rotations: int = option(150, "Orientations that each posture is aligned from", least=1)
     palms: int = option(60, "Palms whose fingers are searched closely", least=1)
@@ -45,6 +45,7 @@ class SearchOptions:
     temperature: float = option(
         1.0, "Divides the energies that the confidence is computed from; 1: as probabilities", least=1e-4
     )
+    contested: float = option(1.5, "Factor of the temperature where hands claim the same points", least=1e-4)
 
 
 @dataclass(frozen=True)

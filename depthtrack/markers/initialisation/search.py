@@ -2,17 +2,18 @@
 
 Markers may be missing, points may be ghosts, and hands may touch.
 Rigid bodies come first, because their distances are exact. Each hand is then searched among all other points. If two
-hands claim the same points, each is searched again without the points of the other, and the more probable pair is kept.
+hands claim the same points, each is searched again without the points of the other. The most probable hypotheses
+without common points are kept together, and all such choices count in their confidence.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
 from depthtrack.markers.initialisation.hand_search import HandSearch
-from depthtrack.markers.initialisation.hypotheses import Hypothesis
+from depthtrack.markers.initialisation.hypotheses import Hypothesis, unique
+from depthtrack.markers.initialisation.joint_choice import Chosen, choose_jointly
 from depthtrack.markers.initialisation.options import SearchOptions
 from depthtrack.markers.initialisation.rigid_bodies import body_hypotheses
 from depthtrack.markers.initialisation.started import StartedModel
@@ -21,6 +22,8 @@ from depthtrack.markers.models.sized_fit import PosturePrior, SizedFitter
 from depthtrack.types import Array, Index, Mask
 
 _BODY_CHOICES = 12
+_HAND_CHOICES = 40
+"""Most hypotheses of a search for a hand that are combined with those of other hands."""
 _FEWEST_POINTS = 3
 
 
@@ -71,49 +74,30 @@ def started_models(searches: list[ModelSearch], points: Array) -> tuple[StartedM
     bodies = [k for k, search in enumerate(searches) if search.hand is None]
     hands = [k for k, search in enumerate(searches) if search.hand is not None]
     every = np.ones(len(points), dtype=np.bool_)
-    found = {k: searches[k].hypotheses(points, every) for k in bodies}
-    found = _disjoint({k: found[k][:_BODY_CHOICES] for k in bodies}, searches)
-    free = _without(every, [found[k] for k in bodies])
-    found |= _hands(hands, searches, points, free)
-    return tuple(_started(searches[k], found[k], points) if found[k] else None for k in range(len(searches)))
+    chosen = _chosen({k: searches[k].hypotheses(points, every)[:_BODY_CHOICES] for k in bodies}, searches)
+    free = _without(every, [None if one is None else one.hypothesis for one in chosen.values()])
+    chosen |= _chosen_hands(hands, searches, points, free)
+    return tuple(_started(search, chosen[k], points) for k, search in enumerate(searches))
 
 
-def _hands(hands: list[int], searches: list[ModelSearch], points: Array, free: Mask) -> dict[int, list[Hypothesis]]:
-    """Return the hypotheses of the hands, the best ones without common points."""
-    alone = {k: searches[k].hypotheses(points, free) for k in hands}
-    if _are_disjoint([alone[k][0].points for k in hands if alone[k]]):
-        return alone
-    best, least = alone, np.inf
-    for order in permutations(hands):
-        left, found = free, {}
-        for k in order:
-            found[k] = alone[k] if left is free else searches[k].hypotheses(points, left)
-            left = _without(left, [found[k]])
-        energy = sum(found[k][0].energy if found[k] else searches[k].absent() for k in hands)
-        if energy < least:
-            best, least = found, energy
-    return best
+def _chosen_hands(hands: list[int], searches: list[ModelSearch], points: Array, free: Mask) -> dict[int, Chosen | None]:
+    """Return the choice of each hand: alone, and beside the other hands if they claim common points."""
+    found = {k: searches[k].hypotheses(points, free)[:_HAND_CHOICES] for k in hands}
+    best = {k: some[0] for k, some in found.items() if some}
+    contested = not _are_disjoint([h.points for h in best.values()])
+    for k in hands if contested else ():
+        left = _without(free, [h for other, h in best.items() if other != k])
+        found[k] = unique([*found[k], *searches[k].hypotheses(points, left)[:_HAND_CHOICES]])
+    return _chosen(found, searches, contested)
 
 
-def _disjoint(found: dict[int, list[Hypothesis]], searches: list[ModelSearch]) -> dict[int, list[Hypothesis]]:
-    """Return the hypotheses, the best combination without common points first."""
-    keys = list(found)
-
-    def combined(n: int, taken: frozenset[int]) -> Iterator[tuple[float, tuple[int, ...]]]:
-        if n == len(keys):
-            yield 0.0, ()
-            return
-        k = keys[n]
-        for choice, h in [(-1, None), *enumerate(found[k])]:
-            mine = frozenset() if h is None else frozenset(h.points[h.points >= 0].tolist())
-            if not mine & taken:
-                energy = searches[k].absent() if h is None else h.energy
-                yield from ((energy + rest, (choice, *others)) for rest, others in combined(n + 1, taken | mine))
-
-    _, chosen = min(combined(0, frozenset()))
-    return {
-        k: [] if c < 0 else [found[k][c], *found[k][:c], *found[k][c + 1 :]] for k, c in zip(keys, chosen, strict=True)
-    }
+def _chosen(
+    found: dict[int, list[Hypothesis]], searches: list[ModelSearch], contested: bool = False
+) -> dict[int, Chosen | None]:
+    if not found:
+        return {}
+    options, absent = searches[0].options, {k: searches[k].absent() for k in found}
+    return choose_jointly(found, absent, options.temperature * (options.contested if contested else 1.0))
 
 
 def _are_disjoint(assigned: list[Index]) -> bool:
@@ -121,28 +105,28 @@ def _are_disjoint(assigned: list[Index]) -> bool:
     return len(np.unique(used)) == len(used)
 
 
-def _without(free: Mask, found: list[list[Hypothesis]]) -> Mask:
-    """Return the points that the best of some hypotheses leave."""
+def _without(free: Mask, found: Iterable[Hypothesis | None]) -> Mask:
+    """Return the points that some hypotheses leave."""
     left = free.copy()
-    for hypotheses in found:
-        if hypotheses:
-            left[hypotheses[0].points[hypotheses[0].points >= 0]] = False
+    for h in found:
+        if h is not None:
+            left[h.points[h.points >= 0]] = False
     return left
 
 
-def _started(search: ModelSearch, found: list[Hypothesis], points: Array) -> StartedModel:
-    """Return the first of different hypotheses."""
-    best, energies = found[0], np.array([h.energy for h in found])
+def _started(search: ModelSearch, chosen: Chosen | None, points: Array) -> StartedModel | None:
+    if chosen is None:
+        return None
+    best = chosen.hypothesis
     model = search.fitter.fitted_model(best.sizes)
     seen = best.points >= 0
     e = model.positions(best.pose)[seen] - points[best.points[seen]]
-    relative = energies[0] - energies
     return StartedModel(
         model=model,
         pose=best.pose,
         points=best.points,
         energy=best.energy,
         residual=float(np.sqrt(np.square(e).sum(axis=-1).mean())),
-        margin=float(-relative[1:].max()) if len(found) > 1 else search.options.missing,
-        confidence=float(1 / np.exp(np.minimum(relative / search.options.temperature, 50)).sum()),
+        margin=chosen.margin if np.isfinite(chosen.margin) else search.options.missing,
+        confidence=chosen.confidence,
     )
