@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from depthtrack.api.comparing import comparison_table as comparison_table
     from depthtrack.api.lifting import lift as lift
     from depthtrack.api.live import HandTracker as HandTracker
+    from depthtrack.api.markers import evaluate_markers as evaluate_markers
     from depthtrack.api.markers import fill_markers as fill_markers
     from depthtrack.api.markers import label_markers as label_markers
     from depthtrack.api.markers import read_marker_folder as read_marker_folder
@@ -27,12 +28,14 @@ if TYPE_CHECKING:
     from depthtrack.api.runs import read_run as read_run
     from depthtrack.api.runs import track as track
     from depthtrack.api.synthetic import synthesise as synthesise
+    from depthtrack.api.synthetic import synthesise_markers as synthesise_markers
     from depthtrack.calibration.calibrate import Calibration as Calibration
     from depthtrack.calibration.marker_solution import MarkerSolution as MarkerSolution
     from depthtrack.calibration.rig_calibration import RigCalibration as RigCalibration
     from depthtrack.errors import DepthtrackError as DepthtrackError
     from depthtrack.errors import InputError as InputError
     from depthtrack.evaluation.evaluate import Evaluation as Evaluation
+    from depthtrack.evaluation.marker_evaluation import MarkerEvaluation as MarkerEvaluation
     from depthtrack.evaluation.metrics.metric import Metric as Metric
     from depthtrack.export.joint_track import JointTrack as JointTrack
     from depthtrack.export.registry import EXPORTERS as EXPORTERS
@@ -70,6 +73,9 @@ if TYPE_CHECKING:
     from depthtrack.segmentation.observation import Observation as Observation
     from depthtrack.segmentation.options import SegmentationOptions as SegmentationOptions
     from depthtrack.synthesis.generate import Synthesis as Synthesis
+    from depthtrack.synthesis.marker_capture import MarkerSynthesis as MarkerSynthesis
+    from depthtrack.synthesis.marker_capture import SyntheticMarkers as SyntheticMarkers
+    from depthtrack.synthesis.marker_measurement import MeasurementErrors as MeasurementErrors
     from depthtrack.tracking.pipeline import TrackedFrame as TrackedFrame
     from depthtrack.tracking.registry import tracker_config as tracker_config
     from depthtrack.tracking.tracker import Estimate as Estimate
@@ -79,15 +85,16 @@ _MODULES = {
     "api.comparing": ("compare", "comparison_table"),
     "api.lifting": ("lift",),
     "api.live": ("HandTracker",),
-    "api.markers": ("fill_markers", "label_markers", "read_marker_folder", "solve_markers"),
+    "api.markers": ("evaluate_markers", "fill_markers", "label_markers", "read_marker_folder", "solve_markers"),
     "api.measuring": ("calibrate", "calibrate_rig"),
     "api.runs": ("evaluate", "export_run", "joint_track", "read_run", "track"),
-    "api.synthetic": ("synthesise",),
+    "api.synthetic": ("synthesise", "synthesise_markers"),
     "calibration.calibrate": ("Calibration",),
     "calibration.marker_solution": ("MarkerSolution",),
     "calibration.rig_calibration": ("RigCalibration",),
     "errors": ("DepthtrackError", "InputError"),
     "evaluation.evaluate": ("Evaluation",),
+    "evaluation.marker_evaluation": ("MarkerEvaluation",),
     "evaluation.metrics.metric": ("Metric",),
     "export.joint_track": ("JointTrack",),
     "export.registry": ("EXPORTERS",),
@@ -116,6 +123,8 @@ _MODULES = {
     "segmentation.observation": ("Observation",),
     "segmentation.options": ("SegmentationOptions",),
     "synthesis.generate": ("Synthesis",),
+    "synthesis.marker_capture": ("MarkerSynthesis", "SyntheticMarkers"),
+    "synthesis.marker_measurement": ("MeasurementErrors",),
     "tracking.pipeline": ("TrackedFrame",),
     "tracking.registry": ("tracker_config",),
     "tracking.tracker": ("Estimate",),

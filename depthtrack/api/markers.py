@@ -1,10 +1,11 @@
-"""Label, solve and fill optical marker captures."""
+"""Label, solve, fill and evaluate optical marker captures."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from depthtrack.calibration.marker_solution import LabelSource, MarkerSolution, Measuring, Progress, solve_capture
+from depthtrack.evaluation.marker_evaluation import MarkerEvaluation, evaluate_marker_folder
 from depthtrack.hand.shape import HandShape
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.filled_capture import FilledCapture
@@ -139,6 +140,29 @@ def read_marker_folder(path: Path | str) -> MarkerFolder:
         print([model.name for model in folder.labelled.models])
     """
     return MarkerFolder.load(Path(path))
+
+
+def evaluate_markers(
+    folder: Path | str, *, labels: Path | str | None = None, truth: Path | str | None = None
+) -> MarkerEvaluation:
+    """Compare the labels, positions and angles of a marker folder with the truth.
+
+    labels: capture file with true labels of the same points.
+    truth: marker folder with true labels and poses, or a synthetic capture. Without both, the folder must have been
+        made from a synthetic capture.
+
+    Returns:
+        Accuracy, precision, recall, F1 and every wrong stretch; distances in millimetres; angles in degrees.
+
+    Raises:
+        InputError: a folder or file is missing or malformed, both truths are given, or none is found.
+
+    Example:
+        found = depthtrack.evaluate_markers("solved", labels="labelled.c3d")
+        print(found.labels.accuracy, found.positions.to_json()["measured"])
+    """
+    given, known = (None if path is None else Path(path) for path in (labels, truth))
+    return evaluate_marker_folder(Path(folder), given, known)
 
 
 def _opened(capture: MarkerCapture | Path | str) -> tuple[MarkerCapture, Source | None]:

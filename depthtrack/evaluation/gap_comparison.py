@@ -11,6 +11,7 @@ from depthtrack.hand.kinematics import body_of
 from depthtrack.markers.filled_capture import Gap
 from depthtrack.markers.filling.fill import fill_gaps
 from depthtrack.markers.filling.options import FillMethod, FillOptions
+from depthtrack.markers.filling.pca_fill import mean_distances
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.labelled_fit import fit_poses
 from depthtrack.types import Array, Index, Mask
@@ -18,7 +19,7 @@ from depthtrack.types import Array, Index, Mask
 _MARGIN = 5
 """Visible frames on both sides of a stretch."""
 _APART = 0.3
-"""Time between stretches, seconds: one marker at a time is cut."""
+"""Time between stretches of different markers, seconds."""
 TIPS = np.array([body_of(finger, 2) for finger in range(5)])
 """Bodies of the fingertips."""
 
@@ -59,11 +60,13 @@ def compare_filling(
     longest: int,
     seeds: Sequence[int],
     methods: Sequence[FillMethod],
+    together: int = 1,
     progress: Callable[[str, float], None] = lambda step, share: None,
 ) -> list[FillScore]:
     """Return the scores of each method over the stretches of all captures and seeds.
 
     shortest, longest: frames of a stretch.
+    together: neighbouring markers that are cut at about the same time.
     progress: called with the current step and the share of the work that is done.
 
     Raises:
@@ -73,7 +76,7 @@ def compare_filling(
     rounds = [(whole, seed) for whole in captures for seed in seeds]
     for number, (whole, seed) in enumerate(rounds):
         progress("fitting poses", number / len(rounds))
-        cut, gaps = cut_stretches(whole, shortest, longest, seed)
+        cut, gaps = cut_stretches(whole, shortest, longest, seed, together)
         for k, method in enumerate(methods):
             progress(method, (number + (k + 1) / (len(methods) + 1)) / len(rounds))
             options = FillOptions(method=method, longest=longest / whole.capture.rate)
@@ -83,19 +86,23 @@ def compare_filling(
 
 
 def cut_stretches(
-    labelled: LabelledCapture, shortest: int, longest: int, seed: int
+    labelled: LabelledCapture, shortest: int, longest: int, seed: int, together: int = 1
 ) -> tuple[LabelledCapture, tuple[Gap, ...]]:
     """Cut stretches out of visible markers, one after another; return capture and stretches.
 
     shortest, longest: frames of a stretch.
+    together: a marker and its nearest neighbours on its model, this many, lose stretches that overlap.
 
     All poses are fitted again, without what was cut.
     Raises InputError if the lengths are out of order, or no stretch fits.
     """
     if not 1 <= shortest <= longest:
         raise InputError(f"stretches must be from 1 frame up, the shorter length first, found {shortest} to {longest}")
+    if together < 1:
+        raise InputError(f"at least 1 marker must be cut, found {together}")
     generator = np.random.default_rng(seed)
     visible = [columns >= 0 for columns in labelled.columns]
+    distances = [mean_distances(labelled.positions(k)) for k in range(len(visible))]
     owners = [(k, m) for k, seen in enumerate(visible) for m in range(seen.shape[1])]
     apart = max(round(_APART * labelled.capture.rate), 2 * _MARGIN)
     gaps, t = [], apart
@@ -106,6 +113,11 @@ def cut_stretches(
         if usable:
             k, m = usable[int(generator.integers(len(usable)))]
             gaps.append(Gap(k, m, t, t + length))
+            near = sorted((other for j, other in usable if j == k and other != m), key=lambda o: distances[k][m, o])
+            for other in near[: together - 1]:
+                mine = int(generator.integers(min(shortest, length), length + 1))
+                first = t + int(generator.integers(length - mine + 1))
+                gaps.append(Gap(k, other, first, first + mine))
         t += length + apart
     if not gaps:
         raise InputError(f"no marker is visible for {shortest} frames: cut shorter stretches")

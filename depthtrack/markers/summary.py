@@ -11,11 +11,15 @@ from depthtrack.types import Mask
 
 @dataclass(frozen=True)
 class TrajectoryGaps:
-    """The gaps of a trajectory: number, longest one in frames, share of all frames."""
+    """The gaps of a trajectory: number, longest one in frames, share of all frames.
+
+    segments: number of runs of frames in which it was measured.
+    """
 
     label: str
     is_labelled: bool
     gaps: int
+    segments: int
     longest: int
     missing: float
 
@@ -25,7 +29,9 @@ class CaptureSummary:
     """Properties of a capture. Lengths are metres, times seconds.
 
     labelled, unlabelled: numbers of trajectories.
-    gaps, longest_gap, missing: of the labelled trajectories, of all if none is labelled; number, seconds, share.
+    gaps, longest_gap, missing: of the labelled trajectories, of all if none is labelled; number, seconds, share. A gap
+        is a run of frames without the marker, at an end of the capture too.
+    segments: number of runs of frames with the marker, of the same trajectories.
     points: least, median and largest number of measured points in a frame.
     lowest, highest: corners of the box that holds all points.
     neighbours: median distance between neighbouring points; None with one point a frame.
@@ -43,6 +49,7 @@ class CaptureSummary:
     labelled: int
     unlabelled: int
     gaps: int
+    segments: int
     longest_gap: float
     missing: float
     points: tuple[int, float, int]
@@ -77,6 +84,7 @@ def summarise_capture(capture: MarkerCapture) -> CaptureSummary:
         labelled=labelled,
         unlabelled=len(gaps) - labelled,
         gaps=sum(gap.gaps for gap in counted),
+        segments=sum(gap.segments for gap in counted),
         longest_gap=max(gap.longest for gap in counted) / capture.rate,
         missing=float(np.mean([gap.missing for gap in counted])),
         points=(int(visible.min()), float(np.median(visible)), int(visible.max())),
@@ -101,7 +109,7 @@ def gap_runs(measured: Mask) -> list[tuple[int, int]]:
 def _gaps(label: str, is_labelled: bool, measured: Mask) -> TrajectoryGaps:
     runs = gap_runs(measured)
     longest = max((length for _, length in runs), default=0)
-    return TrajectoryGaps(label, is_labelled, len(runs), longest, float(np.mean(~measured)))
+    return TrajectoryGaps(label, is_labelled, len(runs), len(gap_runs(~measured)), longest, float(np.mean(~measured)))
 
 
 def _residual(capture: MarkerCapture) -> float | None:

@@ -62,3 +62,18 @@ def test_labelling_writes_a_folder(made: SyntheticMarkers, tmp_path: Path, monke
     found = dt.read_marker_folder(tmp_path / "out")
     assert found.contents.source is None
     assert found.contents.configuration["command"] == "label"
+
+
+def test_a_synthetic_capture_is_made_solved_and_evaluated(tmp_path: Path) -> None:
+    errors = dt.MeasurementErrors(ghosts=0, dropouts=0.0)
+    made = dt.synthesise_markers("grasp", tmp_path / "made", layout="13", frames=12, rate=30.0, errors=errors, seed=4)
+    assert len(made.capture) == 12
+    again = dt.synthesise_markers(made.options, seed=5)
+    assert (again.options.seed, again.options.layout) == (5, "13")
+    dt.solve_markers(
+        tmp_path / "made" / "truth" / "labelled.csv", made.models, calibrate=False, out=tmp_path / "solved"
+    )
+    found = dt.evaluate_markers(tmp_path / "solved", truth=tmp_path / "made")
+    assert (found.frames, found.labels.f1) == (12, 1.0)
+    with pytest.raises(dt.InputError, match="give one of them"):
+        dt.evaluate_markers(tmp_path / "solved", truth=tmp_path, labels=tmp_path)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from depthtrack.cli import main
+from depthtrack.evaluation.gap_comparison import cut_stretches
 from depthtrack.markers.filled_capture import Filling
 from depthtrack.markers.folder.contents import Source
 from depthtrack.markers.folder.reading import MarkerFolder
@@ -70,7 +71,22 @@ def test_methods_are_compared(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert all(np.isclose(row["filled"], 1) for row in rows)
 
 
-@pytest.mark.parametrize("wrong", [["--methods", "magic"], ["--frames", "30", "20"], ["--frames", "900", "900"]])
+def test_neighbours_are_cut_together(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = MarkerFolder.load(folder).labelled
+    cut, gaps = cut_stretches(whole, 20, 30, 1, together=3)
+    assert len({(gap.marker, gap.start) for gap in gaps}) == len(gaps)
+    missing = (whole.columns[0] >= 0) & (cut.columns[0] < 0)
+    assert missing.sum() == sum(gap.length for gap in gaps)
+    assert missing.sum(axis=1).max() == 3
+    arguments = ["markers", "compare-filling", str(folder), "--frames", "20", "30", "--seeds", "1", "--together", "3"]
+    assert main([*arguments, "--methods", "spline"]) == 0
+    assert "3 neighbours at a time" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [["--methods", "magic"], ["--frames", "30", "20"], ["--frames", "900", "900"], ["--together", "0"]],
+)
 def test_unusable_comparisons_give_one_sentence(
     wrong: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,7 +34,8 @@ def test_summary() -> None:
     summary = summarise_capture(capture())
     assert (summary.frames, summary.first_frame, summary.duration) == (10, 12, 0.2)
     assert (summary.labelled, summary.unlabelled) == (2, 1)
-    assert (summary.gaps, summary.longest_gap, summary.missing) == (2, 0.04, 0.2)
+    # Measured segments: frames 0 and 1, and 4 to 7, of the thumb; all frames of the index.
+    assert (summary.gaps, summary.segments, summary.longest_gap, summary.missing) == (2, 3, 0.04, 0.2)
     assert summary.points == (1, 2.0, 3)
     assert summary.lowest == (0.1, 0.0, 0.0)
     assert summary.highest == pytest.approx((0.5, 0.0, 0.009))

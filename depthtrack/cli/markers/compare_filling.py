@@ -26,7 +26,8 @@ class FoldersArgument:
 class Command:
     """Cut stretches out of visible markers, and compare how each method fills them.
 
-    One marker at a time is cut, and all poses are fitted again without what was cut.
+    One marker at a time is cut, or several neighbours with --together, and all poses are fitted again without what was
+    cut.
     """
 
     labelled: tyro.conf.OmitArgPrefixes[FoldersArgument]
@@ -34,6 +35,8 @@ class Command:
     """Shortest and longest stretch."""
     seeds: Annotated[tuple[int, ...], number(0, MOST_SEED, metavar="SEED ...")] = (1000, 1001, 1002)
     """Seeds of the places; each cuts the whole capture once."""
+    together: int = 1
+    """Neighbouring markers that lose overlapping stretches, as where something hides a finger."""
     methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = (
         "smooth",
         "paper",
@@ -63,14 +66,15 @@ class Command:
         captures = [MarkerFolder.load(path).labelled for path in self.labelled.paths]
         methods = cast("tuple[FillMethod, ...]", self.methods)
         with percent_bar() as show:
-            scores = compare_filling(captures, *self.frames, self.seeds, methods, show)
+            scores = compare_filling(captures, *self.frames, self.seeds, methods, self.together, show)
         if self.json:
             print(json_text([score.row() for score in scores], indent=2))
         else:
             self._print(scores)
 
     def _print(self, scores: "list[FillScore]") -> None:
-        print(f"stretches of {self.frames[0]} to {self.frames[1]} frames, one marker at a time")
+        count = "1 marker" if self.together == 1 else f"{self.together} neighbours"
+        print(f"stretches of {self.frames[0]} to {self.frames[1]} frames, {count} at a time")
         print(f"  {'method':9}{'markers':12}{'samples':>9}{'filled':>9}{'median':>11}{'rms':>11}{'expected':>11}")
         for score in scores:
             row = score.row()

@@ -55,7 +55,7 @@ def _text(name: str, summary: "CaptureSummary") -> str:
         (
             "gaps",
             [
-                f"{summary.gaps}, longest {summary.longest_gap:.3f} s,"
+                f"{summary.gaps} between {summary.segments} measured segments, longest {summary.longest_gap:.3f} s,"
                 f" {100 * summary.missing:.2f} % of the {of_them} samples",
                 *_gap_lines(summary),
             ],

@@ -1,7 +1,8 @@
 """Expected error of filled samples: the factors are calibrated on synthetic captures.
 
 `smooth` knows its error up to a factor: from the posterior distribution of the postures, and from held-out parts of the
-capture. For the other methods the error grows with the time to the nearest measured frame of the marker.
+capture. For the other methods the error grows with the time to the nearest measured frame of the marker. For the
+baselines it is scaled by that of held-out stretches of the capture, see `held_out`.
 """
 
 import numpy as np

@@ -11,6 +11,7 @@ import numpy as np
 
 from depthtrack.markers.filled_capture import FilledCapture, Filling, Gap, measured_samples
 from depthtrack.markers.filling.expected_error import error_after
+from depthtrack.markers.filling.held_out import error_scale
 from depthtrack.markers.filling.options import FillOptions
 from depthtrack.markers.filling.paper_fill import paper_fill
 from depthtrack.markers.filling.pattern_fill import pattern_fill
@@ -36,7 +37,7 @@ def fill_gaps(labelled: LabelledCapture, options: FillOptions | None = None) -> 
     visible = [measured_samples(positions) for positions in measured]
     gaps = [gaps_to_fill(k, seen, rate, options) for k, seen in enumerate(visible)]
     predictions = _predictions(labelled, measured, gaps, options)
-    merged = [_merged(*each, rate, options) for each in zip(measured, visible, gaps, predictions, strict=True)]
+    merged = [_merged(*each) for each in zip(measured, visible, gaps, predictions, strict=True)]
     positions, how, error, poses = (tuple(parts) for parts in zip(*merged, strict=True))
     return FilledCapture(labelled, positions, how, error, poses)
 
@@ -50,19 +51,23 @@ def _predictions(
     if method == "smooth":
         return [smooth_fill(model, X, poses, some, rate, options.smooth) for model, X, poses, some in given]
     if method == "paper":
-        return [paper_fill(model, X, poses, options.paper) for model, X, poses, _ in given]
-    if method == "pca":
-        filled = _pca(labelled, measured, gaps, options)
-    elif method == "pattern":
-        filled = [pattern_fill(X, some, options.pattern) for _, X, _, some in given]
-    else:
-        filled = [spline_fill(X, some) for _, X, _, some in given]
-    return [_baseline(positions, poses, method) for positions, poses in zip(filled, labelled.poses, strict=True)]
+        return [paper_fill(model, X, poses, rate, options.paper) for model, X, poses, _ in given]
 
+    def fill(measured: list[Array], gaps: list[list[Gap]]) -> list[Array]:
+        if method == "pca":
+            return _pca(labelled, measured, gaps, options)
+        each = zip(measured, gaps, strict=True)
+        if method == "pattern":
+            return [pattern_fill(X, some, options.pattern) for X, some in each]
+        return [spline_fill(X, some) for X, some in each]
 
-def _baseline(positions: Array, poses: Array, method: str) -> Prediction:
-    shape = positions.shape[:2]
-    return Prediction(positions, np.full(shape, int(_FILLING[method])), np.full(shape, np.nan), poses)
+    scale = error_scale(fill, method, measured, gaps, rate)
+    errors = [scale * error_after(method, time_to_measured(measured_samples(X), rate)) for X in measured]
+    how = int(_FILLING[method])
+    return [
+        Prediction(positions, np.full(error.shape, how), error, poses)
+        for positions, error, poses in zip(fill(measured, gaps), errors, labelled.poses, strict=True)
+    ]
 
 
 def _pca(labelled: LabelledCapture, measured: list[Array], gaps: list[list[Gap]], options: FillOptions) -> list[Array]:
@@ -77,7 +82,7 @@ def _pca(labelled: LabelledCapture, measured: list[Array], gaps: list[list[Gap]]
 
 
 def _merged(
-    measured: Array, visible: Mask, gaps: list[Gap], prediction: Prediction, rate: float, options: FillOptions
+    measured: Array, visible: Mask, gaps: list[Gap], prediction: Prediction
 ) -> tuple[Array, Array, Array, Array]:
     """Return positions, how, expected error and poses of a model."""
     asked = np.zeros(visible.shape, dtype=np.bool_)
@@ -87,8 +92,5 @@ def _merged(
     filled = (asked | replaced) & np.isfinite(prediction.positions).all(axis=-1)
     how = np.where(visible, int(Filling.MEASURED), int(Filling.GAP))
     how = np.where(filled, prediction.how, how)
-    error = prediction.expected_error
-    if options.method != "smooth":
-        error = error_after(options.method, time_to_measured(visible & ~replaced, rate))
     positions = np.where(filled[..., None], prediction.positions, measured)
-    return positions, how, np.where(filled, error, np.nan), prediction.poses
+    return positions, how, np.where(filled, prediction.expected_error, np.nan), prediction.poses

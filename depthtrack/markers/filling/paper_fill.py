@@ -4,18 +4,20 @@ import numpy as np
 
 from depthtrack.markers.filled_capture import Filling, measured_samples, runs
 from depthtrack.markers.filling.bridging import bridged
+from depthtrack.markers.filling.expected_error import error_after
 from depthtrack.markers.filling.joints import affecting, determined
 from depthtrack.markers.filling.options import PaperFillOptions
-from depthtrack.markers.filling.prediction import Prediction
+from depthtrack.markers.filling.prediction import Prediction, time_to_measured
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Mask
 
 
-def paper_fill(model: MarkerModel, measured: Array, poses: Array, options: PaperFillOptions) -> Prediction:
+def paper_fill(model: MarkerModel, measured: Array, poses: Array, rate: float, options: PaperFillOptions) -> Prediction:
     """Return the markers of a model wherever they are missing.
 
     measured: (T, M, 3) metres, capture frame; NaN if not measured.
     poses: (T, 27) capture frame: inverse kinematics of the visible markers in each frame.
+    rate: frames a second, Hz.
 
     The joints that no visible marker determines are frozen until a marker reappears in a plausible place. Then their
     angles are interpolated from the frame before the gap to the one after it. All gaps are filled in parallel.
@@ -29,7 +31,8 @@ def paper_fill(model: MarkerModel, measured: Array, poses: Array, options: Paper
         joints = affecting(model, m) & known.any(axis=0)
         how[~known[:, joints].all(axis=1), m] = Filling.INTERPOLATED
     how[visible & ~accepted] = Filling.REPLACED
-    return Prediction(model.positions(filled), how, np.full(visible.shape, np.nan), filled)
+    error = error_after("paper", time_to_measured(accepted, rate))
+    return Prediction(model.positions(filled), how, error, filled)
 
 
 def _plausible(model: MarkerModel, measured: Array, poses: Array, visible: Mask, options: PaperFillOptions) -> Mask:

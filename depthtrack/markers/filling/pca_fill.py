@@ -29,7 +29,7 @@ def pca_fill(measured: Array, gaps: list[Gap], options: PcaFillOptions) -> Array
     leaves out the others that are missing.
     """
     visible = measured_samples(measured)
-    distances = _mean_distances(measured)
+    distances = mean_distances(measured)
     filled = np.full(measured.shape, np.nan)
     for gap in gaps:
         frames = np.arange(gap.start, gap.stop)
@@ -87,7 +87,7 @@ def _kept(values: Array, share: float) -> int:
     return int(np.searchsorted(np.cumsum(values), share * values.sum())) + 1
 
 
-def _mean_distances(measured: Array) -> Array:
+def mean_distances(measured: Array) -> Array:
     """Return the mean distance (M, M) of markers from each other, metres."""
     count = measured.shape[1]
     distances = np.full((count, count), np.nan)
