@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from depthtrack.types import Array, Image
+from depthtrack.viewing.panels import blank, smaller
 from depthtrack.viewing.text import put_text, text_width
 from depthtrack.viewing.text_placement import place_names
 from depthtrack.viewing.theme import OUTLINE, TEXT, Rgb
@@ -18,6 +19,17 @@ SUPERSAMPLING = 2
 """Resolution of drawing relative to the picture."""
 _NAME_SIZE = 12
 """Height of a name, pixels."""
+_DOT, _BESIDE = 6.0, 11.0
+"""Radius of a dot with its rim, and distance of a name from which a line joins both, pixels."""
+_STUB = 6 * SUPERSAMPLING
+"""Half the length of a line in the legend, pixels of a drawing."""
+_LEGEND = (
+    ("dot", "measured"),
+    ("dark", "measured, behind the hand"),
+    ("ring", "from the pose"),
+    ("line", "to the marker of the pose"),
+    ("cross", "without a label"),
+)
 _RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))
 """Offsets of the dark rim of a name, pixels."""
 _FIXED_POINT = 4
@@ -73,16 +85,50 @@ def draw_names(image: Image, dots: list[NamedDot]) -> None:
     size = _NAME_SIZE
     pixels = np.array([dot.pixel for dot in dots]).reshape(-1, 2)
     boxes = np.array([[text_width(dot.name, size), size] for dot in dots], dtype=np.float64).reshape(-1, 2)
-    corners = place_names(pixels, boxes, image.shape[:2], clearance=8)
+    corners = place_names(pixels, boxes, image.shape[:2], clearance=10)
     for dot, corner, box in zip(dots, corners, boxes, strict=True):
         nearest = np.clip(dot.pixel, corner, corner + box)
-        if np.linalg.norm(nearest - dot.pixel) > 14:
-            cv2.line(image, _fixed(dot.pixel), _fixed(nearest), dot.colour, 1, cv2.LINE_AA, _FIXED_POINT)
+        away = nearest - dot.pixel
+        if (length := float(np.linalg.norm(away))) > _BESIDE:
+            begin = _fixed(dot.pixel + away * _DOT / length)
+            for colour, width in ((OUTLINE, 3), (dot.colour, 1)):
+                cv2.line(image, begin, _fixed(nearest), colour, width, cv2.LINE_AA, _FIXED_POINT)
     for dot, corner in zip(dots, corners, strict=True):
         x, y = round(corner[0]), round(corner[1] + size / 2)
         for dx, dy in _RIM:
             put_text(image, dot.name, (x + dx, y + dy), size, OUTLINE)
-        put_text(image, dot.name, (x, y), size, TEXT)
+        put_text(image, dot.name, (x, y), size, _pale(dot.colour))
+
+
+def draw_legend(width: int, height: int, size: int, colours: tuple[Rgb, Rgb], text_colour: Rgb) -> Image:
+    """Return a bar with each mark and its meaning.
+
+    size: height of the text, pixels.
+    colours: of a marker, and of a point without a label.
+    """
+    colour, unlabelled = colours
+    image = blank(width * SUPERSAMPLING, height * SUPERSAMPLING)
+    x, words = 10.0, []
+    for mark, text in _LEGEND:
+        at = np.array([x, height / 2]) * SUPERSAMPLING
+        if mark == "cross":
+            draw_cross(image, at, unlabelled)
+        else:
+            at[0] -= _STUB if mark == "line" else 0
+            draw_offset(image, at, at + np.array([2 * _STUB, 0]) if mark == "line" else at, colour)
+            draw_dot(image, at, colour, mark != "ring", mark == "dark")
+        words.append((text, (round(x) + 14, height // 2)))
+        x += 14 + text_width(text, size) + 26
+    bar = smaller(image, width, height)
+    for text, place in words:
+        put_text(bar, text, place, size, text_colour)
+    return bar
+
+
+def _pale(colour: Rgb) -> Rgb:
+    """Return a colour half way to that of text."""
+    red, green, blue = ((part + other) // 2 for part, other in zip(colour, TEXT, strict=True))
+    return red, green, blue
 
 
 def _fixed(pixel: Array) -> tuple[int, int]:

@@ -8,10 +8,11 @@ from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.virtual_camera import virtual_camera
 from depthtrack.types import Array, Image
 from depthtrack.viewing.contact_sheet import framed
-from depthtrack.viewing.marker_scene import MarkerScene, View
+from depthtrack.viewing.marker_marks import draw_legend
+from depthtrack.viewing.marker_scene import UNLABELLED_COLOUR, MarkerScene, View
 from depthtrack.viewing.panels import blank, captioned, stacked, tile_grid
 from depthtrack.viewing.text import put_text, text_width
-from depthtrack.viewing.theme import FAINT_TEXT
+from depthtrack.viewing.theme import FAINT_TEXT, FINGER_COLOURS
 
 
 def scene_picture(scene: MarkerScene, frame: int, title: str) -> Image:
@@ -109,7 +110,4 @@ def _headline(title: str, subtitle: str, width: int) -> Image:
 
 
 def _legend(width: int) -> Image:
-    bar = blank(width, 22)
-    text = "dot: measured; ring: from the pose; line: to the marker of the pose; cross: without a label"
-    put_text(bar, text, (0, 11), 14, FAINT_TEXT)
-    return bar
+    return draw_legend(width, 26, 14, (FINGER_COLOURS["middle"], UNLABELLED_COLOUR), FAINT_TEXT)

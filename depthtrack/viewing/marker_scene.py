@@ -88,8 +88,7 @@ class MarkerScene:
     def draw(self, frame: int, view: View, named: int | None = None) -> Image:
         """Return a picture (h, w, 3) of a frame in a view.
 
-        named: model whose markers have their names beside them, and to which edges of rigid bodies are limited;
-            None for no names.
+        named: model whose markers are drawn alone, with their names; None for those of all models, without names.
 
         Filled dots are markers that were measured, rings those that the pose or the filling puts there. Crosses are
         points without a label.
@@ -125,12 +124,14 @@ class MarkerScene:
         """Draw the markers; return those in the image of each model."""
         dots: list[list[NamedDot]] = [[] for _ in self.labelled.models]
         for k, model in enumerate(self.labelled.models):
+            if named not in (None, k):
+                continue
             expected = view.points(model.positions(self.labelled.poses[k][frame]))
             at = view.points(self.positions[k][frame])
             measured = self.labelled.columns[k][frame] >= 0
             shown = np.where(np.isfinite(at), at, expected)
             pixels, colours = view.camera.project(shown), self.colours(k)
-            if model.is_rigid and named in (None, k):
+            if model.is_rigid:
                 draw_edges(image, pixels, colours[0])
             hidden = _hidden(shown, pixels, surface)
             for m, pixel in enumerate(pixels):

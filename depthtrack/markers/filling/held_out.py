@@ -28,7 +28,7 @@ _MARGIN = 5
 def error_scale(
     fill: Fill, method: FillMethod, measured: list[Array], gaps: Sequence[Sequence[Gap]], rate: float
 ) -> float:
-    """Return the factor of the errors of `expected_error.error_after`; 1 if nothing can be held out.
+    """Return the factor of expected errors; 1 if nothing can be held out.
 
     measured: (T, M, 3) of each model, metres, NaN if not measured.
     gaps: those to fill, of each model.

@@ -81,7 +81,7 @@ def started_models(searches: list[ModelSearch], points: Array) -> tuple[StartedM
 
 
 def _chosen_hands(hands: list[int], searches: list[ModelSearch], points: Array, free: Mask) -> dict[int, Chosen | None]:
-    """Return the choice of each hand: alone, and beside the other hands if they claim common points."""
+    """Return the choice of each hand; those that claim common points are searched again."""
     found = {k: searches[k].hypotheses(points, free)[:_HAND_CHOICES] for k in hands}
     best = {k: some[0] for k, some in found.items() if some}
     contested = not _are_disjoint([h.points for h in best.values()])
