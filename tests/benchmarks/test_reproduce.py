@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions
+from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
 from depthtrack.benchmarks.papers.registry import (
     EXPERIMENTS,
     SHORT_NAMES,
@@ -136,3 +136,11 @@ def test_the_command_lists_figures_and_rejects_invalid_options(
     ):
         assert main(["reproduce", *arguments]) == 2
         assert hint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("ours", "unit", "text"),
+    [(None, "Hz", "-"), (0.03712, "deg", "0.0371 deg"), (8320.4, "Hz", "8,320 Hz"), (200.0, "", "200")],
+)
+def test_a_measured_figure_has_three_digits_and_its_unit(ours: float | None, unit: str, text: str) -> None:
+    assert PaperComparison("figure", "1", ours, unit).ours_text == text

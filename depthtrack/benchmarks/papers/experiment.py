@@ -74,7 +74,10 @@ class PaperComparison:
     @property
     def ours_text(self) -> str:
         """Measured figure with its unit."""
-        return "-" if self.ours is None else f"{self.ours:.3g} {self.unit}"
+        if self.ours is None:
+            return "-"
+        number = f"{self.ours:,.0f}" if abs(self.ours) >= 1000 else f"{self.ours:.3g}"
+        return f"{number} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)

@@ -133,7 +133,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         return float(function(np.asarray(values))) if len(values) else None
 
     return [
-        PaperComparison("trials", "1126", float(len(error)), "of them"),
+        PaperComparison("trials", "1126", float(len(error)), ""),
         PaperComparison("difference of angles, mean of the trials", f"{PAPER_DEG:g} deg", of(np.mean, error), "deg"),
         PaperComparison("standard deviation of the trials", f"{PAPER_SD_DEG:g} deg", of(np.std, error), "deg"),
         PaperComparison("median of the trials", "not given", of(np.median, error), "deg"),

@@ -59,7 +59,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         PaperComparison(
             "all angles, synergies of other grasps as prior", "not given", ours("error_deg", soft=True), "deg"
         ),
-        PaperComparison("synergies for 99 % of other grasps' variance", "5", ours("components"), "of them"),
+        PaperComparison("synergies for 99 % of other grasps' variance", "5", ours("components"), ""),
         PaperComparison("endpoint error, all angles", "not given", ours("error_mm", None), "mm"),
         PaperComparison("endpoint error, synergies of other grasps alone", "not given", ours("error_mm"), "mm"),
         PaperComparison("frames per second, all angles (ours: one core)", "25 (8 threads)", hertz[0], "Hz"),
