@@ -21,12 +21,15 @@ def sensor(recording: dt.Sequence) -> Iterator[tuple[NDArray[Any], NDArray[Any] 
         yield units, frame.colour, frame.timestamp
 
 
-def main(path: str, tracker: str = "ik") -> NDArray[np.float64]:
-    """Print and return the opening (T,) between thumb and index finger, metres."""
+def main(path: str, tracker: str = "ik", *, deadline: float | None = 33.0) -> NDArray[np.float64]:
+    """Print and return the opening (T,) between thumb and index finger, metres.
+
+    deadline: milliseconds after which a search goes on in the next frame; None for the same bits in each run.
+    """
     recording = dt.open_recording(path)
     thumb, index = (dt.KEYPOINT_NAMES.index(name) for name in ("thumb_tip", "index_tip"))
     openings = []
-    with dt.HandTracker(recording.camera, tracker=tracker) as hand_tracker:
+    with dt.HandTracker(recording.camera, tracker=tracker, deadline=deadline) as hand_tracker:
         for depth, colour, seconds in sensor(recording):
             estimate = hand_tracker.update(depth, colour, timestamp=seconds)
             keypoints = hand_tracker.keypoints(estimate)

@@ -64,7 +64,7 @@ def test_01_a_replay_prints_each_frame(recording: str, capsys: pytest.CaptureFix
 
 
 def test_02_pushed_frames_are_tracked(recording: str) -> None:
-    openings = example(2).main(recording)
+    openings = example(2).main(recording, deadline=None)
     assert openings.shape == (FRAMES,)
     assert np.all((openings > 0.01) & (openings < 0.2))
 

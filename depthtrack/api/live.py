@@ -1,5 +1,6 @@
 """Track frames that come from any source, one call per frame."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -19,7 +20,7 @@ from depthtrack.recording.sequence import Frame, ImageKeypoints
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
+from depthtrack.tracking.configuration import DEFAULT_TRACKER, HybridConfig, IkConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.registry import create_tracker
@@ -30,10 +31,11 @@ from depthtrack.types import Array, Depth, Image
 class HandTracker(Closing):
     """Tracks a hand in frames that come from any source: a sensor, a network, a program.
 
-    Equal frames give equal bits. With a given hand, all frames of a recording give the poses that `depthtrack track`
-    writes. Without one, the hand is measured while it is tracked: the average adult's hands of both sides are tracked
-    first, then those of the sizes so far. A hand is first measured after it was visible for three seconds, then every
-    two seconds, and less often when its sizes stay. `depthtrack track` measures it before it tracks the first frame.
+    Searches end at a deadline, and go on in the next frames. Without a deadline, equal frames give equal bits; with a
+    given hand, all frames of a recording then give the poses that `depthtrack track` writes. Without a hand, it is
+    measured while it is tracked: the average adult's hands of both sides are tracked first, then those of the sizes so
+    far. A hand is first measured after it was visible for three seconds, then every two seconds, and less often when
+    its sizes stay. `depthtrack track` measures it before it tracks the first frame.
     Frames are numbered from 0 as they arrive; the random numbers of a frame depend on its number.
     The segmentation uses colour if the first frame has colour.
 
@@ -54,6 +56,7 @@ class HandTracker(Closing):
         segmentation: SegmentationOptions | None = None,
         start_pose: ArrayLike | None = None,
         threads: int | None = None,
+        deadline: float | None = 33.0,
     ) -> None:
         """Make a tracker for the frames of one camera.
 
@@ -64,6 +67,8 @@ class HandTracker(Closing):
         segmentation: how the hand is found in a frame.
         start_pose: (27,) pose in the first frame, metres, quaternion and radians, camera frame; searched if absent.
         threads: threads of the renderer, one per core if absent; poses do not depend on it.
+        deadline: milliseconds after the call of `update` at which its searches end; None for none. A configuration
+            states its own.
 
         Raises:
             InputError: there is no such tracker, or a file cannot be read.
@@ -72,7 +77,10 @@ class HandTracker(Closing):
         self._start_pose = None if start_pose is None else checked_pose(start_pose)
         self._tracker: Tracker | OngoingPipeline
         if isinstance(tracker, str | TrackerConfig):
-            make = partial(create_tracker, as_config(tracker), threads=threads or usable_cores())
+            config = as_config(tracker)
+            if isinstance(tracker, str) and isinstance(config, HybridConfig | IkConfig):
+                config = replace(config, deadline=deadline)
+            make = partial(create_tracker, config, threads=threads or usable_cores())
             measured = hand is None
             self._tracker = OngoingPipeline(make, self._segmenter, self._start_pose) if measured else make(self._given)
         else:

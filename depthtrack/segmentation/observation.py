@@ -1,5 +1,6 @@
 """The observation of a frame: silhouette, depth and point cloud of the hand."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +28,7 @@ class Observation(Target):
     wrist: plane where the forearm is cut off, if any.
     cloud_options: options of the point cloud.
     keypoints: of the hand in the region, from elsewhere; None if there are none.
+    arrived: time of `time.perf_counter` at which the frame arrived, seconds; NaN if unknown.
     """
 
     frame_index: int
@@ -38,6 +40,7 @@ class Observation(Target):
     wrist: WristPlane | None = None
     cloud_options: PointCloudOptions | None = None
     keypoints: ImageKeypoints | None = None
+    arrived: float = math.nan
 
     def whole_mask(self, shape: tuple[int, ...]) -> Mask:
         """Return the silhouette in the whole frame of `shape` (height, width)."""

@@ -159,6 +159,14 @@ class IkConfig:
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    deadline: float | None = option(
+        None,
+        "Time after a frame arrives at which its searches end, to go on in the next frames. "
+        "Poses then depend on the speed of the machine",
+        unit="ms",
+        least=0,
+        most=3_600_000,
+    )
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
@@ -210,6 +218,14 @@ class HybridConfig:
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    deadline: float | None = option(
+        None,
+        "Time after a frame arrives at which its searches end, to go on in the next frames. "
+        "Poses then depend on the speed of the machine",
+        unit="ms",
+        least=0,
+        most=3_600_000,
+    )
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:

@@ -19,8 +19,9 @@ from depthtrack.solver.lifting import Lifter
 from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
-from depthtrack.tracking.state import TrackState
+from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.surfaces.registry import make_surface
+from depthtrack.tracking.timing import Deadline
 from depthtrack.types import Array
 
 
@@ -95,6 +96,8 @@ class FrameContext:
     restarted: whether a search replaced the track, so that the status becomes `started`.
     branches: alternatives to the pose that the next frame goes on with.
     surface: surface that all fits of the frame use, None for that of their options.
+    deadline: time at which searches end.
+    search: search for the hand that the deadline interrupted, which the next frame goes on with.
     """
 
     observation: Observation
@@ -106,6 +109,8 @@ class FrameContext:
     restarted: bool = False
     branches: tuple[Branch, ...] = ()
     surface: SurfaceName | None = None
+    deadline: Deadline = field(default_factory=Deadline)
+    search: InterruptedSearch | None = None
 
     @cached_property
     def random(self) -> np.random.Generator:

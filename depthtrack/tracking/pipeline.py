@@ -162,6 +162,8 @@ def segment(
         observation = segmenter.segment(frame, roi_prior(model, keypoints.pose(frame) if pose is None else pose))
     except Exception as error:
         failure = failure_of(error)
+    if observation is not None:
+        observation = replace(observation, arrived=begun)
     return observation, 1e3 * (clock() - begun), failure
 
 

@@ -57,4 +57,5 @@ def create_tracker(
         synergies = synergies.truncated(chosen.components)
     tools = Toolkit(hand, config.scoring, threads, synergies)
     stages = getattr(import_module(BUILDERS[config.name]), config.name)(config, tools)
-    return StageTracker(config.name, stages, tools, config.thresholds, config.seed)
+    deadline = getattr(config, "deadline", None)
+    return StageTracker(config.name, stages, tools, config.thresholds, config.seed, deadline)

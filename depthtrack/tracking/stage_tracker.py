@@ -16,8 +16,8 @@ from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.stages.stage import Stage
-from depthtrack.tracking.state import TrackState
-from depthtrack.tracking.timing import StageClock
+from depthtrack.tracking.state import InterruptedSearch, TrackState
+from depthtrack.tracking.timing import Deadline, StageClock
 from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.types import Array
 
@@ -42,8 +42,20 @@ class StageTracker:
     evidence: figures that the confidence of the last estimate depends on.
     """
 
-    def __init__(self, name: str, stages: Stages, tools: Toolkit, thresholds: TrackingThresholds, seed: int) -> None:
-        self.name, self._stages, self._tools, self._seed = name, stages, tools, seed
+    def __init__(
+        self,
+        name: str,
+        stages: Stages,
+        tools: Toolkit,
+        thresholds: TrackingThresholds,
+        seed: int,
+        deadline: float | None = None,
+    ) -> None:
+        """Make a tracker of stages.
+
+        deadline: milliseconds after a frame arrives at which its searches end; None for none.
+        """
+        self.name, self._stages, self._tools, self._seed, self._deadline = name, stages, tools, seed, deadline
         self._state = TrackState(thresholds, tools.scoring.objective.clamp)
         listed = (stage.name for stage in (*stages.follow, *stages.start, *stages.refine))
         self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed, "confidence")))
@@ -88,17 +100,21 @@ class StageTracker:
 
         pose: (27,) given by the user.
         """
-        clock = StageClock(self.stages)
+        clock, deadline = StageClock(self.stages), Deadline.after(self._deadline, observation.arrived)
         self._tools.set_target(observation)
         clock.lap("target")
         found: list[tuple[Candidate, Status, tuple[Branch, ...]]] = []
+        interrupted: InterruptedSearch | None = None
         for status, stages in lists.items():
-            frame, candidates = FrameContext(observation, self._tools, self._state, self._seed, pose), list[Candidate]()
+            frame = FrameContext(observation, self._tools, self._state, self._seed, pose, deadline=deadline)
+            candidates = list[Candidate]()
             for stage in stages:
                 candidates = stage(frame, candidates)
                 clock.lap(stage.name)
+            interrupted = frame.search or interrupted
             if candidates:
                 found.append((candidates[0], Status.STARTED if frame.restarted else status, frame.branches))
+        self._state.search = interrupted
         if not found:
             estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
             self._state.update(estimate)

@@ -7,6 +7,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,21 @@ _ROUNDED = 0.01
 """Relative difference between the durations of two steps that counts as none."""
 
 
+class InterruptedSearch(NamedTuple):
+    """A search for the hand that its deadline interrupted, between two frames.
+
+    turn: number of its rounds that are complete.
+    waiting: (N, 27) poses that the round has not improved yet, best first.
+    improved: (M, 27) poses that it has.
+    centre: (3,) of the palm in the frame, metres, camera frame.
+    """
+
+    turn: int
+    waiting: Array
+    improved: Array
+    centre: Array
+
+
 class TrackState:
     """Last pose, motion and energy of a track.
 
@@ -34,6 +50,7 @@ class TrackState:
     branches: alternatives to the last pose.
     lost: estimate of the last frame, if it was not trusted.
     last_trusted: (27,) last trusted pose; None after `memory` seconds without one, in which a hand hardly turns over.
+    search: search for the hand that the deadline of the last frame interrupted. A resumed run begins it anew.
     """
 
     def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
@@ -44,6 +61,7 @@ class TrackState:
         self.energy = np.inf
         self.last_trusted: Array | None = None
         self.branches: tuple[Branch, ...] = ()
+        self.search: InterruptedSearch | None = None
         self.time, self._started = math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
         self.lost: Estimate | None = None

@@ -1,7 +1,10 @@
-"""The time of each stage of a tracker."""
+"""The time of each stage of a tracker, and the time at which the searches of a frame end."""
 
+import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Self
 
 
 class StageClock:
@@ -16,3 +19,33 @@ class StageClock:
         now = time.perf_counter()
         self.milliseconds[stage] += 1e3 * (now - self._last)
         self._last = now
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """The time at which the searches of a frame end, so that its pose is not late.
+
+    ends: seconds of `clock`; infinity for none.
+
+    The poses of frames that end by it depend on the speed of the machine.
+    """
+
+    ends: float = math.inf
+    clock: Callable[[], float] = time.perf_counter
+
+    @classmethod
+    def after(cls, milliseconds: float | None, arrived: float) -> Self:
+        """Return the deadline of a frame that arrived at a time, seconds; now if NaN."""
+        if milliseconds is None:
+            return cls()
+        return cls((cls.clock() if math.isnan(arrived) else arrived) + 1e-3 * milliseconds)
+
+    @property
+    def is_set(self) -> bool:
+        """Whether there is a deadline."""
+        return self.ends < math.inf
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time has come."""
+        return self.is_set and self.clock() >= self.ends

@@ -32,7 +32,7 @@ def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, 
     assert main(command) == 0
     run = dt.read_run(tmp_path / "run")
     recording = dt.open_recording(path)
-    with dt.HandTracker(recording.camera, "average", name) as tracker:
+    with dt.HandTracker(recording.camera, "average", name, deadline=None) as tracker:
         for frame, pose, energy, status in zip(recording, run.poses, run.energy, run.status, strict=True):
             estimate = tracker.update(frame.depth, frame.colour, timestamp=frame.timestamp)
             assert estimate.status is status
@@ -211,3 +211,15 @@ def test_metres_in_single_precision_are_not_copied() -> None:
         tracker.update(depth := np.zeros_like(DEPTH), timestamp=0)
         assert tracker.last is not None
         assert tracker.last.frame.depth is depth
+
+
+@pytest.mark.parametrize(("deadline", "expected"), [(33.0, 33.0), (None, None)])
+def test_a_tracker_given_by_name_gets_the_deadline(
+    monkeypatch: pytest.MonkeyPatch, deadline: float | None, expected: float | None
+) -> None:
+    configs = list[Any]()
+    monkeypatch.setattr("depthtrack.api.live.create_tracker", lambda config, *_, **__: configs.append(config))
+    dt.HandTracker(CAMERA, "average", "ik", deadline=deadline)
+    dt.HandTracker(CAMERA, "average", dt.tracker_config("ik", deadline=20.0), deadline=deadline)
+    dt.HandTracker(CAMERA, "average", "pso", deadline=deadline)
+    assert [getattr(config, "deadline", "none stated") for config in configs] == [expected, 20.0, "none stated"]

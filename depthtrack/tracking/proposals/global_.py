@@ -10,10 +10,20 @@ from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ORIENTATION, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.synergies import Synergies
+from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.options import GlobalSearchOptions
 from depthtrack.types import Array
 
 DEFAULTS = GlobalSearchOptions()
+
+
+def global_proposals(
+    observation: Observation, synergies: Synergies, generator: np.random.Generator, options: GlobalSearchOptions
+) -> Array:
+    """Return poses (N, 27) of the observed hand with the postures that the options ask for."""
+    angles = mixed_angles(synergies, generator, options)
+    arm = observation.arm_direction if options.follow_arm else None
+    return orientation_proposals(observation.centre, angles, generator, arm, options)
 
 
 def orientation_proposals(

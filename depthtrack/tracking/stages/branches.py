@@ -43,6 +43,9 @@ class CarryBranches:
         best, options = candidates[0], self.options
         if frame.restarted or options.interval == 0:
             return candidates
+        if frame.deadline.is_over:
+            frame.branches = frame.state.branches
+            return candidates
         time, carried = frame.observation.timestamp, list[Branch]()
         for branch, found in self._followed(frame, best):
             ratio, age = branch.energy_ratio, time - branch.begun

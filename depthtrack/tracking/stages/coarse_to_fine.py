@@ -6,6 +6,7 @@ rendered energy decides which.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +19,13 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.solver.subspace import FULL, PostureSubspace
-from depthtrack.tracking.candidate import Candidate, evaluate, poses_of
+from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.options import FitRound
 from depthtrack.tracking.posture_prior import prior_near
 from depthtrack.tracking.proposals.global_ import synergy_angles
 from depthtrack.tracking.random import frame_generator
+from depthtrack.tracking.timing import Deadline
 from depthtrack.types import Array
 
 
@@ -87,16 +89,23 @@ def run_rounds(
     synergies: Synergies,
     rounds: Sequence[FitRound],
     kept: float,
+    deadline: Deadline | None = None,
 ) -> list[Candidate]:
     """Return candidates, best first, after all rounds from `starts`, best first.
 
     kept: share of a posture's distance from the mean one that the prior of a round keeps.
+    deadline: time at which the rounds end; candidates that were not fitted by then stay as they are.
 
     A round of all angles holds the angles that the observation does not constrain near where the synergies led.
     """
+    deadline = deadline or Deadline()
     for each in rounds:
-        poses = [fit_in_synergies(fitter, start.pose, synergies, each, kept) for start in starts[: each.keep]]
-        starts = evaluate(scorer, np.stack(poses))
+        chosen = starts[: each.keep]
+        in_time = takewhile(lambda _: not deadline.is_over, chosen)
+        poses = [fit_in_synergies(fitter, start.pose, synergies, each, kept) for start in in_time]
+        if not poses:
+            break
+        starts = by_energy([*evaluate(scorer, np.stack(poses)), *chosen[len(poses) :]])
     return starts
 
 

@@ -53,7 +53,7 @@ class RefineFingers:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         best, good = candidates[0], self.recovery.good_energy * frame.clamp
-        if frame.restarted or best.energy <= good or self.recovery.accept_finger == 0:
+        if frame.restarted or best.energy <= good or self.recovery.accept_finger == 0 or frame.deadline.is_over:
             return candidates
         due = self._due_turns(frame, best)
         fitter = self.search.fitter(frame)
@@ -61,7 +61,7 @@ class RefineFingers:
             best = self._accepted(best, self._shifted(frame, best, fitter))
         scorer, generator = frame.tools.scorer_at(self.options.resolution, frame.observation), self.search.random(frame)
         for finger in sorted(due - {_SHIFTS}):
-            if self.options.stop_early and best.energy <= good:
+            if frame.deadline.is_over or (self.options.stop_early and best.energy <= good):
                 break
             found = search_one_finger(scorer, best.pose, finger, generator, self.options)
             best = self._accepted(best, found) if self.refit is None else self._refitted(frame, scorer, best, found)
@@ -117,7 +117,7 @@ class RecoverLocally:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         best, options = candidates[0], self.options
-        if best.energy <= options.good_energy * frame.clamp:
+        if best.energy <= options.good_energy * frame.clamp or frame.deadline.is_over:
             return candidates
         doubtful = self._is_doubtful(frame, best)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
@@ -127,10 +127,11 @@ class RecoverLocally:
         search, spread = self.search, options
         if self.routine is not None and not doubtful:
             search, spread = self.routine, options.routine
-        proposals = local_proposals(best.pose, search.random(frame), spread)
-        near = search.improve(frame, frame.evaluate(proposals, options.resolution), options.min_angle)[0]
-        if near.energy < (1 if doubtful else options.accept_local) * best.energy:
-            best = near
+        if frame.state.search is None:
+            proposals = local_proposals(best.pose, search.random(frame), spread)
+            near = search.improve(frame, frame.evaluate(proposals, options.resolution), options.min_angle)[0]
+            if near.energy < (1 if doubtful else options.accept_local) * best.energy:
+                best = near
         if self.elsewhere and doubtful and self._is_doubtful(frame, best):
             found = run_stages(self.elsewhere, frame)
             if found[0].energy < options.accept_global * best.energy:
@@ -165,7 +166,8 @@ class Reinitialise:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         state = frame.state
-        near, is_due = self._near_last(frame), state.is_search_due(frame.observation.timestamp)
+        near = self._near_last(frame) if state.search is None else []
+        is_due = state.search is not None or state.is_search_due(frame.observation.timestamp)
         if near and state.lost is not None and (not is_due or self._is_good(frame, near[0], state.lost)):
             return near
         brief = state.lost is not None and state.last_trusted is not None

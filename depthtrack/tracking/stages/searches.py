@@ -12,7 +12,7 @@ from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
 from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.options import FitSearchOptions, GlobalSearchOptions, SwarmSearchOptions
-from depthtrack.tracking.proposals.global_ import distinct_orientations, mixed_angles, orientation_proposals
+from depthtrack.tracking.proposals.global_ import distinct_orientations, global_proposals
 from depthtrack.tracking.stages.coarse_to_fine import run_rounds
 from depthtrack.tracking.stages.swarm import swarm_around
 
@@ -93,7 +93,8 @@ class FitSearch:
         if min_angle > 0:
             starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
         tools, kept = frame.tools, frame.posture_kept(self.surface.icp)
-        return run_rounds(frame.fitter(self.surface), tools.scorer, starts, tools.synergies, self.options.rounds, kept)
+        fitter, rounds = frame.fitter(self.surface), self.options.rounds
+        return run_rounds(fitter, tools.scorer, starts, tools.synergies, rounds, kept, frame.deadline)
 
     def fitter(self, frame: FrameContext) -> IcpFitter | None:
         return frame.fitter(self.surface)
@@ -111,9 +112,7 @@ def search_globally(frame: FrameContext, search: Search, options: GlobalSearchOp
     generator, observation = search.random(frame), frame.observation
     good = options.accepted_energy(frame.clamp, frame.state.median_energy)
     for _ in range(options.attempts):
-        angles = mixed_angles(frame.tools.synergies, generator, options)
-        arm = observation.arm_direction if options.follow_arm else None
-        poses = orientation_proposals(observation.centre, angles, generator, arm, options)
+        poses = global_proposals(observation, frame.tools.synergies, generator, options)
         found = search.improve(frame, frame.evaluate(poses, options.resolution), options.min_angle)[0]
         before = np.inf if best is None else best.energy
         best = found if best is None or found.energy < best.energy else best

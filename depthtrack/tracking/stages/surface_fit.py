@@ -63,10 +63,10 @@ class RetryPredictions:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         satisfied = self.ratio * frame.state.energy + self.margin * frame.clamp
-        if candidates[0].energy <= satisfied:
+        if candidates[0].energy <= satisfied or frame.deadline.is_over:
             return candidates
         if others := frame.predictions[1:]:
             candidates = by_energy([*candidates, *self.fit.fitted(frame, others)])
-        if candidates[0].energy <= satisfied:
+        if candidates[0].energy <= satisfied or frame.deadline.is_over:
             return candidates
         return by_energy([*candidates, *self.fit.fitted(frame, candidates[:1], effort=2)])

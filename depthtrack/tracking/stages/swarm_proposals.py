@@ -26,7 +26,7 @@ class SwarmProposals:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         best, options = candidates[0], self.options
-        if best.energy <= options.skip_ratio * frame.state.energy:
+        if best.energy <= options.skip_ratio * frame.state.energy or frame.deadline.is_over:
             return candidates
         last = frame.state.pose
         assert last is not None

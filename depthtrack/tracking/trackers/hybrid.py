@@ -12,6 +12,7 @@ from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, Reinitialise, SearchGlobally
+from depthtrack.tracking.stages.search_in_parts import SearchInParts
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.stages.surface_choice import FitChosenSurface
@@ -34,9 +35,10 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     in_turn = RefineFingers(near, config.recovery, config.fingers, refit=sparse)
     fingers = replace(in_turn, options=replace(config.fingers, turns=1, usual_turns=1))
     keypoints = KeypointProposals(config.keypoints, sparse)
-    start: list[Stage] = [SearchGlobally(search, config.search), keypoints, chosen, fingers]
+    search_globally = SearchGlobally if config.deadline is None else SearchInParts
+    start: list[Stage] = [search_globally(search, config.search), keypoints, chosen, fingers]
     doubt = FitSearch(config.doubt_search, sparse)
-    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), keypoints, chosen, fingers]
+    elsewhere: list[Stage] = [search_globally(doubt, replace(config.search, attempts=1)), keypoints, chosen, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),

@@ -11,6 +11,7 @@ from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
 from depthtrack.tracking.stages.predict import GivenPose, Predict
 from depthtrack.tracking.stages.recover import RecoverLocally, RefineFingers, Reinitialise, SearchGlobally
+from depthtrack.tracking.stages.search_in_parts import SearchInParts
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.stages.stage import Stage
 from depthtrack.tracking.stages.surface_fit import RetryPredictions, SurfaceFit
@@ -35,9 +36,10 @@ def _all_angles(config: IkConfig) -> Stages:
     search, near = FitSearch(config.fit_search, config.fit), FitSearch(config.local_search, config.fit)
     fingers = RefineFingers(near, config.recovery, config.fingers, refit=config.fit)
     keypoints = KeypointProposals(config.keypoints, config.fit)
-    start: list[Stage] = [SearchGlobally(search, config.search), keypoints, fingers]
+    search_globally = SearchGlobally if config.deadline is None else SearchInParts
+    start: list[Stage] = [search_globally(search, config.search), keypoints, fingers]
     doubt, routine = FitSearch(config.doubt_search, config.fit), FitSearch(config.routine_search, config.fit)
-    elsewhere: list[Stage] = [SearchGlobally(doubt, replace(config.search, attempts=1)), keypoints, fingers]
+    elsewhere: list[Stage] = [search_globally(doubt, replace(config.search, attempts=1)), keypoints, fingers]
     return Stages(
         follow=[
             Predict(config.predictions),
