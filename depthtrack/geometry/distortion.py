@@ -20,6 +20,8 @@ _LARGEST = 1e3
 """Bound on a coefficient. The rational model of Azure Kinect has coefficients up to about 100."""
 _WIDEST = 5.0
 """Radius, in units of the focal length, up to which a model is examined: 79 degrees from the axis."""
+_SMALLEST_SHIFT = 0.05
+"""Pixels that distortion must move a point to be removed."""
 _STEP = 0.02
 """Relative range of depth within which neighbours belong to one surface, and are interpolated."""
 
@@ -103,6 +105,17 @@ class Undistortion:
         # A place outside the image for rays beyond the model.
         self._across = np.nan_to_num(across, nan=-1e4).astype(np.float32)
         self._down = np.nan_to_num(down, nan=-1e4).astype(np.float32)
+
+    @classmethod
+    def needed(cls, camera: Camera, distortion: Distortion | None) -> Self | None:
+        """Return the undistortion of a camera; None if it moves no point by a twentieth of a pixel."""
+        undistortion = None if distortion is None else cls(camera, distortion)
+        return None if undistortion is None or undistortion.pixels < _SMALLEST_SHIFT else undistortion
+
+    @property
+    def note(self) -> str:
+        """Sentence for the user."""
+        return f"lens distortion of up to {self.pixels:.1f} pixels is removed from the depth"
 
     def depth(self, depth: Depth) -> Depth:
         """Return depth (h, w) without distortion, metres, 0 = none.

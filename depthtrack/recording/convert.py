@@ -5,7 +5,9 @@ from pathlib import Path
 
 from depthtrack.errors import InputError
 from depthtrack.recording.bags.writer import McapWriter
+from depthtrack.recording.keypoints import KEYPOINTS_FILE, read_keypoints
 from depthtrack.recording.sequence import Frame, Sequence
+from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.writer import ColourFormat, SequenceWriter
 
 MCAP = ".mcap"
@@ -61,7 +63,7 @@ def _write_folder(
         colour_format=colour_format,
         overwrite=overwrite,
     ) as writer:
-        for frame in frames:
+        for frame in _with_keypoints(sequence, frames):
             truth = sequence.ground_truth
             row = None if truth is None else truth.at(frame.timestamp)
             writer.append(
@@ -76,3 +78,11 @@ def _write_folder(
             )
             count += 1
     return count
+
+
+def _with_keypoints(sequence: Sequence, frames: Iterable[Frame]) -> Iterable[Frame]:
+    """Return the frames with the keypoints of the folder, unless images are mirrored."""
+    if not isinstance(sequence, BaseSequence) or sequence.reading.mirror:
+        return frames
+    path = sequence.path / KEYPOINTS_FILE
+    return read_keypoints(path).attach(frames, sequence.timestamps) if path.is_file() else frames

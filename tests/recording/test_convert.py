@@ -7,8 +7,9 @@ import pytest
 
 from depthtrack.cli import main
 from depthtrack.errors import DamagedFrameError, InputError
-from depthtrack.recording import open_sequence
+from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.convert import convert
+from depthtrack.recording.sequence import ImageKeypoints
 from tests.support.recordings import CAMERA, TIMES, depth_at, write_sample
 
 
@@ -47,6 +48,16 @@ def test_a_folder_keeps_its_ground_truth_in_a_folder(sample: Path, tmp_path: Pat
     np.testing.assert_array_equal(a.hand_mask(1), b.hand_mask(1))
     np.testing.assert_array_equal(a.exact_depth(1), b.exact_depth(1))
     assert b.hand == a.hand
+
+
+def test_a_folder_keeps_its_keypoints(tmp_path: Path) -> None:
+    keypoints = ImageKeypoints(np.arange(42, dtype=np.float64).reshape(21, 2), np.full(21, 0.5), "left")
+    with SequenceWriter(tmp_path / "sample", CAMERA) as writer:
+        for index, time in enumerate(TIMES):
+            writer.append(time, depth_at(index), keypoints=keypoints)
+    convert(open_sequence(tmp_path / "sample"), tmp_path / "copy")
+    a, b = (tmp_path / name / "keypoints.csv" for name in ("sample", "copy"))
+    assert a.read_text() == b.read_text()
 
 
 def test_depth_in_other_units_than_millimetres_keeps_its_steps(sample: Path, tmp_path: Path) -> None:

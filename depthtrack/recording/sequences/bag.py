@@ -1,5 +1,6 @@
 """Bags of ROS 1 (`.bag`) and ROS 2 (`.db3`, `.mcap`, folders), of RealSense and of Orbbec."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +27,6 @@ from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array, Depth, Image, Index
-
-_SMALLEST_SHIFT = 0.05
-"""Distortion that moves no point by more pixels than this is left."""
 
 
 class BagSequence(BaseSequence):
@@ -136,7 +134,6 @@ class BagSequence(BaseSequence):
         messages, topic = self._messages, self._choice.depth
         first = messages.first(topic)
         size = size_of_image(first, f"{self.path}: {topic}")
-        self._undistortion: Undistortion | None = None
         self._own = None if given is not None else camera_of(messages, topic, size)
         is_float = encoding_of(first) == "32fc1"
         stated = depth_unit(messages, topic)
@@ -149,15 +146,10 @@ class BagSequence(BaseSequence):
                 " give it with --camera FILE.json, --camera-preset NAME, or --fx and --depth-scale"
             )
         scale = FLOAT_STEP if is_float and given is None and stated == MILLIMETRE else self._unit
-        own = self._own.camera
-        self.camera = Camera(own.width, own.height, own.fx, own.fy, own.cx, own.cy, scale)
-        if self._own.distortion is not None:
-            undistortion = Undistortion(self.camera, self._own.distortion)
-            if undistortion.pixels > _SMALLEST_SHIFT:
-                self._undistortion = undistortion
-                self.notes.append(
-                    f"lens distortion of up to {undistortion.pixels:.1f} pixels is removed from the depth"
-                )
+        self.camera = replace(self._own.camera, depth_scale=scale)
+        self._undistortion = Undistortion.needed(self.camera, self._own.distortion)
+        if self._undistortion is not None:
+            self.notes.append(self._undistortion.note)
 
     def _open_colour(self) -> None:
         """Pair colour with depth and register it, or note why depth is read alone."""
@@ -191,8 +183,7 @@ class BagSequence(BaseSequence):
             return "the file does not state the transform between both cameras"
         same_camera = np.allclose(colour.camera.matrix, self.camera.matrix, rtol=1e-3, atol=0.1)
         if size == (self.camera.width, self.camera.height) and same_camera and np.allclose(T, np.eye(4), atol=1e-6):
-            if colour.distortion is not None:
-                self._colour_undistortion = Undistortion(colour.camera, colour.distortion)
+            self._colour_undistortion = Undistortion.needed(colour.camera, colour.distortion)
             return None
         self._registration = Registration(self.camera, colour.camera, T, colour.distortion)
         self.notes.append(f"colour of {topic} is registered to the depth with the cameras that the file describes")

@@ -29,8 +29,6 @@ _MATROSKA, _MP4, _RIFF = b"\x1a\x45\xdf\xa3", b"ftyp", b"RIFF"
 _SEGMENT = b"\x18\x53\x80\x67"
 """Identifier of the element that holds the streams."""
 _HEAD_BYTES = 4096
-_SMALLEST_SHIFT = 0.05
-"""Distortion that moves no point by more pixels than this is left."""
 
 
 class VideoSequence(BaseSequence):
@@ -68,13 +66,10 @@ class VideoSequence(BaseSequence):
             self.notes.append(
                 f"{path.name} is cut short, or was not finished: the {len(self.timestamps)} frames in it are read"
             )
-        self._undistortion: Undistortion | None = None
-        if camera is None and own is not None and own.distortion is not None:
-            undistortion = Undistortion(own.camera, own.distortion)
-            if undistortion.pixels > _SMALLEST_SHIFT:
-                self._undistortion = undistortion
-                shift = f"{undistortion.pixels:.1f} pixels"
-                self.notes.append(f"lens distortion of up to {shift} is removed from the depth")
+        distortion = own.distortion if camera is None and own is not None else None
+        self._undistortion = Undistortion.needed(self.camera, distortion)
+        if self._undistortion is not None:
+            self.notes.append(self._undistortion.note)
         self._last: tuple[int, Depth] | None = None
         self._colour: VideoFrames | None = None
         self._registration: Registration | None = None
