@@ -70,7 +70,7 @@ def cache_folder() -> Path | None:
     It is that of `VARIABLE`, or `__pycache__` of the package, or the user's folder for caches, or a private
     temporary folder. Others must not write to it, because numba unpickles the files.
     """
-    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else [_PACKAGE / "__pycache__", _user_caches() / "depthtrack"]
+    chosen = [Path(config.CACHE_DIR)] if config.CACHE_DIR else [_PACKAGE / "__pycache__", *_user_caches()]
     private = Path(tempfile.gettempdir()) / f"depthtrack-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
     for folder in (*chosen, private):
         path = folder / f"kernels-{sys.implementation.cache_tag}"
@@ -80,13 +80,18 @@ def cache_folder() -> Path | None:
     return None
 
 
-def _user_caches() -> Path:
-    """Return the folder for caches of this user, as the system defines it."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    if sys.platform == "darwin":
-        return Path("~/Library/Caches").expanduser()
-    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+def _user_caches() -> list[Path]:
+    """Return our folder among the caches of this user, as the system defines it; none of a user without a home."""
+    try:
+        if sys.platform == "win32":
+            found = Path(os.environ.get("LOCALAPPDATA") or Path.home())
+        elif sys.platform == "darwin":
+            found = Path("~/Library/Caches").expanduser()
+        else:
+            found = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+    except RuntimeError:
+        return []
+    return [found / "depthtrack"]
 
 
 def _is_usable(folder: Path) -> bool:

@@ -109,6 +109,18 @@ def test_without_any_folder_kernels_are_compiled_each_time(tmp_path: Path) -> No
         assert len(report["warnings"]) == 1  # type: ignore[arg-type]
 
 
+def test_a_user_without_a_home_has_a_private_folder(tmp_path: Path) -> None:
+    """As in a container whose user is a number that the system does not know."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    unknown = (
+        "import pathlib\n    def no_home(self): raise RuntimeError('Could not determine home directory.')\n"
+        "    pathlib.Path.expanduser = no_home; compilation._PACKAGE = pathlib.Path('/dev/null')"
+    )
+    settings = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": "", "TMPDIR": str(temporary)}
+    assert Path(str(run(tmp_path, unknown, **settings)["folder"])).is_relative_to(temporary)
+
+
 def test_two_first_runs_at_once(tmp_path: Path) -> None:
     (tmp_path / "made_kernels.py").write_text(MODULE)
     with ThreadPoolExecutor(2) as pool:
