@@ -82,6 +82,8 @@ def scenarios(short: bool) -> list[Scenario]:
         Scenario("synth --overwrite", (*synth, "--seed", "1", "--overwrite"), old=True),
         Scenario("track", track, (*track, "--resume"), resumes=True),
         Scenario("compare", compare, resumes=True),
+        Scenario("convert", ("convert", "recording", "OUT")),
+        Scenario("convert .mcap", ("convert", "recording", "OUT.mcap")),
         Scenario("calibrate", ("calibrate", "recording", "-o", "OUT"), old=True),
         *exports,
         Scenario("markers link .csv", ("markers", "link", *capture, "OUT.csv"), old=True),
@@ -216,13 +218,18 @@ def contents(folder: Path) -> Contents:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def run(short: bool, show: Callable[[str], None] = print) -> bool:
-    """Run the campaign, print its table, and return whether no fault was found."""
+def run(short: bool, names: list[str], show: Callable[[str], None] = print) -> bool:
+    """Run the campaign, print its table, and return whether no fault was found.
+
+    names: of the scenarios; all if empty.
+    """
     found = False
     with TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder), short)
         show(f"{'command':24}{'operations':>12}{'runs':>8}{'kills':>8}{'faults':>10}")
         for scenario in scenarios(short):
+            if names and scenario.name not in names:
+                continue
             tally = campaign.run(scenario)
             show(tally.row(scenario.name))
             for fault in tally.faults or ():
@@ -234,7 +241,9 @@ def run(short: bool, show: Callable[[str], None] = print) -> bool:
 def main() -> int:
     parser = argparse.ArgumentParser(description="Let the writes of commands fail.")
     parser.add_argument("--short", action="store_true", help="the writers alone")
-    return 0 if run(parser.parse_args().short) else 1
+    parser.add_argument("names", nargs="*", help="commands as the table names them; all if none")
+    given = parser.parse_args()
+    return 0 if run(given.short, given.names) else 1
 
 
 if __name__ == "__main__":
