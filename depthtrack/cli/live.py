@@ -12,7 +12,7 @@ import tyro
 from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.ending import Terminated
 from depthtrack.cli.recording_options import PresetName, RecordingOptions
-from depthtrack.cli.stated_default import stated_default
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 from depthtrack.tracking.configuration import TrackerName
 
@@ -46,7 +46,7 @@ class Command:
     """A hand file, a rigged mesh or the average adult's (default: the hand is measured while it is tracked)."""
     smooth: bool = False
     """Filter the poses over time (one-euro filter), which delays motion."""
-    frames: Annotated[int | None, stated_default(metavar="N")] = None
+    frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
     """End after N tracked frames."""
     view: bool = False
     """Show frames, hand and latency in the rerun viewer (extra `view`)."""
@@ -60,7 +60,7 @@ class Command:
     """Camera of a recording in place of its own."""
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor, in place of the recording's own."""
-    threads: Annotated[int | None, stated_default(metavar="N")] = None
+    threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Threads of the renderer (default: one per core)."""
 
     def run(self) -> None:
@@ -78,10 +78,6 @@ class Command:
 
     def _check(self) -> None:
         """Raise InputError if an option is out of range, or options exclude each other."""
-        if self.frames is not None and self.frames < 1:
-            raise InputError(f"--frames must be at least 1, found {self.frames}")
-        if self.threads is not None and self.threads < 1:
-            raise InputError(f"--threads must be at least 1, found {self.threads}")
         if self.tracker == "lift":
             raise InputError("--tracker lift needs 2D keypoints, which a live source does not have: choose another one")
         if self.view and self.rrd is not None:
