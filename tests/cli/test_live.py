@@ -65,8 +65,8 @@ def test_the_viewer_s_file_is_written(recording: str, tmp_path: Path, capsys: py
     ("arguments", "expected"),
     [
         (["--source", "{out}/nowhere"], "there is no recording at"),
-        (["--source", "{recording}", "--frames", "0"], "--frames must be at least 1, found 0"),
-        (["--source", "{recording}", "--threads", "0"], "--threads must be at least 1"),
+        (["--source", "{recording}", "--frames", "0"], "--frames must be from 1 to 10000000, found 0"),
+        (["--source", "{recording}", "--threads", "0"], "--threads must be from 1"),
         (["--source", "{recording}", "--serial", "1"], "--serial is of a camera: use --source realsense"),
         (["--source", "{recording}", "--tracker", "lift"], "needs 2D keypoints"),
         (["--source", "{recording}", "--view", "--rrd", "{out}/a.rrd"], "exclude each other"),

@@ -35,7 +35,7 @@ class Command:
     """Shortest and longest stretch."""
     seeds: Annotated[tuple[int, ...], number(0, MOST_SEED, metavar="SEED ...")] = (1000, 1001, 1002)
     """Seeds of the places; each cuts the whole capture once."""
-    together: int = 1
+    together: Annotated[int, number(1, 1000)] = 1
     """Neighbouring markers that lose overlapping stretches, as where something hides a finger."""
     methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = (
         "smooth",
