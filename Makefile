@@ -23,7 +23,7 @@ quick: .venv/.ready-test
 	$(PYTEST) -m "not slow"
 
 kernels: .venv/.ready-test
-	$(BIN)/python -m tests.support.compile_kernels
+	$(BIN)/depthtrack warmup
 
 lint: .venv/.ready-test
 	$(BIN)/ruff format --check .

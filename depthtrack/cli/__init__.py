@@ -52,6 +52,7 @@ COMMANDS = {
     "export": CommandEntry("depthtrack.cli.export", "write the joints of a run for other programs"),
     "reproduce": CommandEntry("depthtrack.cli.reproduce", "repeat experiments of the papers, with both figures"),
     "bench": CommandEntry("depthtrack.cli.bench", "measure the speed of scoring, fitting and segmentation"),
+    "warmup": CommandEntry("depthtrack.cli.warmup", "compile the kernels ahead of the first run"),
     "doctor": CommandEntry("depthtrack.cli.doctor", "check the renderers of this machine"),
 }
 
