@@ -70,6 +70,8 @@ class TrackCommand:
         raise NotImplementedError
 
     def run(self) -> None:
+        from time import perf_counter
+
         from depthtrack.cli.progress import counter
         from depthtrack.machine import usable_cores
         from depthtrack.tracking.run import TrackingRun
@@ -82,10 +84,12 @@ class TrackCommand:
             counter(len(run), leave=True) as shown,
         ):
             shown.set_postfix_str("the first use compiles kernels")
+            times = []
             for each in run.write(self.out, resume=self.resume):
+                times.append(perf_counter())
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
-        self._report(sequence)
+        self._report(sequence, _rate_text(times))
 
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
@@ -137,7 +141,7 @@ class TrackCommand:
         check_run(configuration, sequence, self.out, self.resume)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
-    def _report(self, sequence: "Recording") -> None:
+    def _report(self, sequence: "Recording", rate: str) -> None:
         from depthtrack.recording.depth_checks import no_hand_note
         from depthtrack.recording.frame_failures import FAILURES_FILE, read_failures
         from depthtrack.recording.run_rows import read_rows
@@ -149,8 +153,16 @@ class TrackCommand:
         if sequence.has_depth and untrusted == len(rows):
             print(no_hand_note(sequence))
         failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""
-        print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}")
+        print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}{rate}")
         print(f"errors and timing:  depthtrack evaluate {self.out}")
+
+
+def _rate_text(times: Sequence[float]) -> str:
+    """Return the frames per second of wall-clock time, from reading to writing; "" for less than two frames.
+
+    times: seconds at which each frame was written. The first frame, with its search, does not count.
+    """
+    return f", {(len(times) - 1) / (times[-1] - times[0]):.0f} frames a second" if len(times) > 1 else ""
 
 
 def command(arguments: Sequence[str]) -> tuple[type[TrackCommand], TrackCommand]:

@@ -14,6 +14,7 @@ import pytest
 import depthtrack as dt
 from depthtrack.calibration.calibrate import Calibration, Measured
 from depthtrack.cli import main
+from depthtrack.cli.track import _rate_text
 from depthtrack.errors import InputError
 from depthtrack.evaluation.replay import Replay
 from depthtrack.hand.shape import HandShape
@@ -207,3 +208,8 @@ def test_errors_are_one_sentence_without_traceback(
         message = capsys.readouterr().err
         assert expected in message
         assert "Traceback" not in message
+
+
+def test_the_rate_leaves_out_the_first_frame() -> None:
+    assert _rate_text([5.0, 5.5, 6.0]) == ", 2 frames a second"
+    assert _rate_text([5.0]) == _rate_text([]) == ""
