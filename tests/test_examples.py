@@ -14,6 +14,7 @@ import pytest
 
 import depthtrack as dt
 from depthtrack.calibration.calibrate import Measured
+from depthtrack.hand.pose import make_pose
 from depthtrack.hand.synergies import load_synergies
 from depthtrack.markers.formats.registry import write_capture
 from depthtrack.recording.keypoints import HEADER, read_keypoints
@@ -194,3 +195,202 @@ def test_12_needs_nothing_of_depthtrack_and_states_what_is_missing(
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     with pytest.raises(SystemExit, match="pip install mediapipe"):
         example(12).main(recording, "hand_landmarker.task", str(tmp_path / "keypoints.csv"))
+
+
+class StandInTracker:
+    """Takes the place of `HandTracker`, and keeps the frames that an example gives it."""
+
+    def __init__(self, camera: dt.Camera, tracker: str) -> None:
+        self.camera, self.frames = camera, list[tuple[Any, Any, float]]()
+
+    def __enter__(self) -> "StandInTracker":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    def update(self, depth: Any, colour: Any, *, timestamp: float) -> dt.Estimate:
+        self.frames.append((depth, colour, timestamp))
+        return dt.Estimate(make_pose([0, 0, 0], [1, 0, 0, 0], np.zeros(20)), 1.0, 1.0, dt.Status.TRACKED, {}, timestamp)
+
+    def keypoints(self, estimate: dt.Estimate) -> Any:
+        return np.arange(63.0).reshape(21, 3)
+
+
+@pytest.fixture
+def trackers(monkeypatch: pytest.MonkeyPatch) -> list[StandInTracker]:
+    """The trackers that an example makes."""
+    made: list[StandInTracker] = []
+
+    def make(camera: dt.Camera, *, tracker: str) -> StandInTracker:
+        made.append(StandInTracker(camera, tracker))
+        return made[-1]
+
+    monkeypatch.setattr(dt, "HandTracker", make)
+    return made
+
+
+@pytest.fixture
+def frame(recording: str) -> dt.Frame:
+    """A frame with colour."""
+    return next(frame for frame in dt.open_recording(recording) if frame.colour is not None)
+
+
+def test_14_a_realsense_camera_is_tracked(
+    recording: str,
+    trackers: list[StandInTracker],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A recording stands for the camera; tests/live has a file of pyrealsense2."""
+    opened = []
+
+    def source(serial: str | None) -> dt.PlayedRecording:
+        opened.append(serial)
+        return dt.PlayedRecording(dt.open_recording(recording), realtime=False)
+
+    monkeypatch.setattr(dt, "RealSenseSource", source)
+    report = example(14).main("123", tracker="ik")
+    assert len(report.latencies) == len(trackers[0].frames) > 0
+    assert opened == ["123"]
+    assert "palm at 0.000 0.000 0.000 m" in capsys.readouterr().out
+
+
+def test_15_an_azure_kinect_is_tracked(
+    frame: dt.Frame, trackers: list[StandInTracker], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, matrix, stopped = frame.camera, np.eye(3), []
+    matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2] = camera.fx, camera.fy, camera.cx, camera.cy + 48
+    assert frame.colour is not None
+    depth = np.pad(np.rint(1000 * frame.depth).astype(np.uint16), ((48, 48), (0, 0)))
+    bgra = np.pad(np.dstack([frame.colour[..., ::-1], frame.colour[..., :1]]), ((48, 48), (0, 0), (0, 0)))
+    empty = SimpleNamespace(depth=None, transformed_color=None)
+    full = SimpleNamespace(depth=depth, transformed_color=bgra, depth_timestamp_usec=2_000_000)
+    waiting = iter([empty, full])
+    device = SimpleNamespace(
+        start=lambda: None,
+        stop=lambda: stopped.append(True),
+        get_capture=lambda: next(waiting),
+        calibration=SimpleNamespace(
+            get_camera_matrix=lambda kind: matrix, get_distortion_coefficients=lambda kind: np.zeros(8)
+        ),
+    )
+    driver = SimpleNamespace(
+        PyK4A=lambda config: device,
+        Config=lambda **options: options,
+        DepthMode=SimpleNamespace(NFOV_UNBINNED=2),
+        CalibrationType=SimpleNamespace(DEPTH=0),
+    )
+    monkeypatch.setitem(sys.modules, "pyk4a", driver)
+    report = example(15).main(count=1)
+    ((seen, colour, seconds),) = trackers[0].frames
+    np.testing.assert_allclose(seen[48:-48], frame.depth, atol=1e-3)
+    np.testing.assert_array_equal(colour[48:-48], frame.colour)
+    assert (seconds, len(report.latencies), stopped) == (2.0, 1, [True])
+    assert (trackers[0].camera.fy, trackers[0].camera.cy) == (camera.fy, camera.cy + 48)
+
+
+def test_16_an_orbbec_camera_is_tracked(
+    frame: dt.Frame, trackers: list[StandInTracker], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, enabled = frame.camera, list[Any]()
+    lens = SimpleNamespace(fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy)
+    video = SimpleNamespace(
+        get_height=lambda: camera.height, get_width=lambda: camera.width, get_intrinsic=lambda: lens
+    )
+    assert frame.colour is not None
+    units, colour = np.rint(frame.depth * 2000).astype(np.uint16), frame.colour  # half a millimetre
+
+    def frameset(number: int) -> SimpleNamespace:
+        depth = SimpleNamespace(
+            get_data=lambda: units.view(np.uint8).ravel(),
+            get_depth_scale=lambda: 0.5,
+            get_index=lambda: number,
+            get_timestamp_us=lambda: 1_000_000 * number,
+            get_stream_profile=lambda: SimpleNamespace(as_video_stream_profile=lambda: video),
+        )
+        image = SimpleNamespace(get_data=colour.ravel)
+        frames = SimpleNamespace(get_depth_frame=lambda: depth, get_color_frame=lambda: image)
+        return SimpleNamespace(as_frame_set=lambda: frames)
+
+    waiting = iter([frameset(3), None, frameset(4)])
+    pipeline = SimpleNamespace(
+        get_stream_profile_list=lambda sensor: SimpleNamespace(get_video_stream_profile=lambda *wanted: wanted),
+        start=lambda config: None,
+        stop=lambda: enabled.append("stopped"),
+        wait_for_frames=lambda milliseconds: next(waiting),
+    )
+    driver = SimpleNamespace(
+        Pipeline=lambda: pipeline,
+        Config=lambda: SimpleNamespace(enable_stream=enabled.append),
+        AlignFilter=lambda align_to_stream: SimpleNamespace(process=lambda frames: frames),
+        OBSensorType=SimpleNamespace(DEPTH_SENSOR=0, COLOR_SENSOR=1),
+        OBFormat=SimpleNamespace(Y16="Y16", RGB="RGB"),
+        OBStreamType=SimpleNamespace(DEPTH_STREAM="depth"),
+    )
+    monkeypatch.setitem(sys.modules, "pyorbbecsdk", driver)
+    report = example(16).main(count=1)
+    ((seen, image, seconds),) = trackers[0].frames
+    np.testing.assert_allclose(seen, frame.depth, atol=1e-3)
+    np.testing.assert_array_equal(image, colour)
+    assert (seconds, len(report.latencies)) == (4.0, 1)
+    assert enabled == [(640, 0, "Y16", 30), (640, 0, "RGB", 30), "stopped"]
+
+
+def test_17_a_ros_node_publishes_keypoints(
+    frame: dt.Frame, trackers: list[StandInTracker], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera, callbacks, published = frame.camera, dict[str, Any](), list[Any]()
+    header = SimpleNamespace(frame_id="optical")
+    lens = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
+
+    def spin(node: Any) -> None:
+        callbacks["/info"](SimpleNamespace(width=camera.width, height=camera.height, k=lens, header=header))
+        padded = np.pad(np.rint(1000 * frame.depth).astype("<u2"), ((0, 0), (0, 8)))
+        stamp = SimpleNamespace(sec=5, nanosec=250_000_000)
+        size = {"height": camera.height, "width": camera.width, "is_bigendian": 0, "encoding": "16UC1"}
+        callbacks["/depth"](SimpleNamespace(header=SimpleNamespace(stamp=stamp), data=padded.tobytes(), **size))
+
+    def publish(message: Any) -> None:
+        published.append(message)
+        raise KeyboardInterrupt
+
+    node = SimpleNamespace(
+        create_publisher=lambda *_: SimpleNamespace(publish=publish),
+        create_subscription=lambda kind, topic, callback, qos: callbacks.update({topic: callback}),
+    )
+    modules: dict[str, Any] = {
+        "rclpy": SimpleNamespace(init=lambda: None, create_node=lambda name: node, spin=spin),
+        "rclpy.qos": SimpleNamespace(qos_profile_sensor_data=None),
+        "sensor_msgs.msg": SimpleNamespace(CameraInfo=None, Image=None),
+        "geometry_msgs.msg": SimpleNamespace(
+            Point=lambda **place: SimpleNamespace(**place),
+            Pose=lambda position: SimpleNamespace(position=position),
+            PoseArray=lambda poses: SimpleNamespace(poses=poses, header=SimpleNamespace(frame_id="")),
+        ),
+    }
+    for name, module in modules.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    with pytest.raises(KeyboardInterrupt):
+        example(17).main("/depth", "/info")
+    ((seen, colour, seconds),) = trackers[0].frames
+    np.testing.assert_allclose(seen, frame.depth, atol=1e-3)
+    assert (colour, seconds, trackers[0].camera.cx) == (None, 5.25, camera.cx)
+    (found,) = published
+    assert (found.header.frame_id, len(found.poses), found.poses[20].position.z) == ("optical", 21, 62.0)
+
+
+def test_17_depth_of_ros_images_is_in_metres() -> None:
+    floats = np.array([[1.5, np.nan], [np.inf, 0.0]], ">f4")
+    image = SimpleNamespace(encoding="32FC1", is_bigendian=1, data=floats.tobytes(), height=2, width=2)
+    np.testing.assert_array_equal(example(17).depth_of(image), [[1.5, 0], [0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("number", "module", "advice"),
+    [(15, "pyk4a", "pip install pyk4a"), (16, "pyorbbecsdk", "pip install pyorbbecsdk2"), (17, "rclpy", "ROS 2")],
+)
+def test_a_missing_driver_is_named(number: int, module: str, advice: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(SystemExit, match=advice):
+        example(number).main()
