@@ -113,6 +113,39 @@ class Markers(_Benchmark):
 
 
 @dataclass(frozen=True)
+class Pipeline:
+    """Measure the time of each frame from the reading of a file to the pose, and of each stage.
+
+    The frames per second are those of wall-clock time. Reading runs ahead in a thread, as in `depthtrack track`.
+    """
+
+    recording: Annotated[Path, tyro.conf.Positional]
+    """The recording."""
+    trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("hybrid", "ik", "pso")
+    """Trackers to measure."""
+    hand: Annotated[str | None, stated_default(metavar="HAND")] = None
+    """Hand to track with: a file, "truth" or "average" (default: the recording's own, or the average one)."""
+    frames: Annotated[int | None, number(2, 10**9), stated_default(metavar="N")] = None
+    """Track only the first N frames (default: all)."""
+    threads: Annotated[int | None, number(1, 256), stated_default(metavar="N")] = None
+    """Threads of the renderer (default: one per core)."""
+    deadline: Annotated[float | None, number(0, 3_600_000), stated_default(metavar="MS")] = None
+    """Time after a frame arrives at which searches end, of `hybrid` and `ik` (default: none)."""
+    json: bool = False
+    """Print JSON instead of a table."""
+    out: Annotated[Path | None, OUTPUT_FILE, stated_default(metavar="FILE.json")] = None
+    """Also write the JSON to a file."""
+
+    def run(self) -> None:
+        from depthtrack.benchmarks.speed import pipeline
+        from depthtrack.machine import usable_cores
+
+        threads = self.threads or usable_cores()
+        plan = pipeline.plan(self.recording, self.trackers, self.hand, self.frames, threads, self.deadline)
+        print_measured(pipeline, plan, self.json, self.out)
+
+
+@dataclass(frozen=True)
 class Starts:
     """Measure how often the markers of hands are found in a single frame of points.
 
@@ -150,6 +183,7 @@ class Command:
         | Annotated[Ik, tyro.conf.subcommand("ik")]
         | Annotated[Segment, tyro.conf.subcommand("segment")]
         | Annotated[Markers, tyro.conf.subcommand("markers")]
+        | Annotated[Pipeline, tyro.conf.subcommand("pipeline")]
         | Annotated[Starts, tyro.conf.subcommand("starts")]
     ]
 

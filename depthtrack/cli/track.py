@@ -158,7 +158,7 @@ class TrackCommand:
 
 
 def _rate_text(times: Sequence[float]) -> str:
-    """Return the frames per second of wall-clock time, from reading to writing; "" for less than two frames.
+    """Return the frames per second of wall-clock time, "" for less than two frames.
 
     times: seconds at which each frame was written. The first frame, with its search, does not count.
     """
