@@ -20,7 +20,8 @@ from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
 from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array, Labels, Mask
 
-_LARGEST_FILE = 4 << 20
+MAX_BYTES = 4 << 20
+"""Largest file of a model."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class SkinColourModel:
         Raises:
             InputError: the file is missing or malformed, or its tables are no probabilities.
         """
-        return read_json(path, "the skin model", cls._from_fields, _LARGEST_FILE, made_by="depthtrack train-skin")
+        return read_json(path, "the skin model", cls._from_fields, MAX_BYTES, made_by="depthtrack train-skin")
 
     @classmethod
     def _from_fields(cls, fields: Any) -> Self:

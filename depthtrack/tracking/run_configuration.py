@@ -24,6 +24,7 @@ from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.run_folder import Run, read_configuration
 from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.skin_colour import MAX_BYTES as MAX_SKIN_BYTES
 from depthtrack.solver.options import SurfaceName
 from depthtrack.tracking.configuration import (
     RUN_CONFIGURATIONS,
@@ -195,7 +196,9 @@ def digests(configuration: RunConfiguration) -> dict[str, str]:
     if synergies is not None and synergies.synergies is not None:
         found["synergies"] = sha256(load_synergies(synergies.synergies).to_json().encode()).hexdigest()
     if configuration.segmentation.skin_model is not None:
-        found["skin_model"] = sha256(Path(configuration.segmentation.skin_model).read_bytes()).hexdigest()
+        found["skin_model"] = sha256(
+            read_bounded(Path(configuration.segmentation.skin_model), MAX_SKIN_BYTES)
+        ).hexdigest()
     if configuration.keypoints is not None:
         found["keypoints"] = sha256(read_bounded(Path(configuration.keypoints), MAX_BYTES)).hexdigest()
     return found

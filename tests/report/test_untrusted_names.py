@@ -25,15 +25,19 @@ CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", 
 
 
 class Elements(HTMLParser):
-    """The elements of a page, with their attributes."""
+    """The elements of a page with their attributes, and its texts."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
         self.found: list[tuple[str, list[tuple[str, str | None]]]] = []
+        self.texts: list[str] = []
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.found.append((tag, attrs))
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data)
 
 
 @pytest.fixture(scope="module")
@@ -67,10 +71,7 @@ def test_names_make_no_elements_and_no_attributes(pages: list[Path]) -> None:
 
 def test_names_are_shown_as_they_are(pages: list[Path]) -> None:
     for path, name in zip(pages[1:], NAMES, strict=True):
-        parser = HTMLParser()
-        texts: list[str] = []
-        parser.handle_data = texts.append  # type: ignore[method-assign]
-        parser.feed(path.read_text(encoding="utf-8"))
+        texts = Elements(path.read_text(encoding="utf-8")).texts
         assert any(name in text for text in texts), name
 
 

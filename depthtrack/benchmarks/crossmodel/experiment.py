@@ -19,7 +19,7 @@ def tabulate(rows: Sequence[Row]) -> list[Row]:
             "tracker": name,
             "recordings": len(rows),
             **{key: _mean(rows, f"{name}_{key}") for key in ("mean_mm", "raw_mm", "p95_mm", "visible_mm", "hidden_mm")},
-            "worst_mean_mm": max(row[f"{name}_mean_mm"] for row in rows),
+            "worst_mean_mm": _worst(rows, f"{name}_mean_mm"),
             "untrusted_percent": _mean(rows, f"{name}_untrusted_percent"),
             "wrong_percent": _mean(rows, f"{name}_wrong_percent"),
             "longest_wrong_s": max(row[f"{name}_longest_wrong_s"] for row in rows),
@@ -53,7 +53,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
 def draw(axes: Axes, rows: Sequence[Row]) -> None:
     """Plot the sorted mean errors of the recordings."""
     for name in TRACKERS:
-        errors = sorted(row[f"{name}_mean_mm"] for row in rows)
+        errors = sorted(row[f"{name}_mean_mm"] for row in rows if row[f"{name}_mean_mm"] is not None)
         axes.plot(np.linspace(0, 100, len(errors)), errors, marker="o", label=name)
     axes.set(xlabel="recordings (%)", ylabel="mean joint error after offsets (mm)", yscale="log")
     axes.legend()
@@ -62,6 +62,10 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
 def _mean(rows: Sequence[Row], key: str) -> float | None:
     values = [row[key] for row in rows if row[key] is not None]
     return float(np.mean(values)) if values else None
+
+
+def _worst(rows: Sequence[Row], key: str) -> float | None:
+    return max((row[key] for row in rows if row[key] is not None), default=None)
 
 
 def _share(rows: Sequence[Row], key: str) -> float | None:
