@@ -26,6 +26,7 @@ Contents = dict[str, bytes]
 """Files below a folder, by relative path."""
 _TIMES = {"timings.csv", "results.json", "results.csv", "report.html", "budgets.jsonl", "run.json", "done.json"}
 """Files that hold times, which differ between equal runs."""
+_INPUTS = ("recording", "run", "moving", "capture")
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def scenarios(short: bool) -> list[Scenario]:
         Scenario("compare", compare, resumes=True),
         Scenario("convert", ("convert", "recording", "OUT")),
         Scenario("convert .mcap", ("convert", "recording", "OUT.mcap")),
-        Scenario("calibrate", ("calibrate", "recording", "-o", "OUT"), old=True),
+        Scenario("calibrate", ("calibrate", "moving", "-o", "OUT"), old=True),
         *exports,
         Scenario("markers link .csv", ("markers", "link", *capture, "OUT.csv"), old=True),
         Scenario("markers cut .c3d", ("markers", "cut", *capture, "OUT.c3d"), old=True),
@@ -113,6 +114,7 @@ class Campaign:
         for arguments in (
             ("synth", "everyday", "recording", "--frames", "2", "--model", "skin"),
             ("track", "recording", "-o", "run", "--hand", "truth", "--tracker", "ik", "--threads", "1"),
+            ("synth", "everyday", "moving", "--frames", "8", "--fps", "6", "--model", "skin"),
             ("synth", "everyday", "capture", "--markers", "13", "--frames", "8"),
         ):
             self._here(Scenario("", arguments))
@@ -167,7 +169,7 @@ class Campaign:
     def _prepare(self, scenario: Scenario) -> None:
         """Remove what the last command left, and make what the command replaces."""
         for path in self._folder.iterdir():
-            if path.name not in ("recording", "run", "capture"):
+            if path.name not in _INPUTS:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
         if not scenario.old:
             return

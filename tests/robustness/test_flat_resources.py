@@ -10,6 +10,6 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 def test_nothing_grows_while_frames_are_tracked_and_trackers_opened() -> None:
-    growths = list(measure(frames=24, opened=12, trackers=["ik"], backends=["raster", "oracle"]))
+    growths = list(measure(frames=12, opened=6, trackers=["ik"], backends=["raster", "oracle"]))
     assert [growth.what for growth in growths] == ["frames of ik", "trackers ik", "scorers raster", "scorers oracle"]
     assert [growth.row() for growth in growths if not growth.is_flat] == []
