@@ -163,8 +163,11 @@ class Campaign:
             if ended.code != 0:
                 yield f"does not resume: {ended.code} {ended.error[-300:]}"
         old = {name: data for name, data in before.items() if name.startswith("OUT")}
-        if found != reference and (scenario.resumes or ended.code == 0 or found != old):
-            yield f"left {sorted(found)} that are neither the old nor the new ones"
+        # Each output is complete, of a command that writes several.
+        for output in {name.partition("/")[0] for name in found | old | reference}:
+            left, former, new = (_of(output, each) for each in (found, old, reference))
+            if left != new and (scenario.resumes or ended.code == 0 or left != former):
+                yield f"left {output}, which is neither the old nor the new one"
 
     def _prepare(self, scenario: Scenario) -> None:
         """Remove what the last command left, and make what the command replaces."""
@@ -213,6 +216,11 @@ class Campaign:
         """
         if code := quiet(scenario.act, list(scenario.arguments), self._folder):
             raise RuntimeError(f"{' '.join(scenario.arguments)} ended with {code}")
+
+
+def _of(output: str, found: Contents) -> Contents:
+    """Return the files of one output."""
+    return {name: data for name, data in found.items() if name.partition("/")[0] == output}
 
 
 def contents(folder: Path) -> Contents:

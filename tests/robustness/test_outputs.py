@@ -128,7 +128,19 @@ def test_every_path_to_write_is_marked() -> None:
     """All paths that are no inputs have the mark that `check_arguments` reads."""
     inputs = {
         *("path", "camera", "skin_model", "sequence", "sequences", "keypoints", "config", "hand", "start", "paths"),
-        *("runs", "predictions", "labels", "truth", "capture", "recordings", "rig", "images", "masks", "postures"),
+        *(
+            "runs",
+            "predictions",
+            "labels",
+            "truth",
+            "capture",
+            "recording",
+            "recordings",
+            "rig",
+            "images",
+            "masks",
+            "postures",
+        ),
     }
     entries = [entry for entry in (COMMANDS | MARKER_COMMANDS).values() if entry.module != "depthtrack.cli.markers"]
     marked = set()
