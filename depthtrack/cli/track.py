@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from depthtrack.tracking.run_configuration import RunConfiguration
 
 
+_CLEAR_MARGIN = 0.1
+"""Share by which the energy of the given side is higher if the other one is reported."""
+
+
 @dataclass(frozen=True)
 class TrackCommand:
     """Track the hand through a recording and write its pose in every frame to a run folder.
@@ -141,6 +145,22 @@ class TrackCommand:
         check_run(configuration, sequence, self.out, self.resume)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
+    def _better_side(self, sequence: "Recording") -> str | None:
+        """Return a sentence if a hand of the other side fits better than that of `--side`."""
+        from depthtrack.tracking.side_choice import SideOptions, choose_side
+        from depthtrack.tracking.stretches import StretchOptions
+
+        if self.hands.side == "auto":
+            return None
+        options = SideOptions(StretchOptions(stretches=4, stretch_frames=6))
+        choice = choose_side(sequence, self.segmentation_options, self.threads or 1, self.frames, options)
+        if choice.margin < _CLEAR_MARGIN or choice.side == self.hands.side:
+            return None
+        return (
+            f"a {choice.side} hand fits {100 * choice.margin:.0f} % better in {choice.frames} frames: give"
+            f" --side {choice.side}, or --mirror if the images are mirrored"
+        )
+
     def _report(self, sequence: "Recording", rate: str) -> None:
         from depthtrack.recording.depth_checks import no_hand_note
         from depthtrack.recording.frame_failures import FAILURES_FILE, read_failures
@@ -152,6 +172,8 @@ class TrackCommand:
         untrusted = sum(not row.status.is_trusted for row in rows)
         if sequence.has_depth and untrusted == len(rows):
             print(no_hand_note(sequence))
+        elif (better := self._better_side(sequence)) is not None:
+            print(better)
         failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""
         print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}{rate}")
         print(f"errors and timing:  depthtrack evaluate {self.out}")

@@ -19,6 +19,8 @@ _SATURATED_SHARE = 0.002
 """Share of pixels of the largest value of a sensor that is reported."""
 _CONSTANT_SHARE = 0.15
 """Share of pixels of one value that is reported; noise spreads a wall over many values."""
+_WALL_RANGE, _WALL_SHARE = 0.03, 0.05
+"""Relative range of depth beside a value, and the share of its pixels there, that show a surface with noise."""
 _NEAREST_READING = 0.12
 """Depth that no sensor for hands reads below, metres."""
 _FARTHEST_HAND = 3.0
@@ -97,13 +99,19 @@ def _values_without_meaning(readings: Index, pixels: int, camera: Camera) -> Ite
     saturated = float(readings[_LARGEST_STORED] / pixels)
     if saturated >= _SATURATED_SHARE:
         value, share = _LARGEST_STORED, saturated
-    elif share < _CONSTANT_SHARE:
+    elif share < _CONSTANT_SHARE or _is_surface(readings, value):
         return
     yield (
         f"the stored value {value} ({value * camera.depth_scale:.3g} m) covers {100 * share:.1f} % of the pixels:"
         f" if it means no reading, give --invalid {value}"
     )
     readings[value] = 0
+
+
+def _is_surface(readings: Index, value: int) -> bool:
+    """Return whether neighbours of a value are readings too, as on a noisy wall."""
+    near = readings[int((1 - _WALL_RANGE) * value) : int((1 + _WALL_RANGE) * value) + 1].sum() - readings[value]
+    return bool(near > _WALL_SHARE * readings[value])
 
 
 def _units(readings: Index, camera: Camera) -> Iterator[str]:

@@ -35,8 +35,12 @@ def contact_sheet(
     if not frames:
         raise InputError(f"{title} holds no readable frame to show")
     # Pairs of pictures are placed three in a row, single ones four.
-    columns = min(4 if frames[0].frame.colour is None else 3, len(frames))
-    tiles = [_tile(annotated, _tile_height(frames[0], width // columns), near, far) for annotated in frames]
+    layers: list[Layer] = ["overview"]
+    if any(annotated.frame.colour is not None for annotated in frames):
+        layers = ["depth", "overview"]
+    columns = min(5 - len(layers), len(frames))
+    height = _tile_height(frames[0], width // columns / len(layers))
+    tiles = [_tile(annotated, layers, height, near, far) for annotated in frames]
     grid = tile_grid(tiles, columns)
     parts = [_title(title, subtitle, grid.shape[1]), grid, _legend(frames, near, far, grid.shape[1])]
     return framed(stacked(parts, gap=12))
@@ -76,17 +80,16 @@ def save_picture(image: Image, path: Path) -> None:
     write_atomic(path, data.tobytes())
 
 
-def _tile(annotated: AnnotatedFrame, height: int, near: float, far: float) -> Image:
-    """Return depth beside the overview; without colour, the overview on depth alone."""
-    layers: list[Layer] = ["overview"] if annotated.frame.colour is None else ["depth", "overview"]
+def _tile(annotated: AnnotatedFrame, layers: list[Layer], height: int, near: float, far: float) -> Image:
+    """Return layers of a frame in a row; an overview without colour is on depth."""
     large = [draw_layer(annotated, layer, 2 * height, near, far) for layer in layers]
     pictures = [smaller(image, image.shape[1] // 2, height) for image in large]
     return captioned(beside(pictures, gap=0), f"frame {annotated.frame.index}", f"{annotated.frame.timestamp:.2f} s")
 
 
-def _tile_height(annotated: AnnotatedFrame, tile_width: int) -> int:
-    pictures = 1 if annotated.frame.colour is None else 2
-    return max(16, round(tile_width / pictures * annotated.camera.height / annotated.camera.width))
+def _tile_height(annotated: AnnotatedFrame, width: float) -> int:
+    """Return the height of one picture of a tile, pixels."""
+    return max(16, round(width * annotated.camera.height / annotated.camera.width))
 
 
 def _title(title: str, subtitle: str, width: int) -> Image:

@@ -49,6 +49,13 @@ def test_ordinary_depth_has_no_note(wall: bool, scale: float) -> None:
     assert notes((scene(wall) * (0.001 / scale)).astype(np.uint16), scale) == []
 
 
+def test_a_far_wall_in_coarse_steps_has_no_note() -> None:
+    """Kinect v1 at 3 m has steps of 25 mm, so that a third of a wall has one value."""
+    stored = scene(wall=False)
+    steps = np.rint(np.random.default_rng(1).normal(0, 0.6, CAMERA.shape)).astype(int)
+    assert notes(np.where(stored > 0, stored, 3000 + 25 * steps).astype(np.uint16)) == []
+
+
 @pytest.mark.parametrize("value", [65535, 4000, 10000], ids=["saturated", "a far plane", "clipped at 10 m"])
 def test_a_value_that_covers_much_is_named_and_can_be_excluded(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], value: int

@@ -49,6 +49,21 @@ def test_the_side_is_found_and_its_hand_tracked(tmp_path: Path, side: Side, caps
     assert main([*command, "--resume"]) == 0
 
 
+@pytest.mark.slow
+def test_a_hand_given_of_the_wrong_side_is_reported_after_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = recorded(tmp_path / "recording", "left")
+    command = ["track", str(path), "--tracker", "ik", "--hand", "average"]
+    assert main([*command, "-o", str(tmp_path / "wrong"), "--side", "right"]) == 0
+    assert "give --side left, or --mirror" in capsys.readouterr().out
+    assert main([*command, "-o", str(tmp_path / "right"), "--side", "left"]) == 0
+    assert "--mirror" not in capsys.readouterr().out
+    # The images mirrored back show a right hand.
+    assert main([*command, "-o", str(tmp_path / "mirrored"), "--side", "right", "--mirror"]) == 0
+    assert "--mirror" not in capsys.readouterr().out
+
+
 def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = Synthesiser(Synthesis(frames=1))
     with SequenceWriter(tmp_path / "empty", made.sensor.camera) as writer:
