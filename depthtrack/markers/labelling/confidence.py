@@ -10,10 +10,10 @@ from depthtrack.markers.labelling.packed import PackedPoints
 from depthtrack.markers.labelling.state import LARGEST_MISFIT, Settings
 from depthtrack.types import Array, Index, Mask
 
-ONLINE = np.array([1.304, 0.279, -2.575, 0.432])
-"""Weights of 1, margin, misfit and logarithm of the frames in a row with a point, online."""
-OFFLINE = np.array([-3.079, -0.138, 1.717, 4.76, 2.902, -2.176])
-"""Weights of 1, margin a frame, logarithm of the frames, rival, passes that agree, and misfit, offline."""
+ONLINE = np.array([5.81, -0.005, -6.004, 0.764])
+"""Weights of 1, margin, log(1 + misfit) and logarithm of the frames in a row with a point, online."""
+OFFLINE = np.array([-4.267, -0.207, 1.665, 6.241, 4.203, -6.526])
+"""Weights of 1, margin a frame, logarithm of the frames, rival, passes that agree, log(1 + misfit), offline."""
 SUREST = 0.9999
 """Largest confidence: the share of errors among the surest labels of the captures is not known more exactly."""
 
@@ -55,7 +55,7 @@ def offline_features(
             np.log(frames[k]),
             rivals[k],
             sum((each[t, i] == labels[t, i]).astype(np.float64) for each in passes),
-            np.minimum(np.nan_to_num(misfit), LARGEST_MISFIT),
+            np.log1p(np.minimum(np.nan_to_num(misfit), LARGEST_MISFIT)),
         ],
         axis=-1,
     )

@@ -59,7 +59,7 @@ def keep_residuals(
         count += 1
         features = out.features[i]
         features[0], features[1] = 1.0, min(out.margin[i], LARGEST_MARGIN)
-        features[2] = min(misfit(points[j], scene, settings, state, i, placed, bodies), LARGEST_MISFIT)
+        features[2] = np.log1p(min(misfit(points[j], scene, settings, state, i, placed, bodies), LARGEST_MISFIT))
         features[3] = np.log(1.0 + state.run[i])
         T, e = bodies.T[scene.body[i]], state.residual[i]
         gain = max(settings.residual_gain, 1 / (1.0 + state.seen[i]))

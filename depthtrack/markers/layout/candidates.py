@@ -80,8 +80,11 @@ class Candidates:
         first = np.cumsum(sizes) - sizes
         return np.asarray(np.concatenate(groups)[first[group] + (share * sizes[group]).astype(np.int64)])
 
-    def layout(self, chosen: Sequence[int] | Index, about: str) -> Layout:
-        """Return the layout of chosen candidates of a skin, from thumb to little finger and outward."""
+    def layout(self, chosen: Sequence[int] | Index, about: str, anchored: bool = False) -> Layout:
+        """Return the layout of chosen candidates of a skin, from thumb to little finger and outward.
+
+        anchored: add the marker at the wrist.
+        """
         order = sorted(map(int, chosen), key=lambda v: (self.bodies[v] == 0, self.bodies[v], self.places[v]))
         markers, used = [], dict[str, int]()
         for v in order:
@@ -89,6 +92,8 @@ class Candidates:
             used[bone] = used.get(bone, 0) + 1
             label = bone if used[bone] == 1 else f"{bone}_{used[bone]}"
             markers.append(SkinMarker(label, bone, along, around, SPREAD))
+        if anchored:
+            markers.append(SkinMarker("wrist", "middle_metacarpal", 0.0, 0.0, SPREAD))
         return Layout(about, self.radius, tuple(markers))
 
 

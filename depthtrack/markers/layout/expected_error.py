@@ -1,12 +1,18 @@
 """Reconstruction error of all vertices of the skin (Schroeder et al. 2015, Sec. 4)."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from depthtrack.hand.pose import make_pose
 from depthtrack.hand.skin.mesh import Skin
+from depthtrack.hand.synergies import Synergies
+from depthtrack.markers.layout.reconstruction import reconstruct
+from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array
 
+_HELD_OUT = 200
 _FRAMES = 32
 """Frames whose vertices are in memory at a time."""
 
@@ -30,3 +36,32 @@ class VertexErrors(NamedTuple):
             distance = np.linalg.norm(skin.at(poses[part]) - skin.at(truth[part]), axis=-1)
             mean[part], largest[part] = distance.mean(axis=1), distance.max(axis=1)
         return VertexErrors(mean, largest)
+
+
+def expected_errors(
+    model: MarkerModel, motions: Sequence[Array], components: int, anchored: bool, noise: float, seed: int = 0
+) -> VertexErrors:
+    """Return the errors of motions that are reconstructed from noisy markers.
+
+    motions: postures (T, 20) of each, rad.
+    components: synergies of the subspace, fitted to the first four fifths of each motion. The last fifth, at most
+        `_HELD_OUT` frames, is reconstructed.
+    anchored: whether the wrist is measured too.
+    noise: standard deviation of each coordinate, metres.
+    """
+    assert model.hand is not None
+    split = [max(1, 4 * len(postures) // 5) for postures in motions]
+    known = np.concatenate([postures[:first] for postures, first in zip(motions, split, strict=True)])
+    synergies = Synergies.fit(known).truncated(components)
+    generator, found = np.random.Generator(np.random.Philox(key=[seed, 1])), []
+    for postures, first in zip(motions, split, strict=True):
+        held_out = postures[first:][:_HELD_OUT]
+        if not len(held_out):
+            continue
+        truth = make_pose(np.zeros(3), [1.0, 0, 0, 0], held_out)
+        markers, wrist = model.positions(truth), model.kinematics.wrist(truth)
+        markers = markers + generator.normal(0, noise, markers.shape)
+        wrist = wrist + generator.normal(0, noise, wrist.shape)
+        poses = reconstruct(model, markers, synergies, None, wrist if anchored else None)
+        found.append(VertexErrors.between(Skin.of(model.hand), poses, truth))
+    return VertexErrors(np.concatenate([e.mean for e in found]), np.concatenate([e.largest for e in found]))

@@ -110,3 +110,12 @@ def _frame(axis: Array) -> Array:
 
 def _name(finger: int, phalanx: int) -> str:
     return next(name for name, place in BONES.items() if place == (finger, phalanx))
+
+
+def bone_length(hand: HandShape, bone: str) -> float:
+    """Return the length of one of `BONES`, metres."""
+    finger, phalanx = BONES[bone]
+    if phalanx >= 0:
+        return float(hand.lengths[finger, phalanx]) * hand.scale
+    shape = hand.with_(side="right", scale=1.0)
+    return float(np.linalg.norm(shape.bases[finger] - _carpal_root(shape, finger))) * hand.scale
