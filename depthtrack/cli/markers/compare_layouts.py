@@ -68,7 +68,7 @@ def _row(found: "CaptureComparison") -> dict[str, Any]:
     import numpy as np
 
     return {
-        "markers": found.count,
+        "markers": found.markers,
         "ours_mm": round(1000 * found.ours.error, 3),
         "farthest_mm": round(1000 * found.farthest.error, 3),
         "random_mean_mm": round(1000 * float(found.random.mean()), 3),
@@ -83,7 +83,7 @@ def _text(name: str, rows: list[dict[str, Any]]) -> str:
     from depthtrack.text_table import aligned
 
     head = ("markers", "ours", "farthest", "random, mean", "median", "best", "worse than ours", "our choice")
-    lines = [head]
+    lines: list[tuple[str, ...]] = [head]
     for row in rows:
         errors = [f"{row[key]:.2f} mm" for key in ("ours_mm", "farthest_mm")]
         errors += [f"{row[f'random_{key}_mm']:.2f} mm" for key in ("mean", "median", "best")]

@@ -43,7 +43,7 @@ class CaptureComparison(NamedTuple):
     random: errors (R,) of random choices, metres.
     """
 
-    count: int
+    markers: int
     ours: Choice
     farthest: Choice
     random: Array

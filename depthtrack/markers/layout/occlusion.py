@@ -22,7 +22,7 @@ _BEHIND = 0.004
 """Depth behind the skin from which a marker is hidden, metres."""
 _NEEDED = 2
 """Cameras that must see a marker."""
-_TURNS = np.radians((0.0, 60.0, 120.0, 180.0, 240.0, 300.0))
+_TURNS = tuple(np.radians((0.0, 60.0, 120.0, 180.0, 240.0, 300.0)).tolist())
 """Turns of the hand about the vertical."""
 
 
