@@ -167,8 +167,5 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _short(value: object) -> str:
-    try:
-        shown = repr(value)
-    except (ValueError, RecursionError):  # Python does not print integers of thousands of digits
-        return "a value too long to print"
+    shown = repr(value)
     return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -37,7 +37,10 @@ class TrackingThresholds:
     )
     agreement: float = option(0.5, "A track with a lower agreement of the silhouettes is lost", most=1)
     energy: float = option(
-        0.4, "A track is lost if its energy exceeds this and also `lost_ratio` times the median", unit="clamp"
+        0.4,
+        "A track is lost if its energy exceeds this and also `lost_ratio` times the median",
+        unit="clamp",
+        most=math.inf,
     )
     lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
     guide_agreement: float = option(0.6, "Least agreement of a pose that guides the segmentation", most=1)
@@ -172,7 +175,7 @@ class RecoveryOptions:
     accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
     accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
     doubt_agreement: float = option(0.6, "A lower agreement triggers a local search", most=1)
-    doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp")
+    doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp", most=math.inf)
 
     @property
     def routine(self) -> "RecoveryOptions":

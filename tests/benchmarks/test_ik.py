@@ -69,7 +69,7 @@ def test_the_command_prints_text_and_writes_json(
 ) -> None:
     monkeypatch.setattr(ik, "plan", lambda seconds: ik.IkPlan(seconds, (HEADLINE, Setting("cylinders"))))
     out = tmp_path / "bench.json"
-    arguments = ["bench", "ik", "--seconds", "0.001", "--out", str(out)]
+    arguments = ["bench", "ik", "--seconds", "0.01", "--out", str(out)]
     assert main([*arguments, "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report == json.loads(out.read_text())

@@ -91,7 +91,7 @@ def test_tracking_is_repeatable_and_accurate() -> None:
 
 def test_noise_and_a_tiny_budget_increase_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
     # A search would fail here, so the swarm tracks alone at any energy.
-    monkeypatch.setattr("depthtrack.tracking.stages.searches.orientation_proposals", None)
+    monkeypatch.setattr("depthtrack.tracking.stages.searches.global_proposals", None)
     good = tracked()["error_mm"]
     assert tracked(depth_noise_mm=80.0, skin_flips_percent=40.0)["error_mm"] > 1.5 * good
     assert tracked(particles=4, generations=1)["error_mm"] > 1.5 * good

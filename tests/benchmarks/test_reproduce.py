@@ -132,7 +132,7 @@ def test_the_command_lists_figures_and_rejects_invalid_options(
         (["-o", str(tmp_path)], "expected figures"),
         (["fig99", "-o", str(tmp_path)], "no figure 'fig99'"),
         (["fig2b", "-o", str(tmp_path), "--jobs", "0"], "--jobs"),
-        (["fig2b", "-o", str(tmp_path), "--frames", "0", "--jobs", "1"], "1 to 360 frames"),
+        (["fig2b", "-o", str(tmp_path), "--frames", "0", "--jobs", "1"], "--frames must be from 1"),
     ):
         assert main(["reproduce", *arguments]) == 2
         assert hint in capsys.readouterr().err

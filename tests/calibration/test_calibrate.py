@@ -218,5 +218,5 @@ def test_recordings_without_a_hand_are_rejected(tmp_path: Path, capsys: pytest.C
     assert main(["calibrate", str(empty), "-o", str(tmp_path / "hand.json")]) == 2
     assert "calibrating needs at least 3 frames" in capsys.readouterr().err
     assert main(["calibrate", str(empty), "-o", str(tmp_path)]) == 2
-    assert "name a file in it" in capsys.readouterr().err
+    assert "-o must be a file, found the folder" in capsys.readouterr().err
     assert not (tmp_path / "hand.json").exists()

@@ -121,8 +121,8 @@ def test_an_output_below_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureF
     assert f"found the file {tmp_path / 'file'}" in capsys.readouterr().err
 
 
-def test_control_characters_are_escaped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(tmp_path / "no\x1b[31mname\x07")]) == 2
+def test_control_characters_are_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", "no\x1b[31mname\x07"]) == 2
     error = capsys.readouterr().err
     assert "\\x1b[31mname\\x07" in error
     assert "\x1b" not in error

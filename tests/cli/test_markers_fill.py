@@ -47,7 +47,7 @@ def test_an_unusable_option_gives_one_sentence(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["markers", "fill", str(folder), "-o", str(tmp_path / "no"), "--longest", "-1"]) == 2
-    assert "longest gap" in capsys.readouterr().err
+    assert "--longest must be from" in capsys.readouterr().err
     assert main(["markers", "fill", str(tmp_path / "nothing"), "-o", str(tmp_path / "no")]) == 2
 
 

@@ -81,7 +81,7 @@ def test_prefix_of_the_labels_is_removed(made: Path, tmp_path: Path, capsys: pyt
         ([], "either the markers of a rigid body"),
         (["-m", "19", "--body", "a"], "either the markers of a rigid body"),
         (["-m", "19", "left:13"], "one hand"),
-        (["-m", "19", "--rounds", "-1"], "rounds must not be negative"),
+        (["-m", "19", "--rounds", "-1"], "--rounds must be from 0"),
         (["--body", "a", "b", "c"], "no marker 'a'"),
     ],
 )

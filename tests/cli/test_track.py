@@ -172,10 +172,11 @@ def test_mistakes_are_found_before_the_hand_is_measured(
     options = [each.format(run=run, new=tmp_path / "new") for each in more]
     assert main(["track", str(recording), *options]) == 2
     assert expected in capsys.readouterr().err
-    tracker = dt.tracker_config("ik", synergies="leap", components=99)
     monkeypatch.setattr("depthtrack.api.choices.calibrate_either_side", measured)
-    with pytest.raises(InputError):
-        dt.track(recording, tracker=tracker)
+    with pytest.raises(InputError, match="components must be from 1 to 20"):
+        dt.tracker_config("ik", synergies="leap", components=99)
+    with pytest.raises(InputError, match="must have keypoints"):
+        dt.track(recording, tracker="lift")
     with pytest.raises(InputError, match="already holds a run"):
         dt.track(recording, out=run)
 

@@ -68,8 +68,8 @@ def test_a_run_resumes_only_with_its_own_synergies(
         (("--components", "3"), "choose a set with --synergies"),
         (("--synergy-prior",), "choose a set with --synergies"),
         (("--synergies", "magic"), "leap-grasps"),
-        (("--synergies", "leap", "--components", "21"), "1 to 20 components"),
-        (("--icp-iterations", "0"), "icp_iterations"),
+        (("--synergies", "leap", "--components", "21"), "--components must be from 1 to 20"),
+        (("--icp-iterations", "0"), "--icp-iterations must be from 1"),
     ],
 )
 def test_invalid_options_are_rejected(

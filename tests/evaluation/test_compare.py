@@ -265,7 +265,7 @@ def test_recordings_of_one_name_get_different_folders(recording: Path, tmp_path:
     ("more", "expected"),
     [
         (["--repeats", "0"], "repeats"),
-        (["--equal-time", "0"], "equal time"),
+        (["--equal-time", "0"], "--equal-time"),
         (["--frames", "0"], "--frames"),
         (["--jobs", "0"], "--jobs"),
         (["--hand", "nobody.json"], "nobody.json"),

@@ -61,7 +61,7 @@ def test_a_posture_is_forgotten_over_time() -> None:
 
 @pytest.mark.parametrize("wrong", [{"posture_weight": -1.0}, {"posture_memory": 0.0}, {"search_share": 1.5}])
 def test_values_out_of_range_are_rejected(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="search_share from 0 to 1"):
+    with pytest.raises(InputError, match=f"{next(iter(wrong))} must be from"):
         IcpOptions(**wrong)  # type: ignore[arg-type]
 
 

@@ -22,7 +22,7 @@ class Command:
     the capture, errors those of the second.
     """
 
-    folder: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
+    path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
     """Folder that `markers solve` wrote."""
     model: Annotated[str | None, stated_default(metavar="NAME")] = None
     """Hand in the folder (default: the first one)."""
@@ -43,11 +43,11 @@ class Command:
 
         if not self.markers:
             raise InputError("a comparison needs numbers of markers, as --markers 4 6 8")
-        labelled = MarkerFolder.load(self.folder).labelled
+        labelled = MarkerFolder.load(self.path).labelled
         hands = {model.name: k for k, model in enumerate(labelled.models) if not model.is_rigid}
         name = next(iter(hands), None) if self.model is None else self.model
         if name not in hands:
-            raise InputError(f"{self.folder} has no hand '{name}': choose among {', '.join(hands) or 'none'}")
+            raise InputError(f"{self.path} has no hand '{name}': choose among {', '.join(hands) or 'none'}")
         with percent_bar() as show:
             found = [
                 compare_choices(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 from depthtrack.ranges import MOST_SEED, Range
@@ -33,7 +34,7 @@ class Command:
     """Motions by name, as grasp, motion files, or recorded postures: .mat, .csv, .npz, recordings and run folders."""
     markers: Annotated[int, number(1, 64, aliases=("-k",), metavar="K")]
     """Number of markers, without the one at the wrist."""
-    out: Annotated[Path, tyro.conf.arg(aliases=("-o",), metavar="LAYOUT.json")]
+    out: Annotated[Path, Output("file", (".json",)), tyro.conf.arg(aliases=("-o",), metavar="LAYOUT.json")]
     """File to write."""
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of the hand (default: the average adult's)."""
@@ -67,8 +68,6 @@ class Command:
         from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.layout_sheet import layout_sheet
 
-        if self.out.suffix != ".json" or self.out.is_dir() or not self.out.parent.is_dir():
-            raise InputError(f"the layout must be a .json file in an existing folder, found {self.out}")
         hand = HandShape() if self.hand is None else load_hand(self.hand)
         motions = [read_motion(name) for name in self.motion]
         options = self._options()

@@ -80,5 +80,5 @@ def test_options_survive_json() -> None:
 
 
 def test_a_gap_length_of_zero_is_refused() -> None:
-    with pytest.raises(InputError, match="longest gap"):
+    with pytest.raises(InputError, match="longest must be from"):
         FillOptions(longest=0)

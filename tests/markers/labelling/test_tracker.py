@@ -121,5 +121,5 @@ def test_the_assignment_is_that_of_the_oracle(usual: Example) -> None:
 
 def test_options_survive_json_and_reject_nonsense() -> None:
     assert from_data(LabellingOptions, to_data(PAPER_LABELLING), "options") == PAPER_LABELLING
-    with pytest.raises(InputError, match="between 0 and 1"):
+    with pytest.raises(InputError, match="seen_again must be from 0 to 1"):
         LabellingOptions(assignment=AssignmentOptions(seen_again=1.5))
