@@ -123,17 +123,35 @@ class Undistortion:
         Depth is interpolated within a surface. Across its edge, and beside missing readings, the nearest reading is
         taken.
         """
-        nearest, linear = self._sampled(depth, cv2.INTER_NEAREST), self._sampled(depth, cv2.INTER_LINEAR)
+        nearest, linear = self._sampled(depth, cv2.INTER_NEAREST), self._interpolated(depth)
         window = np.ones((3, 3), dtype=np.uint8)
         spread = cv2.dilate(depth, window) - cv2.erode(depth, window)
         smooth = self._sampled(spread, cv2.INTER_NEAREST) < _STEP * nearest
         return np.where(smooth & self._inside, linear, nearest)
 
+    def _interpolated(self, depth: Depth) -> Depth:
+        """Return depth (h, w) between its four neighbours; any value outside the image.
+
+        OpenCV before 5.0 rounds places to a 32nd of a pixel.
+        """
+        (left, top), readings, width = self._corner, depth.ravel(), depth.shape[1]
+        corner, u, v = top * width + left, self._across - np.float32(left), self._down - np.float32(top)
+        above = readings.take(corner) * (1 - u) + readings.take(corner + 1) * u
+        below = readings.take(corner + width) * (1 - u) + readings.take(corner + width + 1) * u
+        return np.asarray(above * (1 - v) + below * v, dtype=np.float32)
+
     def colour(self, colour: Image) -> Image:
         """Return a colour image (h, w, 3) without distortion; black where nothing was seen."""
         return self._sampled(colour, cv2.INTER_LINEAR)
 
-    @property
+    @cached_property
+    def _corner(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Column and row (h, w) of the first of four neighbours, within the image."""
+        height, width = self._across.shape
+        left, top = np.clip(np.floor(self._across), 0, width - 2), np.clip(np.floor(self._down), 0, height - 2)
+        return left.astype(np.intp), top.astype(np.intp)
+
+    @cached_property
     def _inside(self) -> NDArray[np.bool_]:
         """Pixels whose four neighbours lie in the image."""
         height, width = self._across.shape

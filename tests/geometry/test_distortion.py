@@ -80,3 +80,18 @@ def test_unusable_coefficients_are_rejected() -> None:
         Distortion((0.1,) * 12)
     with pytest.raises(InputError, match="within"):
         Distortion((float("nan"),))
+
+
+def test_depth_between_readings_is_interpolated_up_to_the_last_pixel() -> None:
+    """The slow form: each place by itself, from the four readings around it."""
+    undistortion = Undistortion(CAMERA, Distortion(BROWN))
+    depth = distorted_plane(Distortion(BROWN))
+    found = undistortion._interpolated(depth)
+    height, width = depth.shape
+    for row, column in np.random.default_rng(0).integers(0, [height, width], (200, 2)):
+        u, v = float(undistortion._across[row, column]), float(undistortion._down[row, column])
+        if 0 <= u <= width - 1 and 0 <= v <= height - 1:
+            left, top = min(int(u), width - 2), min(int(v), height - 2)
+            weights = np.outer([top + 1 - v, v - top], [left + 1 - u, u - left])
+            expected = float((weights * depth[top : top + 2, left : left + 2]).sum())
+            assert found[row, column] == pytest.approx(expected, abs=1e-6)
