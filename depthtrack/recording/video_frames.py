@@ -132,7 +132,10 @@ def open_video(path: Path) -> Any:
 
     Raises MissingExtraError, or an error of PyAV.
     """
-    return library().open(str(path), metadata_errors="ignore")
+    av = library()
+    # PyAV 19 keeps text that is not UTF-8, and has no choice.
+    choices = {"metadata_errors": "ignore"} if int(av.__version__.partition(".")[0]) < 19 else {}
+    return av.open(str(path), **choices)
 
 
 def video_stream(container: Any, path: Path, number: int = 0) -> Any:
