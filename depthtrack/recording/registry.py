@@ -42,7 +42,7 @@ def open_sequence(
         InputError: if `path` holds no recording, or one that is unusable beyond single frames.
         MissingExtraError: if the format needs a library that is not installed.
     """
-    return _format_of(Path(path)).open(Path(path), camera, on_damage, reading)
+    return _format_of(Path(path))(Path(path), camera, on_damage, reading)
 
 
 def image_size(path: Path | str, reading: ReadingOptions | None = None) -> tuple[int, int]:

@@ -22,9 +22,12 @@ class CountedFrames(BaseSequence):
     """A recording whose depth is the number of the frame, at 10 Hz from 100 s on."""
 
     def __init__(self, frames: int, damaged: tuple[int, ...] = (), clock: "FakeClock | None" = None) -> None:
-        super().__init__(Path("counted"))
-        self.camera, self.timestamps = CAMERA, np.linspace(100, 100 + 0.1 * (frames - 1), frames)
+        self.timestamps = np.linspace(100, 100 + 0.1 * (frames - 1), frames)
         self.bad, self.clock = damaged, clock
+        super().__init__(Path("counted"))
+
+    def _open(self, camera: Camera | None) -> None:
+        self.camera = CAMERA
 
     @classmethod
     def matches(cls, path: Path) -> bool:

@@ -9,7 +9,6 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording import Sequence, open_sequence, registry
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.capture import CaptureSequence
 from depthtrack.recording.sequences.tum import TumSequence
@@ -23,15 +22,8 @@ class ArraySequence(BaseSequence):
 
     format_name = "a .npy file"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
-        super().__init__(path, camera, on_damage, reading)
-        self._depth = np.load(path, allow_pickle=False)
+    def _open(self, camera: Camera | None) -> None:
+        self._depth = np.load(self.path, allow_pickle=False)
         self.camera = camera or CAMERA
         self.timestamps = np.arange(len(self._depth)) / 30
 

@@ -23,7 +23,6 @@ from depthtrack.recording.bags.opening import is_bag, open_storage
 from depthtrack.recording.bags.topics import choose_topics
 from depthtrack.recording.colour_association import associate_colour
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array, Depth, Image, Index
@@ -34,26 +33,19 @@ class BagSequence(BaseSequence):
 
     format_name = "a bag (.bag, .db3, .mcap)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`.
 
         Raises:
             InputError: if there is no depth, or the bag describes no camera and none is given.
             MissingExtraError: if the library rosbags is not installed.
         """
-        super().__init__(path, camera, on_damage, reading)
-        self._messages = Messages(open_storage(path))
+        self._messages = Messages(open_storage(self.path))
         self._choice = choose_topics(self._messages, self.reading)
         self._depth_rows, self.timestamps = self._times(self._choice.depth)
         if self._messages.storage.cut is not None:
             self.notes.append(
-                f"{path.name} is cut short ({self._messages.storage.cut}):"
+                f"{self.path.name} is cut short ({self._messages.storage.cut}):"
                 f" the {len(self.timestamps)} frames before it are read"
             )
         if self._choice.others:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,9 @@ Value = TypeVar("Value", bound=np.generic)
 class BaseSequence(ABC):
     """A recording of one format; see `Sequence` for the contract.
 
-    A format sets `format_name`, overrides `matches`, `image_size` and `read_depth`, and in its constructor, after this
-    one, sets `camera` and `timestamps` (N,), seconds, increasing. It overrides the rest if its recordings hold more.
-    It appends to `notes` what the user must know: colour that is not used, a file that is cut short.
+    A format sets `format_name` and overrides `matches`, `image_size`, `read_depth` and `_open`, which sets `camera` and
+    `timestamps` (N,), seconds, increasing. It overrides the rest if its recordings hold more. It appends to `notes`
+    what the user must know: colour that is not used, a file that is cut short.
     """
 
     format_name: ClassVar[str]
@@ -60,6 +60,17 @@ class BaseSequence(ABC):
         self._undistortion: Undistortion | None = None
         self._damaged: dict[int, DamagedFrame] = {}
         self._damaged_colour: dict[int, DamagedFrame] = {}
+        self._open(camera)
+
+    @abstractmethod
+    def _open(self, camera: Camera | None) -> None:
+        """Read what is known without decoding images, and set `camera` and `timestamps`.
+
+        camera: given by the user in place of the recording's own; None if it is not.
+
+        Raises:
+            InputError: if the recording is unusable.
+        """
 
     @classmethod
     @abstractmethod
@@ -74,17 +85,6 @@ class BaseSequence(ABC):
         Raises:
             InputError: if no depth image can be read.
         """
-
-    @classmethod
-    def open(
-        cls,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> Self:
-        """Open a recording; see the constructor."""
-        return cls(path, camera, on_damage, reading)
 
     @abstractmethod
     def read_depth(self, index: int) -> Depth:

@@ -21,7 +21,6 @@ from depthtrack.files import compact_json, read_json
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Array, Depth
@@ -97,21 +96,14 @@ class CaptureSequence(BaseSequence):
     format_name = f"a folder with {CAPTURE_FILE} (motion capture)"
     has_depth = False
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        capture = read_json(path / CAPTURE_FILE, "the capture", CaptureDescription.from_fields)
+        capture = read_json(self.path / CAPTURE_FILE, "the capture", CaptureDescription.from_fields)
         self._name = capture.name
         self.camera, self.T_camera_world = camera or capture.camera, capture.T_camera_world
         self.timestamps = capture.timestamps
-        self.hand = read_hand(path)
-        self.ground_truth = read_ground_truth(path, self.hand)
+        self.hand = read_hand(self.path)
+        self.ground_truth = read_ground_truth(self.path, self.hand)
 
     @classmethod
     def matches(cls, path: Path) -> bool:

@@ -28,7 +28,7 @@ from depthtrack.number_text import parse_number
 from depthtrack.recording.images import read_colour, read_depth
 from depthtrack.recording.numpy_arrays import read_arrays
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import GroundTruth, OnDamage
+from depthtrack.recording.sequence import GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import first_size, has_file, nominal_times, numbered_files
 from depthtrack.types import Depth, Image, Mask
@@ -46,20 +46,13 @@ class DexYcbSequence(BaseSequence):
 
     format_name = "a folder with aligned_depth_to_color_000000.png (DexYCB)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        self.camera = camera or _read_camera(path.resolve())
-        files = numbered_files(path, _DEPTH)
+        self.camera = camera or _read_camera(self.path.resolve())
+        files = numbered_files(self.path, _DEPTH)
         self._numbers, self._files = list(files), list(files.values())
-        self._colours = numbered_files(path, _COLOUR) if has_file(path, _COLOUR) else {}
-        self._labels = numbered_files(path, _LABELS) if has_file(path, _LABELS) else {}
+        self._colours = numbered_files(self.path, _COLOUR) if has_file(self.path, _COLOUR) else {}
+        self._labels = numbered_files(self.path, _LABELS) if has_file(self.path, _LABELS) else {}
         self.has_colour = any(number in self._colours for number in files)
         self.timestamps = nominal_times(self._numbers)
         self.description = {
@@ -67,7 +60,7 @@ class DexYcbSequence(BaseSequence):
             "source": "Chao et al., DexYCB: a benchmark for capturing hand grasping of objects, CVPR 2021",
         }
         if self._labels:
-            joints = [_joints(path / name) for name in self._labels.values()]
+            joints = [_joints(self.path / name) for name in self._labels.values()]
             self.ground_truth = GroundTruth(nominal_times(list(self._labels)), joints=np.array(joints))
 
     @classmethod
@@ -77,11 +70,7 @@ class DexYcbSequence(BaseSequence):
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
-        """Return (width, height) of the first readable depth image.
-
-        Raises:
-            InputError: if none can be read.
-        """
+        """See `BaseSequence`."""
         return first_size(path, _DEPTH)
 
     def read_depth(self, index: int) -> Depth:

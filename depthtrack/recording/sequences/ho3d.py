@@ -22,7 +22,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.recording.images import read_colour, read_packed
 from depthtrack.recording.pickled_numbers import read_pickled_numbers
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import GroundTruth, OnDamage
+from depthtrack.recording.sequence import GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import first_size, has_file, nominal_times, numbered_files
 from depthtrack.types import Array, Depth, Image
@@ -43,18 +43,11 @@ class Ho3dSequence(BaseSequence):
 
     format_name = "a folder with depth/0000.png and meta/0000.pkl (HO-3D)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        files = numbered_files(path / "depth", _DEPTH)
+        files = numbered_files(self.path / "depth", _DEPTH)
         self._numbers, self._files = list(files), list(files.values())
-        self._colours = numbered_files(path / "rgb", _COLOUR) if has_file(path / "rgb", _COLOUR) else {}
+        self._colours = numbered_files(self.path / "rgb", _COLOUR) if has_file(self.path / "rgb", _COLOUR) else {}
         self.has_colour = any(number in self._colours for number in files)
         self.timestamps = nominal_times(self._numbers)
         self.description = {
@@ -62,10 +55,10 @@ class Ho3dSequence(BaseSequence):
             "source": "Hampali et al., HOnnotate: a method for 3D annotation of hand and object poses, CVPR 2020",
         }
         annotations = {
-            number: read_pickled_numbers(path / "meta" / name)
-            for number, name in numbered_files(path / "meta", _META).items()
+            number: read_pickled_numbers(self.path / "meta" / name)
+            for number, name in numbered_files(self.path / "meta", _META).items()
         }
-        self.camera = camera or _camera(path, annotations)
+        self.camera = camera or _camera(self.path, annotations)
         joints = {number: joints for number, fields in annotations.items() if (joints := _joints(fields)) is not None}
         if joints:
             self.ground_truth = GroundTruth(nominal_times(list(joints)), joints=np.array(list(joints.values())))
@@ -77,11 +70,7 @@ class Ho3dSequence(BaseSequence):
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
-        """Return (width, height) of the first readable depth image.
-
-        Raises:
-            InputError: if none can be read.
-        """
+        """See `BaseSequence`."""
         return first_size(path / "depth", _DEPTH)
 
     def read_depth(self, index: int) -> Depth:

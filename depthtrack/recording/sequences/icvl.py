@@ -22,7 +22,7 @@ from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.number_text import parse_numbers
 from depthtrack.recording.images import read_depth
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import BenchmarkJoints, GroundTruth, OnDamage
+from depthtrack.recording.sequence import BenchmarkJoints, GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import first_size, has_file, nominal_times, numbered_files
 from depthtrack.types import Array, Depth
@@ -40,21 +40,14 @@ class IcvlSequence(BaseSequence):
 
     format_name = "a folder with image_0000.png and labels above it (ICVL)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
         self.camera = camera or _BENCHMARK.camera
-        files = numbered_files(path, _IMAGE)
+        files = numbered_files(self.path, _IMAGE)
         self._files = list(files.values())
         self.timestamps = nominal_times(list(files))
         self.description = {"data set": "ICVL", "source": _BENCHMARK.source}
-        labels = _labels(path.resolve())
+        labels = _labels(self.path.resolve())
         if labels:
             numbers = sorted(labels)
             uvd = np.array([labels[number] for number in numbers])
@@ -69,11 +62,7 @@ class IcvlSequence(BaseSequence):
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
-        """Return (width, height) of the first readable depth image.
-
-        Raises:
-            InputError: if none can be read.
-        """
+        """See `BaseSequence`."""
         return first_size(path, _IMAGE)
 
     def read_depth(self, index: int) -> Depth:

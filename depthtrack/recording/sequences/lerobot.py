@@ -26,7 +26,6 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.recording.depth_tiff import read_tiff_depth, read_tiff_size
 from depthtrack.recording.depth_video import DepthVideo
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import has_file, numbered_files
 from depthtrack.types import Array32, Depth
@@ -54,16 +53,9 @@ class LeRobotSequence(BaseSequence):
 
     format_name = "a depth video or depth images of a folder with meta/info.json (LeRobot)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        source = _Source.of(path)
+        source = _Source.of(self.path)
         if camera is None:
             raise InputError(
                 f"{source.path}: LeRobot stores no camera: give it with --camera FILE.json, --camera-preset NAME, or"

@@ -21,7 +21,7 @@ from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.number_text import parse_numbers
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import GroundTruth, OnDamage
+from depthtrack.recording.sequence import GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import has_file, nominal_times, numbered_files
 from depthtrack.types import Array, Depth
@@ -40,22 +40,15 @@ class Msra15Sequence(BaseSequence):
 
     format_name = "a folder with 000000_depth.bin (MSRA15)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
         self.camera = camera or _BENCHMARK.camera
-        files = numbered_files(path, _DEPTH)
+        files = numbered_files(self.path, _DEPTH)
         self._files = list(files.values())
         self.timestamps = nominal_times(list(files))
         self.description = {"data set": "MSRA15", "source": _BENCHMARK.source}
-        if (path / _JOINTS_FILE).exists():
-            joints = read_joints(path / _JOINTS_FILE)
+        if (self.path / _JOINTS_FILE).exists():
+            joints = read_joints(self.path / _JOINTS_FILE)
             self.ground_truth = GroundTruth(
                 nominal_times(list(range(len(joints)))), joints=_BENCHMARK.to_keypoints(joints)
             )

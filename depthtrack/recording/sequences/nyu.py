@@ -22,7 +22,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.recording.images import read_colour, read_packed
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import BenchmarkJoints, GroundTruth, OnDamage
+from depthtrack.recording.sequence import BenchmarkJoints, GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.numbered_files import first_size, has_file, nominal_times, numbered_files
 from depthtrack.types import Array, Depth, Image
@@ -44,24 +44,17 @@ class NyuSequence(BaseSequence):
 
     format_name = "a folder with depth_1_0000001.png (NYU)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
         self.camera = camera or _BENCHMARK.camera
-        files = numbered_files(path, _DEPTH)
+        files = numbered_files(self.path, _DEPTH)
         self._numbers, self._files = list(files), list(files.values())
-        self._colours = numbered_files(path, _COLOUR) if has_file(path, _COLOUR) else {}
+        self._colours = numbered_files(self.path, _COLOUR) if has_file(self.path, _COLOUR) else {}
         self.has_colour = any(number in self._colours for number in files)
         self.timestamps = nominal_times([number - 1 for number in files])
         self.description = {"data set": "NYU", "source": _BENCHMARK.source}
-        if (path / _JOINTS_FILE).exists():
-            positions = read_joints(path / _JOINTS_FILE)
+        if (self.path / _JOINTS_FILE).exists():
+            positions = read_joints(self.path / _JOINTS_FILE)
             self.ground_truth = GroundTruth(
                 nominal_times(list(range(len(positions)))),
                 joints=_BENCHMARK.to_keypoints(positions),
@@ -75,11 +68,7 @@ class NyuSequence(BaseSequence):
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
-        """Return (width, height) of the first readable depth image.
-
-        Raises:
-            InputError: if none can be read.
-        """
+        """See `BaseSequence`."""
         return first_size(path, _DEPTH)
 
     def read_depth(self, index: int) -> Depth:

@@ -19,7 +19,6 @@ from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.recording import depth16z
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.tum_lists import MAX_FRAMES
 from depthtrack.types import Depth
@@ -67,17 +66,10 @@ class OniSequence(BaseSequence):
 
     format_name = "a .oni file (OpenNI)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        self._depth = _read(path)
-        self.camera = camera or _stated_camera(path, self._depth)
+        self._depth = _read(self.path)
+        self.camera = camera or _stated_camera(self.path, self._depth)
         times = np.array([time for _, _, time in self._depth.frames], dtype=np.float64) / 1e6
         later = np.concatenate([[True], np.diff(np.maximum.accumulate(times)) > 0])
         self._frames = [frame for frame, kept in zip(self._depth.frames, later, strict=True) if kept]
@@ -86,7 +78,7 @@ class OniSequence(BaseSequence):
         if not later.all():
             self.notes.append(f"{int(np.sum(~later))} frames whose time does not increase are left out")
         if self._depth.truncated:
-            self.notes.append(f"{path} is cut short: the {len(self._frames)} frames before the cut are read")
+            self.notes.append(f"{self.path} is cut short: the {len(self._frames)} frames before the cut are read")
         self.notes.append("colour is not used: a .oni file does not state the cameras that would register it")
 
     @classmethod

@@ -23,7 +23,6 @@ from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.recording.images import decode_colour
 from depthtrack.recording.lzfse import decompress
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.zip_members import ZipMembers
 from depthtrack.strict_data import parse_json
@@ -48,16 +47,9 @@ class Record3dSequence(BaseSequence):
 
     format_name = "a .r3d file (Record3D)"
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
-        self._zip = ZipMembers.of(path)
+        self._zip = ZipMembers.of(self.path)
         metadata = _metadata(self._zip)
         depths, colours = self._zip.numbered(_DEPTH), self._zip.numbered(_COLOUR)
         self._depths = list(depths.values())
@@ -69,7 +61,7 @@ class Record3dSequence(BaseSequence):
         self.timestamps = self._times(metadata, list(depths))
         self.description = {"app": "Record3D"}
         if self._zip.truncated:
-            self.notes.append(f"{path} is cut short: the {len(depths)} frames before the cut are read")
+            self.notes.append(f"{self.path} is cut short: the {len(depths)} frames before the cut are read")
         if min(self._shape) < _COARSE:
             height, width = self._shape
             self.notes.append(

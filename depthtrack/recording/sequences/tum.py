@@ -31,7 +31,7 @@ from depthtrack.recording.colour_association import ColourAssociation, associate
 from depthtrack.recording.ground_truth import read_ground_truth, read_hand
 from depthtrack.recording.images import read_colour, read_depth, read_mask, read_size
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import GroundTruth, OnDamage
+from depthtrack.recording.sequence import GroundTruth
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.inside import is_inside
 from depthtrack.recording.sequences.tum_folder import ImageFiles, find_lists, holds_images
@@ -50,28 +50,21 @@ class TumSequence(BaseSequence):
     format_name = "a folder with depth.txt (TUM RGB-D layout)"
     is_generic = True
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`."""
-        super().__init__(path, camera, on_damage, reading)
         self.camera = camera or self._own_camera()
         self._undistort()
-        self.description = _read_description(path)
-        lists = find_lists(path)
-        self._files = ImageFiles(path)
+        self.description = _read_description(self.path)
+        lists = find_lists(self.path)
+        self._files = ImageFiles(self.path)
         self._depth, clock = self._timed(lists.depth)
         self.timestamps = clock.seconds(self._depth.times)
         self._colour, self._association = self._associated(lists.colour)
         self.has_colour = bool(self._association.partner)
         self.notes += [note for note in (lists.note, clock.note, self._association.note) if note is not None]
-        self.hand = read_hand(path)
+        self.hand = read_hand(self.path)
         self.ground_truth = self._annotations(clock)
-        self._exact_camera = replace(self.camera, depth_scale=_exact_depth_scale(self.description, path))
+        self._exact_camera = replace(self.camera, depth_scale=_exact_depth_scale(self.description, self.path))
 
     def _own_camera(self) -> Camera:
         """Return the camera of the folder, and store its distortion. Raises InputError."""
@@ -139,11 +132,7 @@ class TumSequence(BaseSequence):
 
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
-        """Return (width, height) of the first readable depth image.
-
-        Raises:
-            InputError: if none can be read.
-        """
+        """See `BaseSequence`."""
         files = ImageFiles(path)
         size = next(_sizes(files.path(file.name) for file in find_lists(path).depth.files), None)
         if size is None:

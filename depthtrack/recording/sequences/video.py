@@ -20,7 +20,6 @@ from depthtrack.recording.azure_calibration import AzureCalibration, CalibratedC
 from depthtrack.recording.colour_association import associate_colour
 from depthtrack.recording.depth_video import FEWEST_BITS, DepthVideo, sample_format
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.sequence import OnDamage
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.video_frames import VideoFrames, library, open_video
 from depthtrack.types import Depth, Image
@@ -37,34 +36,27 @@ class VideoSequence(BaseSequence):
     format_name = "a video with 16-bit depth (.mkv of Azure Kinect or Femto, FFV1)"
     is_generic = True
 
-    def __init__(
-        self,
-        path: Path,
-        camera: Camera | None = None,
-        on_damage: OnDamage = "refuse",
-        reading: ReadingOptions | None = None,
-    ) -> None:
+    def _open(self, camera: Camera | None) -> None:
         """See `BaseSequence`.
 
         Raises:
             InputError: if no stream holds depth, or its camera is unknown and none is given.
             MissingExtraError: if PyAV is not installed.
         """
-        super().__init__(path, camera, on_damage, reading)
-        streams = _Streams(path)
-        self._video = DepthVideo(path, streams.depth)
+        streams = _Streams(self.path)
+        self._video = DepthVideo(self.path, streams.depth)
         self.timestamps = self._video.times
         size = (self._video.width, self._video.height)
-        own = None if streams.calibration is None else streams.calibration.depth(size, str(path))
+        own = None if streams.calibration is None else streams.calibration.depth(size, str(self.path))
         if camera is None and own is None:
             raise InputError(
-                f"{path} describes no camera: give it with --camera FILE.json, --camera-preset NAME,"
+                f"{self.path} describes no camera: give it with --camera FILE.json, --camera-preset NAME,"
                 " or --fx and --depth-scale"
             )
         self.camera = camera or own.camera  # type: ignore[union-attr]
-        if self._video.truncated or _is_unfinished(path):
+        if self._video.truncated or _is_unfinished(self.path):
             self.notes.append(
-                f"{path.name} is cut short, or was not finished: the {len(self.timestamps)} frames in it are read"
+                f"{self.path.name} is cut short, or was not finished: the {len(self.timestamps)} frames in it are read"
             )
         distortion = own.distortion if camera is None and own is not None else None
         self._undistortion = Undistortion.needed(self.camera, distortion)
