@@ -34,6 +34,7 @@ def open_recording(
     depth_topic: str | None = None,
     colour_topic: str | None = None,
     time_unit: TimeUnit = "auto",
+    depth_scale: float | None = None,
     invalid: tuple[int, ...] = (),
     mirror: bool = False,
     depth_only: bool = False,
@@ -45,6 +46,7 @@ def open_recording(
     on_damage: "refuse" raises an error at a frame that cannot be read, "skip" leaves it out.
     depth_topic, colour_topic: topics of the images in a bag; those found by their type if absent.
     time_unit: unit of the times in lists: "s", "ms", "us", "ns", "frames" at 30 Hz, or "index" to ignore the times.
+    depth_scale: length of one unit of the stored depth, metres; that of the camera if absent.
     invalid: stored depth values that mean no reading, beside 0.
     mirror: mirror the images left to right; the camera is that of the mirrored images.
     depth_only: ignore colour.
@@ -62,7 +64,7 @@ def open_recording(
     elif isinstance(camera, str | Path):
         file = read_camera(Path(camera))
         camera, distortion = file.camera, file.distortion or distortion
-    reading = ReadingOptions(depth_topic, colour_topic, time_unit, invalid, mirror, depth_only, distortion)
+    reading = ReadingOptions(depth_topic, colour_topic, time_unit, depth_scale, invalid, mirror, depth_only, distortion)
     return open_sequence(path, camera, on_damage, reading)
 
 

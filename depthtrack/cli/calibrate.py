@@ -65,7 +65,7 @@ class Command:
             check_distinct({"-o": self.out, "--picture": picture}, [])
         side = None if self.side == "auto" else self.side
         rig = None if self.hand is None else load_hand(self.hand, side)
-        sequence = self.recording.open(registered=True)
+        sequence = self.recording.open(tracked=True)
         skin_model = None if self.skin_model is None else str(self.skin_model)
         segmentation = SegmentationOptions(skin_model=skin_model)
         if rig is not None:

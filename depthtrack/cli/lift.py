@@ -58,7 +58,7 @@ class Command:
         from depthtrack.tracking.configuration import LiftConfig
         from depthtrack.tracking.run import TrackingRun, configure
 
-        sequence, keypoints = self.recording.open(registered=True), read_keypoints(self.file.keypoints)
+        sequence, keypoints = self.recording.open(tracked=True), read_keypoints(self.file.keypoints)
         configuration = configure(
             self.recording.path,
             sequence,

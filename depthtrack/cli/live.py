@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +11,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import Output
 from depthtrack.cli.ending import Terminated
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import PresetName, RecordingOptions
 from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
@@ -60,6 +61,7 @@ class Command:
     """Camera of a recording in place of its own."""
     camera_preset: Annotated[PresetName | None, stated_default(metavar="kinect1|kinect2|realsense|tum")] = None
     """Nominal camera of a sensor, in place of the recording's own."""
+    reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
     threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
     """Threads of the renderer (default: one per core)."""
 
@@ -82,6 +84,10 @@ class Command:
             raise InputError("--tracker lift needs 2D keypoints, which a live source does not have: choose another one")
         if self.view and self.rrd is not None:
             raise InputError("--view and --rrd exclude each other: give one of them")
+        if self.reading != ReadingArguments() and self.source == _REALSENSE:
+            raise InputError(
+                "options about reading, such as --depth-only, are of recordings: leave them out for a camera"
+            )
         if self.serial is not None and self.source != _REALSENSE:
             raise InputError("--serial is of a camera: use --source realsense")
 
@@ -91,8 +97,10 @@ class Command:
 
         if self.source == _REALSENSE:
             return RealSenseSource(self.serial)
-        options = RecordingOptions(Path(self.source), self.camera, self.camera_preset, on_damage="skip")
-        return PlayedRecording(options.open(), self.realtime)
+        options = RecordingOptions(
+            Path(self.source), self.camera, self.camera_preset, on_damage="skip", reading=self.reading
+        )
+        return PlayedRecording(options.open(tracked=True), self.realtime)
 
     def _warmed_up(self, source: "LiveSource") -> "Iterator[LiveFrame]":
         """Return the frames of a source, after a tracker of its own has tracked some.

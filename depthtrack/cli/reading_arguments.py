@@ -20,6 +20,9 @@ class ReadingArguments:
 
     time_unit: Literal["auto", "s", "ms", "us", "ns", "frames", "index"] = "auto"
     """Unit of the times in lists. `frames` are numbers of frames at 30 Hz; `index` ignores the times."""
+    depth_scale: Annotated[float | None, number(1e-6, 0.1, metavar="METRES")] = None
+    """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D (default: that of the
+    recording or of the camera)."""
     invalid: Annotated[tuple[int, ...], number(0, 65535, metavar="VALUE...")] = ()
     """Stored depth values that mean no reading, beside 0."""
     mirror: bool = False

@@ -16,7 +16,8 @@ def print_notes(notes: Iterable[str]) -> None:
 
 def notes_of(sequence: "Sequence") -> list[str]:
     """Return the notes of a recording, with those about the depth of a few frames."""
-    from depthtrack.recording.depth_checks import depth_notes, sampled_histogram
+    from depthtrack.recording.depth_checks import depth_notes
+    from depthtrack.recording.depth_histogram import sampled_histogram
 
     if not sequence.has_depth:
         return list(sequence.notes)

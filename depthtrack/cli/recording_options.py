@@ -41,29 +41,31 @@ class RecordingOptions:
     """Column of the principal point (default: the centre of the image)."""
     cy: Place = None
     """Row of the principal point (default: the centre of the image)."""
-    depth_scale: Annotated[float | None, number(1e-9, 10, metavar="METRES")] = None
-    """Length of one unit of the stored depth: 0.001 for millimetres, 0.0002 for TUM RGB-D."""
     on_damage: Literal["refuse", "skip"] = "refuse"
     """At an unreadable frame, or a time that does not increase: stop with an error, or skip and count it."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
 
-    def open(self, camera: "Camera | None" = None, with_notes: bool = True, registered: bool = False) -> "Sequence":
+    def open(self, camera: "Camera | None" = None, with_notes: bool = True, tracked: bool = False) -> "Sequence":
         """Return the recording with the camera of the options, else with `camera`, else its own.
 
-        registered: whether colour that is not registered to the depth is left out.
+        tracked: whether a hand is to be tracked in it: colour that is not registered to the depth is left out, and
+            depth that cannot be right is refused.
         with_notes: whether to print what the user must know about the recording, on standard error.
 
         Raises:
             InputError: if the recording or the camera of the options is unusable.
         """
         from depthtrack.recording import open_sequence
+        from depthtrack.recording.depth_checks import check_depth
 
         chosen = self._chosen_camera()
         reading, given = self.reading.options, camera if chosen is None else chosen.camera
         if chosen is not None and not reading.distortion:
             reading = replace(reading, distortion=chosen.distortion)
         sequence = open_sequence(self.path, given, self.on_damage, reading)
-        if registered:
+        if tracked:
+            check_depth(sequence)
+        if tracked:
             sequence = with_registered_colour(
                 sequence, lambda: open_sequence(self.path, given, self.on_damage, replace(reading, depth_only=True))
             )
@@ -78,25 +80,26 @@ class RecordingOptions:
         from depthtrack.geometry.camera_files import CameraFile, read_camera
         from depthtrack.recording import image_size
 
+        scale = self.reading.depth_scale
         numbers = {
             "fx": self.fx,
             "fy": self.fx if self.fy is None else self.fy,
             "cx": self.cx,
             "cy": self.cy,
-            "depth_scale": self.depth_scale,
+            "depth_scale": scale,
         }
         given: dict[str, Any] = {name: number for name, number in numbers.items() if number is not None}
         if self.camera is not None and self.camera_preset is not None:
             raise InputError("--camera and --camera-preset exclude each other: give one of them")
         if self.camera is not None:
             file = read_camera(self.camera)
-            notes = () if self.depth_scale is not None else file.notes
+            notes = () if scale is not None else file.notes
             return replace(file, camera=replace(file.camera, **given), notes=notes)
         if self.camera_preset is not None:
             return CameraFile(replace(PRESETS[self.camera_preset], **given))
-        if not given:
+        if set(given) <= {"depth_scale"}:
             return None
-        if self.fx is None or self.depth_scale is None:
+        if self.fx is None or scale is None:
             raise InputError("a camera from numbers needs --fx and --depth-scale: give both, or a --camera-preset")
         width, height = image_size(self.path, self.reading.options)
         return CameraFile(Camera(width, height, **{"cx": (width - 1) / 2, "cy": (height - 1) / 2, **given}))

@@ -66,7 +66,7 @@ class SegmentCommand:
         if self.hands != HandOptions() and self.tracker is None:
             raise InputError("--hand and --side need a tracker: give --tracker ik or --tracker pso")
         options = self.segmentation_options
-        sequence = self.recording.open(registered=True)
+        sequence = self.recording.open(tracked=True)
         segmenter = Segmenter.for_sequence(sequence, options)
         choice = None if self.tracker is None else self.hands.choose_side(sequence, options)
         hand = self.hands.chosen(sequence, choice)

@@ -62,12 +62,15 @@ class SourceOptions:
         """Return a source without colour that is not registered, and print its notes.
 
         Raises:
-            InputError: if the recording is unusable.
+            InputError: if the recording is unusable, or its depth cannot be right.
         """
+        from depthtrack.recording.depth_checks import check_depth
         from depthtrack.recording.registry import reading_of
 
         depth_only = replace(source, reading=replace(source.reading, depth_only=True))
-        sequence = with_registered_colour(source.open(), depth_only.open)
+        opened = source.open()
+        check_depth(opened)
+        sequence = with_registered_colour(opened, depth_only.open)
         print_notes(notes_of(sequence))
         return replace(source, reading=reading_of(sequence))
 

@@ -98,7 +98,7 @@ class TrackCommand:
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
         repeated = None if self.config is None else _load(self.config).camera_model()
-        return self.recording.open(repeated, registered=True)
+        return self.recording.open(repeated, tracked=True)
 
     @cached_property
     def _stored(self) -> "HandShape | None":
@@ -162,7 +162,9 @@ class TrackCommand:
         )
 
     def _report(self, sequence: "Recording", rate: str) -> None:
-        from depthtrack.recording.depth_checks import no_hand_note
+        import numpy as np
+
+        from depthtrack.recording.depth_checks import no_hand_note, poor_agreement_note
         from depthtrack.recording.frame_failures import FAILURES_FILE, read_failures
         from depthtrack.recording.run_rows import read_rows
 
@@ -170,8 +172,11 @@ class TrackCommand:
         if failures and len(failures) == len(rows):
             raise DepthtrackError(f"each of {len(rows)} frames failed: {next(iter(failures.values()))}")
         untrusted = sum(not row.status.is_trusted for row in rows)
+        explained = np.array([row.agreement for row in rows if row.pose is not None])
         if sequence.has_depth and untrusted == len(rows):
             print(no_hand_note(sequence))
+        elif sequence.has_depth and (poor := poor_agreement_note(sequence, explained)) is not None:
+            print(poor)
         elif (better := self._better_side(sequence)) is not None:
             print(better)
         failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""

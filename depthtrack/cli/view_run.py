@@ -1,9 +1,11 @@
 """`depthtrack view` on a run: show the tracked hand over its recording."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from depthtrack.cli.progress import bar
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.view_options import ViewOptions
 from depthtrack.cli.window import why_no_window
 from depthtrack.errors import InputError
@@ -12,8 +14,9 @@ if TYPE_CHECKING:
     from depthtrack.evaluation.replay import Replay
 
 _NOT_FOR_RUNS = ("strip", "depth_range")
-_CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy", "depth_scale")
-"""Options of the camera, which a run stores."""
+_CAMERA = ("camera", "camera_preset", "fx", "fy", "cx", "cy")
+_READING = tuple(field.name for field in fields(ReadingArguments))
+"""Options of the camera and of reading, which a run stores."""
 
 
 def view_run(options: ViewOptions) -> None:
@@ -26,9 +29,10 @@ def view_run(options: ViewOptions) -> None:
     from depthtrack.evaluation.replay import Replay
     from depthtrack.recording.run_folder import Run
 
-    for owner, names in ((options, _NOT_FOR_RUNS), (options.recording, _CAMERA)):
+    recording = options.recording
+    for owner, names in ((options, _NOT_FOR_RUNS), (recording, _CAMERA), (recording.reading, _READING)):
         for name in names:
-            if getattr(owner, name) is not None:
+            if getattr(owner, name) not in (None, False, (), "auto"):
                 raise InputError(f"--{name.replace('_', '-')} applies to recordings: leave it out for a run")
     replay = Replay.open(Run.load(options.recording.path), options.sequence)
     if options.sheet is not None:

@@ -7,14 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from depthtrack.errors import DamagedFrameError
+from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
-from depthtrack.recording.sequence import Frame, Sequence
-from depthtrack.types import Index
+from depthtrack.recording.depth_histogram import LARGEST_STORED, percentile, sampled_histogram
+from depthtrack.recording.registry import reading_of
+from depthtrack.recording.sequence import Sequence
+from depthtrack.types import Array, Index
 
-STORED_VALUES = 1 << 16
-"""Number of values of a 16-bit depth image."""
-_LARGEST_STORED = STORED_VALUES - 1
 _SATURATED_SHARE = 0.002
 """Share of pixels of the largest value of a sensor that is reported."""
 _CONSTANT_SHARE = 0.15
@@ -26,6 +25,13 @@ _NEAREST_READING = 0.12
 _FARTHEST_HAND = 3.0
 """Depth that no hand is tracked beyond, metres."""
 _HAND_DEPTHS = (0.25, 1.5)
+"""Depths that a recorded hand has, metres."""
+_ROOM_WITHIN = 0.7
+"""Depth that no room lies within, metres."""
+_FEWEST_EXPLAINED = 2 / 3
+"""Agreement of silhouettes that a tracked hand exceeds in some frames, and a surface of another size in none."""
+_MOSTLY = 0.9
+"""Share of the frames that are below it if none shows a hand."""
 _COMMON_SCALES = {0.001: "1 mm", 0.0001: "0.1 mm", 0.0002: "0.2 mm", 0.00025: "0.25 mm", 0.000125: "0.125 mm"}
 """Units of the depth of common sensors and data sets, metres."""
 _DISPARITY_MISSING = 2047
@@ -46,40 +52,72 @@ def depth_notes(histogram: Index, camera: Camera) -> list[str]:
         return []
     if (disparity := _disparity(readings)) is not None:
         return [disparity]
-    if not readings[_BYTE + 1 :].any():
-        return [
-            f"no stored value is above {_BYTE}: depth of 8 bits was saved as 16 bits, which lost its steps,"
-            " so export 16-bit depth again"
-        ]
+    if (coarse := _too_few_bits(readings)) is not None:
+        return [coarse]
     notes = list(_values_without_meaning(readings, int(histogram.sum()), camera))
     return [*notes, *_units(readings, camera)]
 
 
-def sampled_histogram(sequence: Sequence, count: int = 8) -> Index:
-    """Return the count of pixels (65536,) of each stored value in a few readable frames."""
-    histogram: Index = np.zeros(STORED_VALUES, dtype=np.int64)
-    for index in np.unique(np.linspace(0, len(sequence) - 1, count).astype(int)):
-        try:
-            add_stored(histogram, sequence[int(index)])
-        except DamagedFrameError:
-            continue
-    return histogram
+def check_depth(sequence: Sequence) -> None:
+    """Check that a hand can be seen in the depth of a recording, unless its unit was stated.
+
+    Raises:
+        InputError: if the depth is raw disparity, of 8 bits, or in another unit than the camera states.
+    """
+    if not sequence.has_depth or reading_of(sequence).depth_scale is not None:
+        return
+    reason = unusable_depth(sampled_histogram(sequence), sequence.camera)
+    if reason is not None:
+        scale = sequence.camera.depth_scale
+        raise InputError(f"{sequence.name}: {reason}; if {1000 * scale:g} mm is right, give --depth-scale {scale:g}")
 
 
-def add_stored(histogram: Index, frame: Frame) -> None:
-    """Add the pixels of a frame to the count (65536,) of each stored value."""
-    units = np.rint(frame.depth / np.float32(frame.camera.depth_scale)).clip(0, _LARGEST_STORED).astype(np.uint16)
-    histogram += np.bincount(units.ravel(), minlength=STORED_VALUES)
+def unusable_depth(histogram: Index, camera: Camera) -> str | None:
+    """Return why no hand can be tracked in the depth of a recording; None if one may be.
+
+    histogram: (65536,) count of the pixels of each stored value.
+    """
+    readings = histogram.copy()
+    readings[0] = 0
+    if not readings.any():
+        return None
+    sure = _disparity(readings) or _too_few_bits(readings)
+    if sure is not None:
+        return sure
+    list(_values_without_meaning(readings, int(histogram.sum()), camera))
+    if not readings.any():
+        return None
+    low, high, nearest = (percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98, 0.001))
+    is_near = low < _NEAREST_READING and high < _ROOM_WITHIN
+    if not (is_near or nearest > _FARTHEST_HAND) or likely_scale(readings) is None:
+        return None
+    return next(_units(readings, camera), None)
 
 
-def no_hand_note(sequence: Sequence) -> str:
+def poor_agreement_note(sequence: Sequence, agreements: Array) -> str | None:
+    """Return a sentence if no pose of a run explains what the camera saw; None otherwise.
+
+    agreements: (N,) agreement of the silhouettes in the frames with a pose.
+    """
+    if not len(agreements):
+        return None
+    usual = float(np.quantile(agreements, _MOSTLY))
+    if usual >= _FEWEST_EXPLAINED:
+        return None
+    return no_hand_note(
+        sequence,
+        f"what was tracked is no hand: nine poses of ten explain at most {100 * usual:.0f} % of what the camera saw",
+    )
+
+
+def no_hand_note(sequence: Sequence, found: str = "no hand was found in any frame") -> str:
     """Return a sentence on a recording without a hand: depth range and likely unit."""
     histogram = sampled_histogram(sequence)
     if not histogram[1:].any():
-        return "no hand was found in any frame: the depth images have no readings"
+        return f"{found}: the depth images have no readings"
     scale = sequence.camera.depth_scale
-    low, high = (_percentile(histogram, share) * scale for share in (0.02, 0.98))
-    text = f"no hand was found in any frame: depth runs from {low:.2f} to {high:.2f} m in units of {1000 * scale:g} mm"
+    low, high = (percentile(histogram, share) * scale for share in (0.02, 0.98))
+    text = f"{found}: depth runs from {low:.2f} to {high:.2f} m in units of {1000 * scale:g} mm"
     likely = likely_scale(histogram)
     if likely is None or np.isclose(likely, scale):
         return f"{text}; a hand must be one of the nearest objects, 0.2 to 1.5 m away (`depthtrack segment` shows it)"
@@ -88,7 +126,7 @@ def no_hand_note(sequence: Sequence) -> str:
 
 def likely_scale(histogram: Index) -> float | None:
     """Return a common unit, metres, that puts the nearest surfaces where hands are."""
-    nearest = _percentile(histogram, 0.02)
+    nearest = percentile(histogram, 0.02)
     fitting = [scale for scale in _COMMON_SCALES if _HAND_DEPTHS[0] <= nearest * scale <= _HAND_DEPTHS[1]]
     return fitting[0] if fitting else None
 
@@ -96,9 +134,9 @@ def likely_scale(histogram: Index) -> float | None:
 def _values_without_meaning(readings: Index, pixels: int, camera: Camera) -> Iterator[str]:
     """Yield a sentence on the value that may mean no reading."""
     value, share = int(np.argmax(readings)), float(readings.max() / pixels)
-    saturated = float(readings[_LARGEST_STORED] / pixels)
+    saturated = float(readings[LARGEST_STORED] / pixels)
     if saturated >= _SATURATED_SHARE:
-        value, share = _LARGEST_STORED, saturated
+        value, share = LARGEST_STORED, saturated
     elif share < _CONSTANT_SHARE or _is_surface(readings, value):
         return
     yield (
@@ -117,7 +155,7 @@ def _is_surface(readings: Index, value: int) -> bool:
 def _units(readings: Index, camera: Camera) -> Iterator[str]:
     if not readings.any():
         return
-    low, high = (_percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98))
+    low, high = (percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98))
     if _NEAREST_READING <= low <= _FARTHEST_HAND:
         return
     found = f"depth runs from {low:.2f} to {high:.2f} m, where no hand is tracked"
@@ -125,9 +163,19 @@ def _units(readings: Index, camera: Camera) -> Iterator[str]:
     if scale is None:
         yield f"{found}: state the unit of the depth with --depth-scale METRES"
         return
-    near, far = (_percentile(readings, share) * scale for share in (0.02, 0.98))
+    near, far = (percentile(readings, share) * scale for share in (0.02, 0.98))
     unit = f"a unit of {_COMMON_SCALES[scale]} (--depth-scale {scale:g})"
     yield f"{found}: with {unit} it runs from {near:.2f} to {far:.2f} m"
+
+
+def _too_few_bits(readings: Index) -> str | None:
+    """Return a sentence if the values are those of a picture of 8 bits."""
+    if readings[_BYTE + 1 :].any():
+        return None
+    return (
+        f"no stored value is above {_BYTE}: depth of 8 bits was saved as 16 bits, which lost its steps,"
+        " so export 16-bit depth again"
+    )
 
 
 def _disparity(readings: Index) -> str | None:
@@ -144,11 +192,3 @@ def _disparity(readings: Index) -> str | None:
         f"values end at {_DISPARITY_MISSING}, which covers {share:.1f} % of the readings: this is raw disparity of"
         " Kinect v1, so convert it by depth = 1 / (3.33 - 0.00307 * value) metres"
     )
-
-
-def _percentile(histogram: Index, share: float) -> float:
-    """Return the stored value that a share of the readings does not exceed."""
-    readings = histogram.copy()
-    readings[0] = 0
-    total = np.cumsum(readings)
-    return float(np.searchsorted(total, share * total[-1]))

@@ -17,6 +17,9 @@ class ReadingOptions:
     depth_topic: str | None = option(None, "Topic of the depth images in a bag (default: the one found by its type)")
     colour_topic: str | None = option(None, "Topic of the colour images in a bag (default: the one found by its type)")
     time_unit: TimeUnit = option("auto", "Unit of the times in lists; frames are at 30 Hz, index ignores the times")
+    depth_scale: float | None = option(
+        None, "Length of one unit of the stored depth, in place of that of the camera", unit="m", least=1e-6, most=0.1
+    )
     invalid: tuple[int, ...] = option((), "Stored depth values that mean no reading, beside 0", most=_LARGEST_STORED)
     mirror: bool = option(False, "Mirror the images left to right; the camera is that of the mirrored images")
     depth_only: bool = option(False, "Ignore colour")

@@ -10,7 +10,8 @@ import numpy as np
 from depthtrack.errors import DamagedFrameError
 from depthtrack.geometry.camera import Camera
 from depthtrack.recording.colour_registration import measure_shift
-from depthtrack.recording.depth_checks import STORED_VALUES, add_stored, depth_notes
+from depthtrack.recording.depth_checks import depth_notes
+from depthtrack.recording.depth_histogram import STORED_VALUES, add_stored
 from depthtrack.recording.sequence import DamagedFrame, Frame, OnDamage, Sequence
 from depthtrack.types import Array, Index
 

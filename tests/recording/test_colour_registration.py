@@ -63,13 +63,13 @@ def test_recordings_without_edges_or_colour_have_no_shift(tmp_path: Path) -> Non
 
 def test_commands_that_track_use_depth_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = write_scene(tmp_path / "made", (9, 0))
-    assert not RecordingOptions(made).open(registered=True).has_colour
+    assert not RecordingOptions(made).open(tracked=True).has_colour
     assert "not registered" in capsys.readouterr().err
     assert RecordingOptions(made).open().has_colour
     assert main(["info", str(made), "--json"]) == 0
     assert any("+9 pixels across" in note for note in json.loads(capsys.readouterr().out)["notes"])
     registered = write_scene(tmp_path / "registered")
-    assert RecordingOptions(registered).open(registered=True).has_colour
+    assert RecordingOptions(registered).open(tracked=True).has_colour
 
 
 def test_real_colour_is_registered(real_data: Path) -> None:

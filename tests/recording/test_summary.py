@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from depthtrack.cli import main
+from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import PresetName, RecordingOptions
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.recording import SequenceWriter, open_sequence
@@ -170,7 +171,9 @@ def test_a_plain_tum_folder_takes_a_camera_in_numbers(info: Any, tmp_path: Path)
 def test_a_camera_file_or_preset_can_be_corrected_in_numbers(tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text(CAMERA.to_json())
     path = write_plain_tum(tmp_path / "tum")
-    opened = RecordingOptions(path, camera=tmp_path / "camera.json", depth_scale=0.0002).open()
+    opened = RecordingOptions(
+        path, camera=tmp_path / "camera.json", reading=ReadingArguments(depth_scale=0.0002)
+    ).open()
     np.testing.assert_allclose(opened[0].depth, depth_at(0), atol=0.00011)
     assert opened.camera == Camera(32, 24, 30.0, 30.5, 15.0, 11.0, 0.0002)
     assert RecordingOptions(path, camera_preset="tum").open().camera == PRESETS["tum"]

@@ -128,7 +128,7 @@ class BagSequence(BaseSequence):
         size = size_of_image(first, f"{self.path}: {topic}")
         self._own = None if given is not None else camera_of(messages, topic, size)
         is_float = encoding_of(first) == "32fc1"
-        stated = depth_unit(messages, topic)
+        stated = self.reading.depth_scale or depth_unit(messages, topic)
         self._unit = stated if given is None else given.depth_scale
         if given is not None:
             self._own = BagCamera(given, None, "")

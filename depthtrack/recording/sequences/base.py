@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -61,6 +62,8 @@ class BaseSequence(ABC):
         self._damaged: dict[int, DamagedFrame] = {}
         self._damaged_colour: dict[int, DamagedFrame] = {}
         self._open(camera)
+        if self.reading.depth_scale is not None:
+            self.camera = replace(self.camera, depth_scale=self.reading.depth_scale)
 
     @abstractmethod
     def _open(self, camera: Camera | None) -> None:
