@@ -58,6 +58,13 @@ class TrackingThresholds:
         most=math.inf,
     )
 
+    fastest: float = option(
+        4.0,
+        "Speed of a palm, beside half a hand's length, beyond which a pose is of another hand: the track is lost",
+        unit="m/s",
+        most=math.inf,
+    )
+
     def __post_init__(self) -> None:
         check_ranges(self)
 

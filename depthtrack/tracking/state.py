@@ -22,6 +22,8 @@ from depthtrack.types import Array
 
 _SAME_TIME = 1e-6
 """Seconds: rounding of time stamps."""
+_HALF_HAND = 0.1
+"""Metres by which two poses of one palm differ at most, if one has another orientation."""
 _ROUNDED = 0.01
 """Relative difference between the durations of two steps that counts as none."""
 
@@ -88,6 +90,13 @@ class TrackState:
             return True
         return energy > most_energy * self._clamp and energy > self._thresholds.lost_ratio * self.median_energy
 
+    def is_jump(self, pose: Array, timestamp: float) -> bool:
+        """Return whether no hand moves from the last pose to `pose` (27,) by `timestamp` (s)."""
+        if self.pose is None:
+            return False
+        farthest = _HALF_HAND + self._thresholds.fastest * (timestamp - self.time)
+        return bool(np.linalg.norm(pose[:3] - self.pose[:3]) > farthest)
+
     @property
     def median_energy(self) -> float:
         """Median energy of the last trusted poses; infinity before the first one."""
@@ -117,7 +126,8 @@ class TrackState:
         """
         previous = self._confidence if status is Status.TRACKED else 0.0
         judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
-        status = Status.LOST if self.is_lost(*judged, confidence, previous) else status
+        if self.is_jump(pose, timestamp) or self.is_lost(*judged, confidence, previous):
+            status = Status.LOST
         figures = confidence, visibility, spread, branches
         estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures)
         self.update(estimate)

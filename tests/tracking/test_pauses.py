@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.state import TrackState
 
 
 @pytest.fixture(scope="module")
@@ -49,3 +52,18 @@ def test_a_hand_that_stayed_during_a_pause_is_followed(made: Synthesiser) -> Non
     frames = [Frame(index, 2.0 * index, depth, None, made.sensor.camera) for index in range(3)]
     energies = [each.estimate.energy for each in track(made, "ik", frames)]
     assert max(energies) < 1.1 * energies[0]
+
+
+@pytest.mark.parametrize(
+    ("step", "elapsed", "jump"), [(0.2, 1 / 30, False), (0.25, 1 / 30, True), (0.25, 0.1, False), (1.0, 0.25, False)]
+)
+def test_a_pose_that_no_hand_reaches_in_time_is_a_jump(step: float, elapsed: float, jump: bool) -> None:
+    state, pose = TrackState(TrackingThresholds(), 1.0), np.eye(27)[3] + 0.5 * np.eye(27)[2]
+    assert not state.is_jump(pose, 0.0)
+    assert state.commit(pose, 0.1, 0.9, Status.STARTED, {}, 1.0, 0.9).status is Status.STARTED
+    moved = pose + step * np.eye(27)[0]
+    assert state.is_jump(moved, 1.0 + elapsed) is jump
+    status = state.commit(moved, 0.1, 0.9, Status.STARTED, {}, 1.0 + elapsed, 0.9).status
+    assert status is (Status.LOST if jump else Status.STARTED)
+    if jump:
+        assert state.commit(moved, 0.1, 0.9, Status.STARTED, {}, 1.1 + elapsed, 0.9).status is Status.STARTED
