@@ -28,6 +28,9 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.stretches import TrackedView, track_stretches
 from depthtrack.types import Array
 
+_USUAL_LENGTHS = (110, 240)
+"""Length of the hand of children at school and of adults, mm, with a margin for its error."""
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -69,6 +72,11 @@ class Calibration:
     def side_sure(self) -> bool:
         """Whether the side was given, or the other one fits clearly worse."""
         return self.side_margin is None or self.side_margin >= self.sure_margin
+
+    @property
+    def is_of_usual_size(self) -> bool:
+        """Whether a person may have such a hand; else the unit of the depth is probably wrong."""
+        return _USUAL_LENGTHS[0] <= self.measured["hand_length"].mm <= _USUAL_LENGTHS[1]
 
     def to_json(self) -> str:
         """Return the text of `hand.json`, with the measured sizes and their uncertainty."""

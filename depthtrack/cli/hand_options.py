@@ -118,4 +118,13 @@ def measured_text(found: "Calibration") -> str:
         f"{found.after_mm:.1f} mm from the skin of the points of {len(found.observations)} frames "
         f"(average hand {found.before_mm:.1f} mm)"
     )
-    return sizes if found.side_sure else f"{sizes}\nthe side is uncertain: give --side"
+    lines = [sizes, *unusual_size(found)]
+    return "\n".join(lines if found.side_sure else [*lines, "the side is uncertain: give --side"])
+
+
+def unusual_size(found: "Calibration") -> list[str]:
+    """Return a line if hardly any person has a hand of the measured length."""
+    if found.is_of_usual_size:
+        return []
+    length = found.measured["hand_length"].mm
+    return [f"hardly any hand is {length:.0f} mm long: if the depth has another unit, give --depth-scale METRES"]

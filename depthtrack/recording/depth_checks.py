@@ -24,6 +24,8 @@ _NEAREST_READING = 0.12
 """Depth that no sensor for hands reads below, metres."""
 _FARTHEST_HAND = 3.0
 """Depth that no hand is tracked beyond, metres."""
+_FARTHEST_ROOM = 10.0
+"""Depth that no sensor for hands measures half of its pixels beyond, metres."""
 _HAND_DEPTHS = (0.25, 1.5)
 """Depths that a recorded hand has, metres."""
 _ROOM_WITHIN = 0.7
@@ -87,9 +89,11 @@ def unusable_depth(histogram: Index, camera: Camera) -> str | None:
     list(_values_without_meaning(readings, int(histogram.sum()), camera))
     if not readings.any():
         return None
-    low, high, nearest = (percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98, 0.001))
+    shares = (0.001, 0.02, 0.5, 0.98)
+    nearest, low, middle, high = (percentile(readings, share) * camera.depth_scale for share in shares)
     is_near = low < _NEAREST_READING and high < _ROOM_WITHIN
-    if not (is_near or nearest > _FARTHEST_HAND) or likely_scale(readings) is None:
+    is_far = nearest > _FARTHEST_HAND or middle > _FARTHEST_ROOM
+    if not (is_near or is_far) or likely_scale(readings) is None:
         return None
     return next(_units(readings, camera), None)
 
@@ -155,8 +159,8 @@ def _is_surface(readings: Index, value: int) -> bool:
 def _units(readings: Index, camera: Camera) -> Iterator[str]:
     if not readings.any():
         return
-    low, high = (percentile(readings, share) * camera.depth_scale for share in (0.02, 0.98))
-    if _NEAREST_READING <= low <= _FARTHEST_HAND:
+    low, middle, high = (percentile(readings, share) * camera.depth_scale for share in (0.02, 0.5, 0.98))
+    if _NEAREST_READING <= low <= _FARTHEST_HAND and middle <= _FARTHEST_ROOM:
         return
     found = f"depth runs from {low:.2f} to {high:.2f} m, where no hand is tracked"
     scale = likely_scale(readings)
