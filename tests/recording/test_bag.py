@@ -13,7 +13,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.recording import image_size, open_sequence
 from depthtrack.recording.reading import ReadingOptions
 from tests.geometry.test_registration import COLOUR, DEPTH, T_COLOUR_DEPTH, seen
-from tests.support.bags import ORBBEC_PROFILE, Bag, compose, depth_png
+from tests.support.bags import ORBBEC_PROFILE, Bag, compose, depth_png, depth_rvl
 from tests.support.recordings import CAMERA, colour_at, depth_at, write_sample
 
 TIMES = (10.0, 10.033, 10.066)
@@ -169,12 +169,30 @@ def test_compressed_depth_in_metres_is_quantised_inverse_depth(tmp_path: Path) -
     np.testing.assert_allclose(frame.depth, depth_at(0), rtol=1e-4, atol=1e-6)
 
 
-def test_depth_compressed_by_rvl_is_rejected_with_advice(tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", [".bag", ".db3", ".mcap"])
+def test_depth_compressed_by_rvl(tmp_path: Path, suffix: str) -> None:
     bag = Bag()
-    bag.compressed("/depth/compressedDepth", TIMES[0], bytes(40), "16UC1; compressedDepth rvl")
+    for index, time in enumerate(TIMES):
+        data = depth_rvl(stored(depth_at(index)))
+        bag.compressed("/c/depth/image_raw/compressedDepth", time, data, "16UC1; compressedDepth rvl")
+        bag.info("/c/depth/camera_info", CAMERA, time=time)
+    sequence = open_sequence(bag.write(tmp_path / f"film{suffix}"))
+    assert len(sequence) == len(TIMES)
+    for index, frame in enumerate(sequence):
+        np.testing.assert_array_equal(frame.depth, stored(depth_at(index)) * np.float32(0.001))
+
+
+@pytest.mark.parametrize("kept", [3, 16, 21, 300])
+def test_damaged_rvl_is_a_damaged_frame(tmp_path: Path, kept: int) -> None:
+    whole = depth_rvl(stored(depth_at(0)))
+    bag = Bag()
+    for index, time in enumerate(TIMES):
+        data = whole[:kept] if index == 1 else whole
+        bag.compressed("/depth/compressedDepth", time, data, "16UC1; compressedDepth rvl")
     bag.info("/camera_info", CAMERA)
-    with pytest.raises(InputError, match="RVL is not read"):
-        open_sequence(bag.write(tmp_path / "film.mcap"))
+    sequence = open_sequence(bag.write(tmp_path / "film.mcap"), on_damage="skip")
+    assert len(list(sequence)) == len(TIMES) - 1
+    assert "RVL" in sequence.damaged[0].reason
 
 
 def test_a_folder_of_images_with_a_bag_in_it_is_a_folder_of_images(tmp_path: Path) -> None:

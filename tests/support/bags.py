@@ -1,6 +1,7 @@
 """Bags written by the library rosbags, for the tests of their reader."""
 
 import shutil
+import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -97,6 +98,38 @@ class Bag:
 def depth_png(stored: Any) -> bytes:
     """Return the bytes of compressedDepth: 12 bytes, then a PNG."""
     return bytes(12) + cv2.imencode(".png", stored)[1].tobytes()
+
+
+def depth_rvl(stored: Any) -> bytes:
+    """Return the bytes of compressedDepth: 12 bytes, width and height, then RVL data."""
+    height, width = stored.shape
+    return bytes(12) + struct.pack("<II", width, height) + compress_rvl(stored)
+
+
+def compress_rvl(stored: Any) -> bytes:
+    """Return 16-bit values in RVL, one after the other as in the paper (Wilson 2017)."""
+    nibbles: list[int] = []
+
+    def put(number: int) -> None:
+        while number >= 8:
+            nibbles.append(8 + number % 8)
+            number //= 8
+        nibbles.append(number)
+
+    values, last = [int(value) for value in np.ravel(stored)], 0
+    while values:
+        zeros = next((n for n, value in enumerate(values) if value), len(values))
+        put(zeros)
+        values = values[zeros:]
+        others = next((n for n, value in enumerate(values) if not value), len(values))
+        put(others)
+        for value in values[:others]:
+            put(2 * (value - last) if value >= last else 2 * (last - value) - 1)
+            last = value
+        values = values[others:]
+    nibbles += [0] * (-len(nibbles) % 8)
+    words = [int("".join(f"{nibble:x}" for nibble in nibbles[i : i + 8]), 16) for i in range(0, len(nibbles), 8)]
+    return struct.pack(f"<{len(words)}I", *words)
 
 
 def compose(

@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.errors import DamagedFrameError
+from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.geometry.camera import MAX_SIDE
 from depthtrack.recording.images import decode_colour, decode_depth, decode_size
+from depthtrack.recording.rvl import decompress
 from depthtrack.types import Depth, Image
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -43,6 +44,8 @@ _JPEG = {"mjpg", "mjpeg", "jpeg"}
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _DEPTH_HEADER = 12
 """Bytes before the PNG of compressedDepth: a format and two parameters of quantised inverse depth."""
+_RVL_HEADER = _DEPTH_HEADER + 8
+"""Bytes before the RVL data of compressedDepth: the same, then width and height."""
 
 
 def encoding_of(message: Any) -> str:
@@ -73,8 +76,8 @@ def size_of_image(message: Any, where: str) -> tuple[int, int]:
     if hasattr(message, "encoding"):
         width, height = int(message.width), int(message.height)
     else:
-        _check_not_rvl(message, where)
-        width, height = decode_size(where, _png_of(bytes(message.data)))
+        data = bytes(message.data)
+        width, height = _rvl_size(data, where) if _is_rvl(message) else decode_size(where, _png_of(data))
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise DamagedFrameError(f"{where}: an image must have sides from 1 to {MAX_SIDE} pixels")
     return width, height
@@ -89,7 +92,6 @@ def depth_of(message: Any, unit: float, shape: tuple[int, int], where: str) -> D
         DamagedFrameError: if it is no depth, has another size, or is damaged.
     """
     encoding = encoding_of(message)
-    _check_not_rvl(message, where)
     if encoding not in _UNITS | _METRES:
         raise DamagedFrameError(
             f"{where}: depth must have the encoding 16UC1 or 32FC1, found {encoding[:40]!r}:"
@@ -100,7 +102,7 @@ def depth_of(message: Any, unit: float, shape: tuple[int, int], where: str) -> D
         stored = _rows(message, np.dtype(kind), 1, shape, where)[..., 0]
         return _clean(stored.astype(np.float32)) if kind == "f4" else stored.astype(np.float32) * np.float32(unit)
     data = bytes(message.data)
-    stored = decode_depth(where, _png_of(data), shape)
+    stored = _rvl_depth(data, shape, where) if _is_rvl(message) else decode_depth(where, _png_of(data), shape)
     if encoding in _UNITS:
         return stored.astype(np.float32) * np.float32(unit)
     if data[:8] == _PNG_SIGNATURE:
@@ -129,13 +131,29 @@ def colour_of(message: Any, shape: tuple[int, int], where: str) -> Image:
     return np.ascontiguousarray(converted, dtype=np.uint8)
 
 
-def _check_not_rvl(message: Any, where: str) -> None:
-    """Raise DamagedFrameError if depth is compressed by RVL."""
-    if "rvl" in str(getattr(message, "format", "")).lower():
-        raise DamagedFrameError(
-            f"{where}: depth compressed by RVL is not read: record the topic without /compressedDepth, or set the"
-            " format of compressedDepth to png"
-        )
+def _is_rvl(message: Any) -> bool:
+    """Return whether depth is compressed by RVL."""
+    return "rvl" in str(getattr(message, "format", "")).lower()
+
+
+def _rvl_size(data: bytes, where: str) -> tuple[int, int]:
+    """Return the (width, height) that stand before RVL data. Raises DamagedFrameError."""
+    if len(data) < _RVL_HEADER:
+        raise DamagedFrameError(f"{where}: RVL depth must have a header of {_RVL_HEADER} bytes, found {len(data)}")
+    width, height = struct.unpack_from("<II", data, _DEPTH_HEADER)
+    return width, height
+
+
+def _rvl_depth(data: bytes, shape: tuple[int, int], where: str) -> NDArray[np.uint16]:
+    """Return the stored values (h, w) of RVL data. Raises DamagedFrameError."""
+    height, width = shape
+    found = _rvl_size(data, where)
+    if found != (width, height):
+        raise DamagedFrameError(f"{where} must have {width}x{height} pixels, found {found[0]}x{found[1]}")
+    try:
+        return decompress(data[_RVL_HEADER:], width * height).reshape(shape)
+    except InputError as error:
+        raise DamagedFrameError(f"{where}: {error}") from error
 
 
 def _rows(message: Any, kind: np.dtype[Any], channels: int, shape: tuple[int, int], where: str) -> NDArray[Any]:
