@@ -1,4 +1,4 @@
-"""Morphology of masks: discs, dilation, erosion, bounding boxes and connected components."""
+"""Morphology of masks: discs, dilation, erosion, closing and bounding boxes."""
 
 from functools import cache
 
@@ -7,6 +7,9 @@ import numpy as np
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.types import Labels, Mask
+
+EXACT = 5
+"""Largest radius of a disc that equals a square and a diamond, pixels."""
 
 
 @cache
@@ -36,7 +39,7 @@ def eroded(mask: Mask, radius: int) -> Mask:
 def _square_and_diamond(radius: int) -> tuple[Labels, Labels]:
     """Return a square and a diamond that together equal `disc(radius)`, at half the cost.
 
-    They are exact up to 5 pixels; beyond, they make an octagon.
+    They are exact up to `EXACT` pixels; beyond, they make an octagon.
     """
     half = max(1, round(radius * (np.sqrt(2) - 1)))
     y, x = np.ogrid[half - radius : radius - half + 1, half - radius : radius - half + 1]
@@ -45,19 +48,11 @@ def _square_and_diamond(radius: int) -> tuple[Labels, Labels]:
 
 def closed(mask: Mask, radius: int) -> Mask:
     """Return the morphological closing of a mask (h, w) by a disc."""
+    if 1 <= radius <= EXACT:
+        return eroded(dilated(mask, radius), radius)
     return np.asarray(cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, disc(radius)) > 0)
 
 
 def bounding_box(mask: Mask, margin: int) -> Rect:
     """Return the bounding box of a mask (h, w) with `margin` pixels around it, within the image."""
     return Rect.bounding(mask).grown(margin).clipped(Rect.of_image(mask.shape))
-
-
-def without_small_components(mask: Mask, share: float) -> Mask:
-    """Return a mask (h, w) without 8-connected components below `share` of the largest one."""
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    if count <= 2:
-        return mask
-    areas = statistics[:, cv2.CC_STAT_AREA].copy()
-    areas[0] = 0
-    return np.asarray((areas >= share * areas.max())[labels])

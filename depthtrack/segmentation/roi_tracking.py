@@ -10,6 +10,7 @@ import numpy as np
 
 from depthtrack.compilation import compiled
 from depthtrack.recording.sequence import Frame
+from depthtrack.segmentation.components import without_small_components
 from depthtrack.segmentation.continuing_surfaces import (
     BEYOND_WRIST,
     MISSING,
@@ -19,7 +20,7 @@ from depthtrack.segmentation.continuing_surfaces import (
 )
 from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.masks import HandMasks, dilation_radius
-from depthtrack.segmentation.morphology import bounding_box, closed, dilated, without_small_components
+from depthtrack.segmentation.morphology import bounding_box, closed, dilated
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.wrist import WristPlane
@@ -99,14 +100,19 @@ def mark_reachable(
     out: (h, w) output: one of the kinds of `continuing_surfaces`.
     """
     fx, fy, cx, cy = lens
+    (px, py, pz), (wx, wy, wz), (ax, ay, az) = centre, wrist, towards_arm
+    rays = np.empty(depth.shape[1])
+    for u in range(depth.shape[1]):
+        rays[u] = (u - cx) / fx
     for v in range(depth.shape[0]):
+        row, kinds, ray = depth[v], out[v], (v - cy) / fy
         for u in range(depth.shape[1]):
-            z = np.float64(depth[v, u])
-            kind = READING if z > 0.0 else MISSING
-            if kind == MISSING:
-                z = centre[2]
-            x, y = (u - cx) / fx * z, (v - cy) / fy * z
-            dx, dy, dz = x - centre[0], y - centre[1], z - centre[2]
-            beyond = (x - wrist[0]) * towards_arm[0] + (y - wrist[1]) * towards_arm[1] + (z - wrist[2]) * towards_arm[2]
+            # Without branches, so that the compiler makes vectors of it.
+            reading = np.float64(row[u])
+            kind = READING if reading > 0.0 else MISSING
+            z = reading if reading > 0.0 else pz
+            x, y = rays[u] * z, ray * z
+            dx, dy, dz = x - px, y - py, z - pz
+            beyond = (x - wx) * ax + (y - wy) * ay + (z - wz) * az
             near = dx * dx + dy * dy + dz * dz < reach * reach
-            out[v, u] = OUTSIDE if not near else kind if beyond < 0.0 else BEYOND_WRIST
+            kinds[u] = OUTSIDE if not near else kind if beyond < 0.0 else BEYOND_WRIST

@@ -6,13 +6,13 @@ Argyros and Lourakis, "Real-time tracking of multiple skin-colored objects with 
 from collections import deque
 from functools import cache
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.compilation import compiled
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.chroma import BINS, bins_of_colours, colour_index, count_chroma
+from depthtrack.segmentation.components import components_with
 from depthtrack.segmentation.options import SkinColourOptions
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.types import Array, Image, Labels, Mask
@@ -76,7 +76,7 @@ class AdaptiveSkin:
             classes = np.empty(part.shape, dtype=np.uint8)
             left, top = int(region.left + j0 * stride), int(region.top + i0 * stride)
             classify(image, left, top, self._classes, np.ascontiguousarray(blocks[i0:i1, j0:j1]), stride, classes)
-            part[:] = grow_skin(classes)
+            part[:] = components_with(classes, SURELY_SKIN)
         return skin
 
 
@@ -126,11 +126,3 @@ def classify(
             else:
                 for u in range(u0, u1):
                     out[v, u] = NOT_SKIN
-
-
-def grow_skin(classes: Labels) -> Labels:
-    """Return 1 (h, w) on 8-connected components of skin that hold a SURELY_SKIN pixel."""
-    count, components = cv2.connectedComponents((classes != NOT_SKIN).view(np.uint8), connectivity=8)
-    is_skin = np.zeros(count, dtype=np.uint8)
-    is_skin[components[classes == SURELY_SKIN]] = 1
-    return is_skin[components]

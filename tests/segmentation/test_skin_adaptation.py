@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.segmentation.chroma import BINS, bins_of_colours
+from depthtrack.segmentation.components import components_with
 from depthtrack.segmentation.options import SkinColourOptions
 from depthtrack.segmentation.skin_adaptation import (
     MAYBE_SKIN,
     NOT_SKIN,
     SURELY_SKIN,
     AdaptiveSkin,
-    grow_skin,
 )
 from depthtrack.segmentation.skin_colour import SkinColourModel, chroma_distribution
 from depthtrack.segmentation.skin_statistics import OTHER, SKIN, Mixture
@@ -41,7 +41,7 @@ def test_hysteresis_equals_a_flood_fill(seed: int) -> None:
         if np.array_equal(grown, expected):
             break
         expected = grown
-    np.testing.assert_array_equal(grow_skin(classes) > 0, expected)
+    np.testing.assert_array_equal(components_with(classes, SURELY_SKIN) > 0, expected)
 
 
 def test_chroma_of_a_mixture_equals_that_of_its_samples() -> None:
