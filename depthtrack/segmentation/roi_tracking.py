@@ -67,8 +67,8 @@ def segment_roi(
     readings, missing = readings[near.slices], kinds[near.slices] == MISSING
     silhouette = readings
     if skin is not None and frame.colour is not None:
-        found = skin.find(frame.colour, region, np.ones((1, 1), np.uint8), max(depth.shape))
-        coloured = found[near.slices] > 0
+        within = kinds[near.slices] != OUTSIDE
+        coloured = skin.find_among(frame.colour, near.shifted(region.left, region.top), within)
         readings = readings & dilated(coloured, radius)
         # Skin without a reading counts in gaps between readings only: outside them, shadows can have its colour.
         silhouette = readings | (coloured & closed(readings, radius) & missing)

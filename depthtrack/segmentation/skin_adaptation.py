@@ -79,6 +79,15 @@ class AdaptiveSkin:
             part[:] = components_with(classes, SURELY_SKIN)
         return skin
 
+    def find_among(self, image: Image, region: Rect, pixels: Mask) -> Mask:
+        """Return the skin (h, w) among pixels (h, w) of a region of an image; others end components.
+
+        image: (H, W, 3), RGB.
+        """
+        classes = np.empty(pixels.shape, np.uint8)
+        classify_pixels(image, region.left, region.top, self._classes, pixels, classes)
+        return components_with(classes, SURELY_SKIN).view(np.bool_)
+
 
 def classes_of_colours(posterior: Array, options: SkinColourOptions) -> Labels:
     """Return NOT_SKIN, MAYBE_SKIN or SURELY_SKIN (32768,) of each quantised colour.
@@ -126,3 +135,18 @@ def classify(
             else:
                 for u in range(u0, u1):
                     out[v, u] = NOT_SKIN
+
+
+@compiled(nogil=True)
+def classify_pixels(image: Image, left: int, top: int, classes: Labels, pixels: Mask, out: Labels) -> None:
+    """Classify some pixels of a part of an image; the others are NOT_SKIN.
+
+    image: (H, W, 3), RGB.
+    left, top: first pixel of the part.
+    classes: (32768,) by quantised colour.
+    pixels: (h, w) pixels to classify.
+    out: (h, w) output.
+    """
+    for v in range(out.shape[0]):
+        for u in range(out.shape[1]):
+            out[v, u] = classes[colour_index(image, top + v, left + u)] if pixels[v, u] else NOT_SKIN

@@ -108,3 +108,15 @@ def test_skin_outside_the_hand_is_left_out() -> None:
         np.zeros((20, 30), np.bool_),
     )
     np.testing.assert_allclose(skin.posterior(), before, atol=1e-15)
+
+
+def test_skin_among_some_pixels_equals_that_among_blocks_of_one_pixel() -> None:
+    rng = np.random.default_rng(4)
+    image = rng.integers(0, 256, (30, 40, 3), dtype=np.uint8)
+    image[5:20, 5:25] = (200, 140, 120)
+    skin, region = AdaptiveSkin(SkinColourModel.default()), Rect(3, 4, 33, 28)
+    pixels = rng.random(region.shape) < 0.8
+    found = skin.find_among(image, region, pixels)
+    np.testing.assert_array_equal(found, skin.find(image, region, pixels.view(np.uint8), 1) > 0)
+    assert found.any()
+    assert not found[~pixels].any()
