@@ -90,8 +90,7 @@ class RasterScorer(ScorerBase):
         shape, batch = self.target.camera.shape, as_batch(np.asarray(pose)[None])
         arrays, space = self._arrays, self._arrays.workspaces[0]
         kernel.draw_pose(batch[0], arrays.hand, arrays.camera, *space.arrays)
-        inverse = tiles.read_tiled(space.buffer, shape)
-        depth = np.divide(1, inverse, out=np.zeros_like(inverse), where=inverse > 0)
+        depth = tiles.read_depth(space.buffer, shape)
         space.buffer[:] = 0
         return depth
 

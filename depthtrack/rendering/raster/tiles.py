@@ -7,7 +7,8 @@ than sixteen pixels of a row. Moving down a column of tiles reads memory in orde
 import numpy as np
 from numpy.typing import NDArray
 
-from depthtrack.types import Array32
+from depthtrack.compilation import compiled
+from depthtrack.types import Array32, Depth
 
 TILE_WIDTH, TILE_HEIGHT = 8, 2
 """Pixels."""
@@ -34,14 +35,45 @@ def new_tiled_image(shape: tuple[int, int]) -> Array32:
 
 def write_tiled(image: NDArray[np.generic], beyond: float, tiled: Array32) -> None:
     """Write an image (h, w) to `tiled`; pixels outside the image become `beyond`."""
-    (height, width), (columns, rows) = image.shape, tile_counts(image.shape)
-    padded = np.full((rows * TILE_HEIGHT, columns * TILE_WIDTH), beyond, np.float32)
-    padded[:height, :width] = image
-    tiled.reshape(columns, rows * TILE_HEIGHT, TILE_WIDTH)[:] = padded.reshape(-1, columns, TILE_WIDTH).swapaxes(0, 1)
+    write_tiles(np.ascontiguousarray(image), np.float32(beyond), tiled)
 
 
-def read_tiled(tiled: Array32, shape: tuple[int, int]) -> Array32:
-    """Return the image (h, w) of `shape` that `write_tiled` stored."""
-    columns, rows = tile_counts(shape)
-    padded = tiled.reshape(columns, rows * TILE_HEIGHT, TILE_WIDTH).swapaxes(0, 1).reshape(-1, columns * TILE_WIDTH)
-    return padded[: shape[0], : shape[1]]
+def read_depth(tiled: Array32, shape: tuple[int, int]) -> Depth:
+    """Return the depth (h, w) of the inverse depth that `write_tiled` stored; 0 where it is 0."""
+    depth = np.empty(shape, np.float32)
+    invert_tiles(tiled, depth)
+    return depth
+
+
+@compiled(nogil=True)
+def write_tiles(image: NDArray[np.generic], beyond: np.float32, tiled: Array32) -> None:
+    """Write an image (h, w) to `tiled`; see `write_tiled`."""
+    height, width = image.shape
+    rows, whole = -(-height // TILE_HEIGHT) * TILE_HEIGHT, width // TILE_WIDTH * TILE_WIDTH
+    for v in range(height):
+        for left in range(0, whole, TILE_WIDTH):
+            for i in range(TILE_WIDTH):
+                tiled[left * rows + v * TILE_WIDTH + i] = np.float32(image[v, left + i])
+        if whole < width:
+            for i in range(TILE_WIDTH):
+                inside = whole + i < width
+                tiled[whole * rows + v * TILE_WIDTH + i] = np.float32(image[v, whole + i]) if inside else beyond
+    for v in range(height, rows):
+        for left in range(0, width, TILE_WIDTH):
+            for i in range(TILE_WIDTH):
+                tiled[left * rows + v * TILE_WIDTH + i] = beyond
+
+
+@compiled(nogil=True)
+def invert_tiles(tiled: Array32, image: Array32) -> None:
+    """Write the inverse of what `write_tiled` stored to an image (h, w); see `read_depth`."""
+    height, width = image.shape
+    rows, whole = -(-height // TILE_HEIGHT) * TILE_HEIGHT, width // TILE_WIDTH * TILE_WIDTH
+    for v in range(height):
+        for left in range(0, whole, TILE_WIDTH):
+            for i in range(TILE_WIDTH):
+                inverse = tiled[left * rows + v * TILE_WIDTH + i]
+                image[v, left + i] = np.float32(1) / inverse if inverse > 0 else np.float32(0)
+        for i in range(width - whole):
+            inverse = tiled[whole * rows + v * TILE_WIDTH + i]
+            image[v, whole + i] = np.float32(1) / inverse if inverse > 0 else np.float32(0)
