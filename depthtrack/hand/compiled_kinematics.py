@@ -142,3 +142,37 @@ def retract_unnormalised(pose: Array, tangent: Array, out: Array) -> None:
     out[3], out[4], out[5], out[6] = compiled_product(w, x, y, z, pose[3], pose[4], pose[5], pose[6])
     for i in range(20):
         out[7 + i] = pose[7 + i] + tangent[6 + i]
+
+
+@compiled(nogil=True)
+def point_jacobian(bodies: BodyPoses, b: int, x: Array, out: Array) -> None:
+    """Write the Jacobian (3, 26) of a point fixed to body b; see `HandModel.point_jacobian`.
+
+    x: (3,) the point, metres, camera frame.
+    """
+    for i in range(3):
+        for j in range(26):
+            out[i, j] = 1.0 if i == j else 0.0
+    px, py, pz = x[0] - bodies.T[0, 0, 3], x[1] - bodies.T[0, 1, 3], x[2] - bodies.T[0, 2, 3]
+    out[0, 4], out[0, 5] = pz, -py
+    out[1, 3], out[1, 5] = -pz, px
+    out[2, 3], out[2, 4] = py, -px
+    if b == 0:
+        return
+    finger, phalanx = (b - 1) // 3, (b - 1) % 3
+    for a in range(4 * finger, 4 * finger + 2 + phalanx):
+        u, o = bodies.axes[a], bodies.origins[a]
+        rx, ry, rz = x[0] - o[0], x[1] - o[1], x[2] - o[2]
+        out[0, 6 + a] = u[1] * rz - u[2] * ry
+        out[1, 6 + a] = u[2] * rx - u[0] * rz
+        out[2, 6 + a] = u[0] * ry - u[1] * rx
+
+
+@compiled(nogil=True)
+def endpoints(chain: Chain, bodies: BodyPoses, out: Array) -> None:
+    """Write the phalanx endpoints (5, 4, 3), metres, camera frame; see `HandModel.endpoints`."""
+    for finger in range(5):
+        for phalanx in range(3):
+            out[finger, phalanx] = bodies.T[1 + 3 * finger + phalanx, :, 3]
+        last = bodies.T[3 + 3 * finger]
+        out[finger, 3] = last[:, 3] + last[:, 1] * chain.lengths[finger, 2]

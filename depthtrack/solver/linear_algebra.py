@@ -22,12 +22,12 @@ def hold_parameter(A: Array, b: Array, i: int) -> None:
 
 
 @compiled(nogil=True)
-def cholesky_solve(A: Array, b: Array) -> bool:
-    """Solve A x = b in place: A (n, n) is overwritten and b (n,) becomes x.
+def cholesky(A: Array) -> bool:
+    """Replace the lower triangle of A (n, n) by L with A = L L^T; only that triangle is read.
 
-    Returns False if A is not symmetric positive definite.
+    Returns False if A is not positive definite.
     """
-    n = b.shape[0]
+    n = A.shape[0]
     for j in range(n):
         d = A[j, j]
         for k in range(j):
@@ -41,6 +41,18 @@ def cholesky_solve(A: Array, b: Array) -> bool:
             for k in range(j):
                 s -= A[i, k] * A[j, k]
             A[i, j] = s / d
+    return True
+
+
+@compiled(nogil=True)
+def cholesky_solve(A: Array, b: Array) -> bool:
+    """Solve A x = b in place: A (n, n) is overwritten and b (n,) becomes x.
+
+    Returns False if A is not symmetric positive definite.
+    """
+    n = b.shape[0]
+    if not cholesky(A):
+        return False
     for i in range(n):
         s = b[i]
         for k in range(i):

@@ -10,11 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from depthtrack.compilation import compiled
+from depthtrack.hand.compiled_kinematics import BodyPoses, endpoints
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel, body_of
-from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
-from depthtrack.rendering.visibility import points_in_view
+from depthtrack.rendering.visibility import FLESH, points_in_view
+from depthtrack.solver.point_spread import point_spread
 from depthtrack.solver.prior import prior_energy
 from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.types import Array, Depth, Mask
@@ -30,8 +32,6 @@ CLIPPED = 0.04
 _BODIES = np.repeat([body_of(finger, bone) for finger in range(5) for bone in range(3)], 2)
 _PALM = np.array([0, 1, 5, 9, 13, 17])
 """Keypoints that no finger moves: the wrist and the bases of the fingers."""
-_ANGLES = slice(6, TANGENT_SIZE)
-_AROUND = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(9, 2)
 
 
 class BonesInView(NamedTuple):
@@ -60,15 +60,25 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
 
     rendered: (h, w) depth of the posed hand, metres; 0 for none.
     """
-    ends = model.endpoints(pose).reshape(5, 4, 3)
-    points = np.stack([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=2)
-    visible = points_in_view(points, rendered, target.camera)
+    bodies, ends, points = BodyPoses.at(model.chain, pose), np.empty((5, 4, 3)), np.empty((5, 3, 2, 3))
+    endpoints(model.chain, bodies, ends)
+    points[:, :, 0], points[:, :, 1] = ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2
+    visible, own = np.empty((5, 3, 2), np.bool_), np.empty((5, 3, 2), np.bool_)
+    differences, camera = np.empty((5, 3, 2)), target.camera
+    compare_points(
+        points.reshape(-1, 3),
+        (bone_radii(model.shape) + OWN_FLESH).reshape(-1),
+        (camera.fx, camera.fy, camera.cx, camera.cy),
+        (rendered, target.depth, target.silhouette),
+        visible.reshape(-1),
+        own.reshape(-1),
+        differences.reshape(-1),
+    )
     if target.occluder is not None:
         # Bones lie inside the fingers: none is behind an object that does not hide its finger.
         visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
-    differences = depth_differences(points, rendered, target)
-    own = visible & points_in_view(points, rendered, target.camera, bone_radii(model.shape) + OWN_FLESH)
-    spread = keypoint_spread(model, pose, points, own & (differences < AGREES))
+    measured = visible & own & (differences < AGREES)
+    spread = keypoint_spread(model, bodies, ends, points, measured)
     return BonesInView(visible, differences, spread, float(np.sqrt(2 * prior_energy(pose, common_postures()))))
 
 
@@ -78,35 +88,68 @@ def bone_radii(shape: HandShape) -> Array:
     return np.stack([radii[:, 1:], (radii[:, 1:] + radii[:, :-1]) / 2], axis=2)
 
 
-def depth_differences(points: Array, rendered: Depth, target: Target) -> Array:
-    """Return mean differences (...) of rendered and observed depth, metres.
-
-    They are those of 3 x 3 pixels around each of the points (..., 3).
-    A rendered pixel outside the observed silhouette disagrees completely. One without a reading inside does not count.
-    Where no pixel counts, nothing is compared, and the difference is complete as well.
-    """
-    centre = np.rint(np.nan_to_num(target.camera.project(points), nan=-9.0)).astype(np.int64)
-    u, v = np.moveaxis(centre[..., None, :] + _AROUND, -1, 0)
-    inside = (u >= 0) & (v >= 0) & (u < target.camera.width) & (v < target.camera.height)
-    at = np.where(inside, v, 0), np.where(inside, u, 0)
-    there, here, silhouette = target.depth[at], rendered[at], target.silhouette[at]
-    difference = np.where(silhouette, np.minimum(np.abs(here - there), CLIPPED), CLIPPED)
-    counts = inside & (here > 0) & (~silhouette | (there > 0))
-    compared = counts.sum(axis=-1)
-    total = np.where(counts, difference, 0.0).sum(axis=-1)
-    return np.where(compared > 0, total / np.maximum(compared, 1), CLIPPED)
-
-
-def keypoint_spread(model: HandModel, pose: Array, points: Array, measured: Mask) -> Array:
+def keypoint_spread(model: HandModel, bodies: BodyPoses, ends: Array, points: Array, measured: Mask) -> Array:
     """Return the root mean square distance (21,) of the keypoints from the truth, metres.
 
+    ends: (5, 4, 3) endpoints of the phalanges, metres, camera frame.
     points: (5, 3, 2, 3) far end and middle of each bone, metres, camera frame.
     measured: (5, 3, 2) which of them are measured; the palm always is.
     """
-    keypoints = model.keypoints(pose)
-    bodies, places = np.append(_BODIES, KEYPOINT_BODIES), np.append(points.reshape(-1, 3), keypoints, axis=0)
-    bones, joints = np.split(model.point_jacobian(pose, bodies, places), [len(_BODIES)])
-    J = np.concatenate([bones[measured.ravel()], joints[_PALM]]).reshape(-1, TANGENT_SIZE)
-    precision = J.T @ J / MEASURED**2
-    precision[_ANGLES, _ANGLES] += common_postures().precision
-    return np.sqrt(np.einsum("nki,ij,nkj->n", joints, np.linalg.inv(precision), joints))
+    palm, keypoints = bodies.T[0], np.empty((21, 3))
+    keypoints[0], keypoints[1:] = palm[:, :3] @ model.shape.wrist + palm[:, 3], ends.reshape(20, 3)
+    seen = measured.reshape(-1)
+    at = np.concatenate([points.reshape(-1, 3)[seen], keypoints[_PALM]])
+    fixed_to = np.append(_BODIES[seen], KEYPOINT_BODIES[_PALM])
+    return np.asarray(
+        point_spread(bodies, common_postures().precision, MEASURED, fixed_to, at, KEYPOINT_BODIES, keypoints)
+    )
+
+
+@compiled(nogil=True)
+def compare_points(
+    points: Array,
+    flesh: Array,
+    lens: tuple[float, float, float, float],
+    images: tuple[Depth, Depth, Mask],
+    visible: Mask,
+    own: Mask,
+    differences: Array,
+) -> None:
+    """Compare the depth around the points of bones.
+
+    The differences are means over 3 x 3 pixels. A rendered pixel outside the observed silhouette disagrees completely.
+    One without a reading inside does not count. Where no pixel counts, nothing is compared, and the difference is
+    complete as well.
+
+    points: (N, 3) metres, camera frame.
+    flesh: (N,) depth below the rendered surface of a point whose own flesh is seen, metres.
+    lens: fx, fy, cx, cy, pixels.
+    images: rendered and observed depth, metres, and observed silhouette (h, w).
+    visible, own: (N,) output: whether nothing is before the point, and whether its own flesh is what is seen.
+    differences: (N,) output: of rendered and observed depth, metres, at most `CLIPPED`.
+    """
+    (fx, fy, cx, cy), (rendered, depth, silhouette) = lens, images
+    height, width = rendered.shape
+    for n in range(points.shape[0]):
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        visible[n], own[n], differences[n] = False, False, CLIPPED
+        if not z > 0.0:
+            continue
+        across, down = np.rint(fx * x / z + cx), np.rint(fy * y / z + cy)
+        if not (-2 < across < width + 1 and -2 < down < height + 1):
+            continue
+        u, v = int(across), int(down)
+        if 0 <= u < width and 0 <= v < height:
+            front = np.float64(rendered[v, u])
+            visible[n] = front == 0.0 or z - front < FLESH
+            own[n] = front == 0.0 or z - front < flesh[n]
+        count, total = 0, 0.0
+        for j in range(max(v - 1, 0), min(v + 2, height)):
+            for i in range(max(u - 1, 0), min(u + 2, width)):
+                here, there = np.float64(rendered[j, i]), np.float64(depth[j, i])
+                if here == 0.0 or (silhouette[j, i] and there == 0.0):
+                    continue
+                count += 1
+                total += min(abs(here - there), CLIPPED) if silhouette[j, i] else CLIPPED
+        if count > 0:
+            differences[n] = total / count

@@ -123,7 +123,9 @@ class StageTracker:
         tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
         seen = seen_part(best, rendered, target, tools.scoring.objective)
         bones = bones_in_view(tools.model, best.pose, rendered, target)
-        unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
+        unhidden = rendered
+        if target.occluder is not None:
+            unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
         self.evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
         confidence = self._confidence(self.evidence)
         clock.lap("confidence")

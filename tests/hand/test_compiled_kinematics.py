@@ -32,6 +32,20 @@ def test_bodies_and_hinges_are_those_of_the_hand_model(side: Side, seed: int) ->
         np.testing.assert_allclose(J[moves, :, angle], turned[moves], atol=1e-12)
 
 
+@given(seed=SEEDS)
+def test_endpoints_and_jacobians_are_those_of_the_hand_model(seed: int) -> None:
+    shape, rng = HandShape(side="left"), np.random.default_rng(seed)
+    pose, model = random_pose(rng), HandModel(shape)
+    bodies, ends, J = BodyPoses.at(model.chain, pose), np.empty((5, 4, 3)), np.empty((3, 26))
+    compiled_kinematics.endpoints(model.chain, bodies, ends)
+    np.testing.assert_allclose(ends.reshape(20, 3), model.endpoints(pose), atol=1e-14)
+    points = rng.normal(0, 0.1, (16, 3))
+    expected = model.point_jacobian(pose, np.arange(16), points)
+    for b in range(16):
+        compiled_kinematics.point_jacobian(bodies, b, points[b], J)
+        np.testing.assert_allclose(J, expected[b], atol=1e-14)
+
+
 @given(seed=SEEDS, length=st.floats(0.1, 10))
 def test_batches_agree_with_single_poses_and_the_reference(seed: int, length: float) -> None:
     shape, rng = HandShape(scale=0.9), np.random.default_rng(seed)

@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.compiled_kinematics import BodyPoses
+from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel, body_of
 from depthtrack.hand.pose import make_pose, retract
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
+from depthtrack.rendering.visibility import FLESH, points_in_view
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -18,8 +20,9 @@ from depthtrack.tracking.spread import (
     CLIPPED,
     MEASURED,
     BonesInView,
+    bone_radii,
     bones_in_view,
-    depth_differences,
+    compare_points,
     keypoint_spread,
 )
 from depthtrack.types import Array, Depth, Mask
@@ -38,6 +41,20 @@ def posed(posture: str) -> Array:
 def points_of(pose: Array) -> Array:
     ends = MODEL.endpoints(pose).reshape(5, 4, 3)
     return np.stack([ends[:, 1:], (ends[:, 1:] + ends[:, :-1]) / 2], axis=2)
+
+
+def spread_of(pose: Array, measured: Mask) -> Array:
+    ends = MODEL.endpoints(pose).reshape(5, 4, 3)
+    return keypoint_spread(MODEL, BodyPoses.at(MODEL.chain, pose), ends, points_of(pose), measured)
+
+
+def compared_with(points: Array, rendered: Depth, target: Target) -> tuple[Mask, Mask, Array]:
+    """Return what `compare_points` writes for points (5, 3, 2, 3): visible, own, differences."""
+    camera, found = target.camera, (np.empty(30, np.bool_), np.empty(30, np.bool_), np.empty(30))
+    images = rendered, target.depth, target.silhouette
+    flesh = bone_radii(HAND).reshape(-1)
+    compare_points(points.reshape(-1, 3), flesh, (camera.fx, camera.fy, camera.cx, camera.cy), images, *found)
+    return found[0].reshape(5, 3, 2), found[1].reshape(5, 3, 2), found[2].reshape(5, 3, 2)
 
 
 def view_of(posture: str, skin: Synthesiser) -> BonesInView:
@@ -75,9 +92,9 @@ def test_fingers_behind_an_object_are_hidden(everyday_skin: Synthesiser) -> None
 @pytest.mark.parametrize("finger", range(5))
 def test_a_finger_that_is_not_measured_spreads_alone(finger: int) -> None:
     pose, all_measured = posed("open"), np.ones((5, 3, 2), dtype=np.bool_)
-    points, part = points_of(pose), all_measured.copy()
+    part = all_measured.copy()
     part[finger] = False
-    whole, less = (keypoint_spread(MODEL, pose, points, measured) for measured in (all_measured, part))
+    whole, less = (spread_of(pose, measured) for measured in (all_measured, part))
     hidden = 1 + 4 * finger + np.arange(1, 4)
     assert np.all(less >= whole - 1e-12)
     assert np.all(less[hidden] > 2 * whole[hidden])
@@ -90,7 +107,7 @@ def test_the_spread_is_that_of_sampled_poses() -> None:
     """Poses drawn from the prior and the measurements, with their likelihood as weight."""
     pose, measured = posed("open"), np.ones((5, 3, 2), dtype=np.bool_)
     measured[2] = False
-    spread = keypoint_spread(MODEL, pose, points_of(pose), measured)
+    spread = spread_of(pose, measured)
     prior, draw = common_postures(), np.random.default_rng(5)
     covariance = np.linalg.inv(prior.precision)
     steps = np.zeros((4000, 26))
@@ -114,7 +131,7 @@ def test_differences_are_clipped_and_missing_readings_do_not_count(everyday_skin
         rendered = tracker._tools.scorer.render(pose)
 
     def compared(observed: Depth, silhouette: Mask) -> Array:
-        return depth_differences(points, rendered, Target(observation.camera, silhouette, observed))
+        return compared_with(points, rendered, Target(observation.camera, silhouette, observed))[2]
 
     covered = rendered > 0
     assert np.allclose(compared(rendered, covered), 0)
@@ -122,3 +139,40 @@ def test_differences_are_clipped_and_missing_readings_do_not_count(everyday_skin
     np.testing.assert_allclose(compared(shifted, covered)[compared(rendered, covered) == 0], 0.02, atol=1e-6)
     assert np.allclose(compared(rendered, np.zeros_like(covered)), CLIPPED)
     assert np.allclose(compared(np.zeros_like(depth), np.ones_like(covered)), CLIPPED)
+
+
+def test_the_spread_is_that_of_the_dense_precision() -> None:
+    rng = np.random.default_rng(3)
+    pose, measured = posed("fist"), rng.random((5, 3, 2)) < 0.5
+    bodies = np.repeat([body_of(finger, bone) for finger in range(5) for bone in range(3)], 2)
+    joints = MODEL.point_jacobian(pose, KEYPOINT_BODIES, MODEL.keypoints(pose))
+    bones = MODEL.point_jacobian(pose, bodies, points_of(pose).reshape(-1, 3))
+    J = np.concatenate([bones[measured.ravel()], joints[[0, 1, 5, 9, 13, 17]]]).reshape(-1, 26)
+    precision = J.T @ J / MEASURED**2
+    precision[6:, 6:] += common_postures().precision
+    expected = np.sqrt(np.einsum("nki,ij,nkj->n", joints, np.linalg.inv(precision), joints))
+    np.testing.assert_allclose(spread_of(pose, measured), expected, rtol=1e-9)
+
+
+def test_points_are_compared_as_in_numpy(everyday_skin: Synthesiser) -> None:
+    """Points inside, at the border of, and outside the image, and behind the camera."""
+    observation, rng = observe(everyday_skin, 20), np.random.default_rng(8)
+    camera = observation.camera
+    rendered = np.where(rng.random(camera.shape) < 0.7, 0.5 + 0.04 * rng.random(camera.shape), 0).astype(np.float32)
+    pixels = rng.uniform([-3, -3], [camera.width + 2, camera.height + 2], (30, 2))
+    points = camera.unproject(pixels, rng.uniform(0.48, 0.56, 30))
+    points[:2, 2] = -0.5, 0.0
+    visible, own, differences = compared_with(points, rendered, observation)
+    np.testing.assert_array_equal(visible.ravel(), points_in_view(points, rendered, camera, FLESH))
+    np.testing.assert_array_equal(own.ravel(), points_in_view(points, rendered, camera, bone_radii(HAND).ravel()))
+    for point, found in zip(points, differences.ravel(), strict=True):
+        u, v = np.rint(np.nan_to_num(camera.project(point), nan=-9)).astype(int)
+        parts = []
+        for j, i in ((v + dv, u + du) for dv in (-1, 0, 1) for du in (-1, 0, 1)):
+            if 0 <= j < camera.height and 0 <= i < camera.width and rendered[j, i] > 0:
+                there = observation.depth[j, i]
+                if not observation.silhouette[j, i]:
+                    parts.append(CLIPPED)
+                elif there > 0:
+                    parts.append(min(abs(float(rendered[j, i]) - float(there)), CLIPPED))
+        assert found == pytest.approx(np.mean(parts) if parts else CLIPPED)
