@@ -54,8 +54,8 @@ def test_the_fewest_markers_below_two_millimetres() -> None:
 
 def test_ours_is_compared_with_each_base_set() -> None:
     found = compared("schroeder2015-10")
-    assert found["ours below Wheatland, one a bone"] == 100
-    assert found["Wheatland, all vertices, 6 markers"] == 4.0
+    assert found["expected error, prior: below Wheatland, one a bone"] == 100
+    assert found["paper's objective: Wheatland, all vertices, 6"] == 4.0
 
 
 def test_centimetres_of_the_table() -> None:

@@ -17,7 +17,7 @@ from depthtrack.hand.skin.mesh import Skin
 from depthtrack.hand.synergies import Synergies
 from depthtrack.markers.layout.candidates import Candidates
 from depthtrack.markers.layout.expected_error import VertexErrors
-from depthtrack.markers.layout.options import LayoutOptions, QualityOptions
+from depthtrack.markers.layout.options import LayoutOptions, Objective, QualityOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.reconstruction import Method, ReconstructionOptions, reconstruct
 from depthtrack.markers.layout.search import find_layout_of
@@ -41,17 +41,24 @@ TEST = {"grasps": "grasp", "interaction": "grasp", "grasps-2": "other-grasps", "
 _RANDOM_SEEDS = range(4)
 
 Search = Literal["full", "quick"]
+System = Literal["paper", "ours"]
+"""What chooses a layout and reconstructs from it: the paper's objective and free refinement, or ours with a prior."""
+OBJECTIVE: dict[System, Objective] = {"paper": "condition", "ours": "expected"}
+METHOD: dict[System, Method] = {"paper": "subspace", "ours": "prior"}
 
 
 def search_of(options: ExperimentOptions) -> Search:
-    """Return the size of the swarm: that of the paper, or a small one."""
+    """Return the effort of the search for a layout."""
     return "quick" if options.quick else "full"
 
 
 def layout_options(search: Search) -> LayoutOptions:
     """Return the options of the search for layouts."""
-    small = SwarmOptions(particles=150, generations=40)
-    return LayoutOptions(swarm=small, kicks=2) if search == "quick" else LayoutOptions()
+    return LayoutOptions(kicks=2) if search == "quick" else LayoutOptions()
+
+
+PAPER_SWARM = SwarmOptions(particles=1000, generations=100)
+"""The swarm of the paper, Sec. 5.2."""
 
 
 @lru_cache(maxsize=8)
@@ -83,17 +90,17 @@ def postures_of(synergies: Synergies, count: int = 1000) -> Array:
 
 
 @lru_cache(maxsize=64)
-def quality_of(training: str, markers: int) -> LayoutQuality:
+def quality_of(training: str, markers: int, system: System) -> LayoutQuality:
     """Return the objective for a training set, with as many synergies as markers, at most six."""
-    options = QualityOptions()
+    options = QualityOptions(objective=OBJECTIVE[system])
     options = replace(options, components=min(options.components, markers))
     return LayoutQuality.of(Candidates.on_skin(HandShape()), training_postures(training), options)
 
 
 @lru_cache(maxsize=128)
-def best_model(training: str, markers: int, search: Search, seed: int = 0) -> MarkerModel:
+def best_model(training: str, markers: int, system: System, search: Search, seed: int = 0) -> MarkerModel:
     """Return the hand with the layout that is found for a training set."""
-    quality = quality_of(training, markers)
+    quality = quality_of(training, markers, system)
     found = find_layout_of(quality, markers, layout_options(search), seed, threads=1)
     return quality.candidates.layout(found.rows, training).on(quality.candidates.hand)
 
@@ -106,20 +113,17 @@ class ReconstructionError(NamedTuple):
 
 
 def reconstruction_error(
-    model: MarkerModel, synergies: Synergies, motion: str, method: Method, every: int = 2
+    model: MarkerModel, quality: LayoutQuality, motion: str, method: Method, every: int = 2
 ) -> ReconstructionError:
     """Return the error of a test motion that is reconstructed from the markers of a model.
 
+    quality: of the training set; it has the synergies.
     every: frames from one whose vertices are compared to the next.
     """
     truth = motion_poses(motion)
-    poses = reconstruct(
-        model,
-        model.positions(truth),
-        synergies,
-        ReconstructionOptions(method=method),
-        model.kinematics.wrist(truth),
-    )
+    options = ReconstructionOptions(method=method, components=quality.options.components)
+    wrist = model.kinematics.wrist(truth)
+    poses = reconstruct(model, model.positions(truth), quality.synergies, options, wrist)
     errors = VertexErrors.between(Skin.of(HandShape()), poses[::every], truth[::every])
     return ReconstructionError(1000 * float(errors.mean.mean()), 1000 * float(errors.largest.max()))
 

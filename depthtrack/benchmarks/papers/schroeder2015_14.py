@@ -29,7 +29,7 @@ def measure(*, markers: int) -> Row:
 
     It is the least mean over the motion of a few rounds.
     """
-    quality = quality_of("grasps", 6)
+    quality = quality_of("grasps", 6, "paper")
     model = quality.candidates.layout(added(quality, markers), "greedy").on(quality.candidates.hand)
     truth = motion_poses(TEST)
     positions, wrist = model.positions(truth), model.kinematics.wrist(truth)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
-from depthtrack.benchmarks.papers.schroeder2015 import SCHROEDER_2015, layout_options, quality_of
+from depthtrack.benchmarks.papers.schroeder2015 import PAPER_SWARM, SCHROEDER_2015, layout_options, quality_of
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.markers.layout.exchange import greedy_layout, kicked
 from depthtrack.markers.layout.surface_swarm import swarm_layout
@@ -36,8 +36,8 @@ def measure(*, training: str, markers: int) -> Row:
     `exchanged` is the swarm's layout after the exchange of single markers. `overtakes_s` is the time after which the
     swarm's energy is at most the final one of the greedy choice. Curves are (s, energy).
     """
-    quality = quality_of(training, markers)
-    for options in (SwarmOptions(particles=8, generations=4), layout_options("full").swarm):  # the first round compiles
+    quality = quality_of(training, markers, "paper")
+    for options in (SwarmOptions(particles=8, generations=4), PAPER_SWARM):  # the first round compiles
         greedy_curve = _Curve()
         greedy = greedy_layout(quality, markers, None, greedy_curve.add)
         greedy_s = greedy_curve.seconds()

@@ -9,6 +9,7 @@ from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOption
 from depthtrack.benchmarks.papers.schroeder2015 import (
     SCHROEDER_2015,
     Search,
+    System,
     best_model,
     motions_tested,
     quality_of,
@@ -19,7 +20,7 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.markers.layout.reconstruction import Method
 
 TRAININGS = ("interaction", "interaction-2")
-METHODS = {"plain": "standard IK", "subspace": "subspace IK, free refinement", "prior": "subspace IK, prior"}
+METHODS = {"plain": "standard IK", "subspace": "subspace IK, free refinement", "prior": "least expected error, prior"}
 MARKERS = 4
 PAPER_CM = {"plain": (1.79, 7.9), "subspace": (0.89, 2.1)}
 
@@ -41,8 +42,9 @@ def measure(*, training: str, test: str, seed: int, method: Method, search: Sear
 
     seed: of the search for the layout.
     """
-    model = best_model(training, MARKERS, search, seed)
-    error = reconstruction_error(model, quality_of(training, MARKERS).synergies, test, method, every=1)
+    system: System = "ours" if method == "prior" else "paper"
+    model = best_model(training, MARKERS, system, search, seed)
+    error = reconstruction_error(model, quality_of(training, MARKERS, system), test, method, every=1)
     return error._asdict() | {"markers": " ".join(model.labels)}
 
 

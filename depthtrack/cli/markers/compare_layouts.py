@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class Command:
     """Solve a recorded hand from a few of its markers, and measure the error at the others.
 
-    Our choice, farthest points and random choices are compared. Synergies and choice are those of the first half of
-    the capture, errors those of the second.
+    The choices of least expected error and of the paper's objective, farthest points and random choices are compared.
+    One half of the capture gives the synergies and chooses, the other half gives the errors.
     """
 
     path: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER")]
@@ -28,6 +28,8 @@ class Command:
     """Hand in the folder (default: the first one)."""
     markers: Annotated[tuple[int, ...], number(3, 64, aliases=("-k",), metavar="K ...")] = (4, 6, 8, 10)
     """Numbers of markers."""
+    half: Literal["first", "second"] = "first"
+    """Half of the capture that chooses."""
     random: Annotated[int, number(1, 10_000)] = 100
     """Random choices of each number."""
     seed: Annotated[int, number(0, MOST_SEED)] = 1000
@@ -38,7 +40,7 @@ class Command:
     def run(self) -> None:
         from depthtrack.cli.progress import percent_bar
         from depthtrack.markers.folder.reading import MarkerFolder
-        from depthtrack.markers.layout.capture_comparison import compare_choices
+        from depthtrack.markers.layout.capture_comparison import HeldOutHalf, compare_choices
         from depthtrack.strict_data import json_text
 
         if not self.markers:
@@ -48,11 +50,11 @@ class Command:
         name = next(iter(hands), None) if self.model is None else self.model
         if name not in hands:
             raise InputError(f"{self.path} has no hand '{name}': choose among {', '.join(hands) or 'none'}")
+        halves = HeldOutHalf.of(labelled, hands[name], self.half)
         with percent_bar() as show:
             found = [
                 compare_choices(
-                    labelled,
-                    hands[name],
+                    halves,
                     count,
                     self.random,
                     self.seed,
@@ -70,22 +72,24 @@ def _row(found: "CaptureComparison") -> dict[str, Any]:
     return {
         "markers": found.markers,
         "ours_mm": round(1000 * found.ours.error, 3),
+        "paper_mm": round(1000 * found.paper.error, 3),
         "farthest_mm": round(1000 * found.farthest.error, 3),
         "random_mean_mm": round(1000 * float(found.random.mean()), 3),
         "random_median_mm": round(1000 * float(np.median(found.random)), 3),
         "random_best_mm": round(1000 * float(found.random.min()), 3),
         "random_worse": round(float(np.mean(found.random > found.ours.error)), 4),
         "ours": list(found.ours.labels),
+        "paper": list(found.paper.labels),
     }
 
 
 def _text(name: str, rows: list[dict[str, Any]]) -> str:
     from depthtrack.text_table import aligned
 
-    head = ("markers", "ours", "farthest", "random, mean", "median", "best", "worse than ours", "our choice")
+    head = ("markers", "ours", "paper's", "farthest", "random, mean", "median", "best", "worse than ours", "our choice")
     lines: list[tuple[str, ...]] = [head]
     for row in rows:
-        errors = [f"{row[key]:.2f} mm" for key in ("ours_mm", "farthest_mm")]
+        errors = [f"{row[key]:.2f} mm" for key in ("ours_mm", "paper_mm", "farthest_mm")]
         errors += [f"{row[f'random_{key}_mm']:.2f} mm" for key in ("mean", "median", "best")]
         lines.append((str(row["markers"]), *errors, f"{100 * row['random_worse']:.0f} %", " ".join(row["ours"])))
-    return "\n".join([f"{name}: mean error at the markers left out", *aligned(lines, left=1, text=(7,))])
+    return "\n".join([f"{name}: mean error at the markers left out", *aligned(lines, left=1, text=(8,))])

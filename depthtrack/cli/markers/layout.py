@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -25,7 +25,8 @@ MOST_POSTURES = 5000
 class Command:
     """Find a layout of few markers for motions, and write where to stick them.
 
-    The method is that of Schroeder, Maycock and Botsch 2015. Synergies and key-frames are those of the motions.
+    The method is that of Schroeder, Maycock and Botsch 2015, by default with the expected error as the objective.
+    Synergies and key-frames are those of the motions.
     LAYOUT.json serves as a model of `markers label`, `solve` and `fill`, and as a layout of `synth --markers`. The page
     beside it, LAYOUT.png, is to print.
     """
@@ -40,6 +41,8 @@ class Command:
     """Sizes of the hand (default: the average adult's)."""
     wrist: bool = True
     """Add a marker at the wrist, which gives the position of the hand. Without, the layout must give it."""
+    objective: Literal["expected", "condition"] = "expected"
+    """What the layout minimises: the expected error, or the condition number and distance of the paper."""
     components: Annotated[int | None, stated_default(Range(1, 20), metavar="COUNT")] = None
     """Synergies of the subspace (default: as many as markers, at most 6)."""
     key_frames: Annotated[int, number(1, 1000)] = 10
@@ -78,7 +81,7 @@ class Command:
         write_atomic(self.out, layout.to_json())
         places, terms = instructions(layout, hand), quality.terms(found.rows)
         bare = quality.candidates.layout(found.rows, about).on(hand)
-        errors = expected_errors(bare, motions, len(quality.synergies), self.wrist, self.noise / 1000)
+        errors = expected_errors(bare, motions, quality.options.components, self.wrist, self.noise / 1000)
         figures = self._figures(quality, terms) | {
             "error_mm": round(1000 * float(errors.mean.mean()), 3),
             "largest_mm": round(1000 * float(errors.largest.max()), 3),
@@ -97,9 +100,9 @@ class Command:
 
         most = QualityOptions().components
         quality = QualityOptions(
+            objective=self.objective,
             key_frames=self.key_frames,
             components=min(self.markers, most) if self.components is None else self.components,
-            occlusion_weight=0.0 if self.cameras is None else 20.0,
             anchored=self.wrist,
             robust=self.robust,
         )
@@ -121,12 +124,15 @@ class Command:
     def _figures(self, quality: "LayoutQuality", terms: "Terms") -> dict[str, Any]:
         return {
             "candidates": len(quality.candidates),
-            "components": len(quality.synergies),
-            "variance_share": round(quality.synergies.variance_share(len(quality.synergies)), 4),
+            "components": quality.options.components,
+            "variance_share": round(quality.synergies.variance_share(quality.options.components), 4),
             "key_frames": len(quality.postures),
+            "objective": self.objective,
             "energy": round(terms.energy, 6),
+            "expected_rms_mm": round(1000 * terms.error, 3),
+            "expected_rms_after_loss_mm": round(1000 * terms.error_lost, 3),
             "condition": round(terms.condition, 3),
-            "condition_after_loss": round(terms.lost, 1),
+            "condition_after_loss": round(terms.condition_lost, 1),
             "least_distance_mm": round(1000 * terms.distance, 2),
             "hidden_share": round(terms.occlusion, 4) if self.cameras is not None else None,
             "noise_mm": self.noise,
@@ -163,10 +169,12 @@ def _lines(figures: dict[str, Any]) -> list[str]:
     return [
         f"{figures['components']} synergies with {100 * figures['variance_share']:.1f} % of the variance,"
         f" {figures['key_frames']} key-frames, {figures['candidates']} possible places",
-        f"objective {figures['energy']:.3f}: condition number {figures['condition']:.0f},"
-        f" after the loss of the worst marker {figures['condition_after_loss']:.3g},"
-        f" least distance {figures['least_distance_mm']:.1f} mm"
+        f"objective '{figures['objective']}' {figures['energy']:.3f}: expected root mean square error"
+        f" {figures['expected_rms_mm']:.2f} mm, after the loss of the worst marker"
+        f" {figures['expected_rms_after_loss_mm']:.2f} mm",
+        f"condition number {figures['condition']:.0f}, after the loss of the worst marker"
+        f" {figures['condition_after_loss']:.3g}, least distance {figures['least_distance_mm']:.1f} mm"
         + ("" if hidden is None else f", hidden from the cameras {100 * hidden:.1f} %"),
-        f"expected error with noise of {figures['noise_mm']:g} mm: {figures['error_mm']:.2f} mm mean of the skin,"
+        f"simulated error with noise of {figures['noise_mm']:g} mm: {figures['error_mm']:.2f} mm mean of the skin,"
         f" {figures['largest_mm']:.1f} mm largest",
     ]

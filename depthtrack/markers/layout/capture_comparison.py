@@ -1,10 +1,10 @@
 """Choices of a few markers of a capture, compared at the markers left out."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import comb
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.synergies import Synergies
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.layout.candidates import Candidates
-from depthtrack.markers.layout.options import QualityOptions
+from depthtrack.markers.layout.options import OBJECTIVES, QualityOptions
 from depthtrack.markers.layout.quality import LayoutQuality
-from depthtrack.markers.layout.reconstruction import reconstruct
+from depthtrack.markers.layout.reconstruction import ReconstructionOptions, reconstruct
 from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array, Index
@@ -23,7 +23,12 @@ from depthtrack.types import Array, Index
 _EXHAUSTIVE = 200_000
 """Choices up to which all are evaluated."""
 _EVERY = 4
-"""Frames of the second half from one that is reconstructed to the next."""
+"""Frames of the tested half from one that is reconstructed to the next."""
+
+RECORDED = ReconstructionOptions(residual=0.002)
+"""Reconstruction of a recorded hand, whose skin slides; chosen on a glove of 13 markers."""
+
+Half = Literal["first", "second"]
 
 
 class Choice(NamedTuple):
@@ -39,58 +44,107 @@ class Choice(NamedTuple):
 class CaptureComparison(NamedTuple):
     """Choices of one number of markers.
 
-    ours: least objective. farthest: farthest points of the rest posture.
+    ours: least expected error. paper: least objective of Schroeder et al. 2015, Eq. (7).
+    farthest: farthest points of the rest posture.
     random: errors (R,) of random choices, metres.
     """
 
     markers: int
     ours: Choice
+    paper: Choice
     farthest: Choice
     random: Array
 
 
-def compare_choices(
-    labelled: LabelledCapture,
-    k: int,
-    count: int,
-    draws: int,
-    seed: int,
-    progress: Callable[[float], None] = lambda share: None,
-) -> CaptureComparison:
-    """Return the errors of choices of `count` markers of model k.
+@dataclass(frozen=True, eq=False)
+class HeldOutHalf:
+    """A hand of a capture in two halves.
 
-    Synergies and key-frames are those of the first half of the poses; the second half is reconstructed.
+    One chooses markers, and the other is reconstructed from them.
+
+    synergies: of the postures (N, 20) of the half that chooses, rad.
+    positions: (T, M, 3) of the other half, metres.
+    """
+
+    model: MarkerModel
+    candidates: Candidates
+    postures: Array
+    synergies: Synergies
+    positions: Array
+
+    @staticmethod
+    def of(labelled: LabelledCapture, k: int, half: Half = "first", every: int = _EVERY) -> "HeldOutHalf":
+        """Return the halves of the poses of model k.
+
+        half: the one that chooses. every: frames of the other half from one that is used to the next.
+
+        Raises:
+            InputError: if the model is no hand, or was lost for most of the capture.
+        """
+        model, poses, positions = labelled.models[k], labelled.poses[k], labelled.positions(k)
+        candidates = Candidates.of_model(model)
+        known = np.flatnonzero(np.isfinite(poses).all(axis=1))
+        halves = known[: len(known) // 2], known[len(known) // 2 :]
+        training, test = halves if half == "first" else halves[::-1]
+        test = test[::every]
+        whole = np.flatnonzero(np.isfinite(positions[test]).all(axis=(1, 2)))
+        if len(training) < 2 or len(whole) == 0:
+            raise InputError(f"no frame in the tested half of the poses of '{model.name}' shows all markers")
+        postures = np.ascontiguousarray(poses[training][:, ANGLES])
+        return HeldOutHalf(model, candidates, postures, Synergies.fit(postures), positions[test[whole[0] :]])
+
+    def quality(self, count: int, options: QualityOptions) -> LayoutQuality:
+        """Return the objective for `count` markers.
+
+        The subspace has as many synergies as their coordinates determine.
+        """
+        options = replace(options, anchored=False, components=self._components(count))
+        return LayoutQuality.of(self.candidates, self.postures, options, self.synergies)
+
+    def measured(self, rows: Index, options: ReconstructionOptions = RECORDED) -> Choice:
+        """Return the error of the reconstruction from some of the markers."""
+        model, positions = self.model, self.positions
+        options = replace(options, components=self._components(len(rows)))
+        poses = reconstruct(model.part(rows), positions[:, rows], self.synergies, options)
+        left_out = np.setdiff1d(np.arange(len(model.labels)), rows)
+        distance = np.linalg.norm(model.positions(poses)[:, left_out] - positions[:, left_out], axis=-1)
+        return Choice(tuple(model.labels[row] for row in rows), float(np.nanmean(distance)))
+
+    @staticmethod
+    def _components(count: int) -> int:
+        return min(QualityOptions().components, count, 3 * count - 6)
+
+
+def compare_choices(
+    halves: HeldOutHalf, count: int, draws: int, seed: int, progress: Callable[[float], None] = lambda share: None
+) -> CaptureComparison:
+    """Return the errors of choices of `count` markers.
 
     Raises:
-        InputError: if the model is no hand, has too few markers, or was lost for most of the capture.
+        InputError: if the hand has too few markers.
     """
-    model, poses, positions = labelled.models[k], labelled.poses[k], labelled.positions(k)
-    candidates = Candidates.of_model(model)
-    if not 3 <= count < len(candidates):
-        raise InputError(f"'{model.name}' has {len(candidates)} markers: choose 3 to {len(candidates) - 1} of them")
-    known = np.flatnonzero(np.isfinite(poses).all(axis=1))
-    training, test = known[: len(known) // 2], known[len(known) // 2 :][::_EVERY]
-    whole = np.flatnonzero(np.isfinite(positions[test]).all(axis=(1, 2)))
-    if len(training) < 2 or len(whole) == 0:
-        raise InputError(f"no frame in the second half of the poses of '{model.name}' shows all markers")
-    test = test[whole[0] :]
-    options = QualityOptions(anchored=False)
-    # As many parameters as the coordinates determine.
-    components = min(options.components, count, 3 * count - 6)
-    options = replace(options, components=components)
-    quality = LayoutQuality.of(candidates, np.ascontiguousarray(poses[training][:, ANGLES]), options)
-
-    def choice(rows: Index) -> Choice:
-        return _measured(model, rows, positions[test], quality.synergies)
-
-    generator = np.random.Generator(np.random.Philox(key=[seed, count]))
-    errors = []
+    total = len(halves.candidates)
+    if not 3 <= count < total:
+        raise InputError(f"'{halves.model.name}' has {total} markers: choose 3 to {total - 1} of them")
+    generator, errors = np.random.Generator(np.random.Philox(key=[seed, count])), []
     for draw in range(draws):
         progress(draw / draws)
-        errors.append(choice(np.sort(generator.permutation(len(candidates))[:count])).error)
-    return CaptureComparison(
-        count, choice(_best(quality, count, seed)), choice(farthest_points(candidates.rest, count)), np.array(errors)
+        errors.append(halves.measured(random_choice(total, count, generator)).error)
+    ours, paper = (
+        best_choice(halves.quality(count, QualityOptions(objective=name)), count, seed) for name in OBJECTIVES
     )
+    return CaptureComparison(
+        count,
+        halves.measured(ours),
+        halves.measured(paper),
+        halves.measured(farthest_points(halves.candidates.rest, count)),
+        np.array(errors),
+    )
+
+
+def random_choice(total: int, count: int, generator: np.random.Generator) -> Index:
+    """Return `count` random rows of `total`, in order."""
+    return np.sort(generator.permutation(total)[:count])
 
 
 def farthest_points(points: Array, count: int) -> Index:
@@ -105,18 +159,10 @@ def farthest_points(points: Array, count: int) -> Index:
     return np.sort(np.array(chosen))
 
 
-def _best(quality: LayoutQuality, count: int, seed: int) -> Index:
+def best_choice(quality: LayoutQuality, count: int, seed: int) -> Index:
+    """Return the best choice (count,) of candidates: of all choices if they are not too many."""
     total = len(quality.candidates)
     if comb(total, count) > _EXHAUSTIVE:
         return np.sort(find_layout_of(quality, count, seed=seed).rows)
     every = np.array(list(combinations(range(total), count)), dtype=np.int64)
     return np.asarray(every[int(np.argmin(quality.energies(every)))])
-
-
-def _measured(model: MarkerModel, rows: Index, positions: Array, synergies: Synergies) -> Choice:
-    labels = tuple(model.labels[row] for row in rows)
-    few = model.with_(labels=labels, bodies=model.bodies[rows], offsets=model.offsets[rows], spread=model.spread[rows])
-    poses = reconstruct(few, positions[:, rows], synergies)
-    left_out = np.setdiff1d(np.arange(len(model.labels)), rows)
-    distance = np.linalg.norm(model.positions(poses)[:, left_out] - positions[:, left_out], axis=-1)
-    return Choice(labels, float(np.nanmean(distance)))

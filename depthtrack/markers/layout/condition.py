@@ -7,6 +7,8 @@ Problem, 1965, Ch. 7).
 
 import math
 
+import numpy as np
+
 from depthtrack.compilation import compiled
 from depthtrack.types import Array
 
@@ -101,3 +103,28 @@ def _nearest_eigenvalue(d: Array, squares: Array, start: float, side: float) -> 
         if abs(step) <= _STEP * abs(x):
             break
     return x
+
+
+@compiled(nogil=True)
+def least_condition(A: Array) -> float:
+    """Return a lower bound of `condition_number`, at a fraction of its time.
+
+    A: (n, n) symmetric, positive semidefinite; its lower triangle is read and overwritten.
+
+    The largest eigenvalue is at least each element of the diagonal. The smallest is at most each pivot of Cholesky's
+    factorisation, since a pivot is on the diagonal of a Schur complement.
+    """
+    n, high, low = A.shape[0], 0.0, np.inf
+    for i in range(n):
+        high = max(high, A[i, i])
+    for j in range(n):
+        pivot = A[j, j]
+        low = min(low, pivot)
+        if not low * LARGEST > high:
+            return LARGEST
+        inverse = 1.0 / pivot
+        for i in range(j + 1, n):
+            factor = A[i, j] * inverse
+            for k in range(j + 1, i + 1):
+                A[i, k] -= factor * A[k, j]
+    return high / low

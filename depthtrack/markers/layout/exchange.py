@@ -33,13 +33,11 @@ def added(quality: LayoutQuality, count: int, pool: ThreadPoolExecutor | None = 
 
     A layout too small to determine the parameters has the largest condition number, so its distance alone decides.
     """
-    every = np.arange(len(quality.candidates))
     # The first marker is the one farthest from the wrist; without others it has no distance.
     rest = quality.candidates.rest
     chosen = np.array([int(np.argmax(np.linalg.norm(rest - quality.candidates.hand.wrist, axis=1)))])
     while len(chosen) < count:
-        grown = np.concatenate([np.broadcast_to(chosen, (len(every), len(chosen))), every[:, None]], axis=1)
-        chosen = np.append(chosen, int(np.argmin(quality.energies(grown, None, pool))))
+        chosen = np.append(chosen, int(np.argmin(quality.grown(chosen, np.inf, pool))))
     return chosen
 
 
@@ -78,15 +76,14 @@ def exchanged(
 
     Each marker in turn gets the best place. progress: receives the energy after each exchange that was tried.
     """
-    layout, every = np.array(start, dtype=np.int64), np.arange(len(quality.candidates))
+    layout = np.array(start, dtype=np.int64)
     energy, tried, k = float(quality.energies(layout[None])[0]), 0, 0
     while tried < len(layout):
-        others = np.repeat(layout[None], len(every), axis=0)
-        others[:, k] = every
-        found = quality.energies(others, np.full(len(every), energy - _LEAST_GAIN * abs(energy)), pool)
+        least = energy - _LEAST_GAIN * abs(energy)
+        found = quality.grown(np.delete(layout, k), least, pool)
         best = int(np.argmin(found))
         tried += 1
-        if np.isfinite(found[best]):
+        if found[best] < least:
             layout[k], energy, tried = best, float(found[best]), 1
         progress(energy)
         k = (k + 1) % len(layout)

@@ -8,7 +8,7 @@ import numpy as np
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.hand.synergies import Synergies
-from depthtrack.markers.layout.reconstruction import reconstruct
+from depthtrack.markers.layout.reconstruction import ReconstructionOptions, reconstruct
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array
 
@@ -44,15 +44,15 @@ def expected_errors(
     """Return the errors of motions that are reconstructed from noisy markers.
 
     motions: postures (T, 20) of each, rad.
-    components: synergies of the subspace, fitted to the first four fifths of each motion. The last fifth, at most
-        `_HELD_OUT` frames, is reconstructed.
+    components: synergies of the subspace. They are fitted to the first four fifths of each motion. The last fifth, at
+        most `_HELD_OUT` frames, is reconstructed.
     anchored: whether the wrist is measured too.
     noise: standard deviation of each coordinate, metres.
     """
     assert model.hand is not None
     split = [max(1, 4 * len(postures) // 5) for postures in motions]
     known = np.concatenate([postures[:first] for postures, first in zip(motions, split, strict=True)])
-    synergies = Synergies.fit(known).truncated(components)
+    synergies, options = Synergies.fit(known), ReconstructionOptions(components=components)
     generator, found = np.random.Generator(np.random.Philox(key=[seed, 1])), []
     for postures, first in zip(motions, split, strict=True):
         held_out = postures[first:][:_HELD_OUT]
@@ -62,6 +62,6 @@ def expected_errors(
         markers, wrist = model.positions(truth), model.kinematics.wrist(truth)
         markers = markers + generator.normal(0, noise, markers.shape)
         wrist = wrist + generator.normal(0, noise, wrist.shape)
-        poses = reconstruct(model, markers, synergies, None, wrist if anchored else None)
+        poses = reconstruct(model, markers, synergies, options, wrist if anchored else None)
         found.append(VertexErrors.between(Skin.of(model.hand), poses, truth))
     return VertexErrors(np.concatenate([e.mean for e in found]), np.concatenate([e.largest for e in found]))

@@ -1,11 +1,18 @@
 """Options of the search for a reduced marker layout."""
 
 from dataclasses import dataclass
+from typing import Literal
 
-from depthtrack.errors import InputError
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 from depthtrack.solver.options import SwarmOptions
 
+Objective = Literal["expected", "condition"]
+"""What a search for a layout minimises.
+
+`expected`: the error that markers with noise leave, for a prior of the postures. `condition`: the condition number in
+the subspace of the synergies, less the distance of the markers (Schroeder et al. 2015, Eq. 7).
+"""
+OBJECTIVES: tuple[Objective, ...] = ("expected", "condition")
 _PAPER = "Schroeder et al. 2015"
 
 
@@ -24,29 +31,56 @@ class FeasibleOptions:
 
 
 @dataclass(frozen=True)
-class QualityOptions:
-    """Objective of a layout (Eq. 7) and the subspace that it is for."""
+class ConditionOptions:
+    """Objective `condition` (Eq. 7)."""
 
-    key_frames: int = option(10, "Postures that the objective is evaluated in", source=f"{_PAPER}, Sec. 5.2: 3 to 10")
-    components: int = option(
-        6, "Synergies l of the subspace, at most; no more than markers", source=f"{_PAPER}, Sec. 3.2: 3 to 6"
-    )
     condition_weight: float = option(0.1, "Weight w1 of the condition number", source=f"{_PAPER}, Sec. 5.1")
     distance_weight: float = option(100.0, "Weight w2 of the least distance", source=f"{_PAPER}, Sec. 5.1")
-    occlusion_weight: float = option(0.0, "Weight of the share of samples that too few cameras see; 0 for none")
+    occlusion_weight: float = option(20.0, "Weight of the share of samples that too few cameras see")
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class ExpectedOptions:
+    """Objective `expected`: the root mean square error of the skin, mm."""
+
+    residual: float = option(0.001, "Standard deviation of a coordinate of a marker", unit="m", least=1e-6)
+    beyond: float = option(
+        0.035, "Standard deviation of each angle about the postures of the motions", unit="rad", least=1e-3
+    )
+    apart: float = option(0.015, "Distance of two markers below which it counts", unit="m")
+    distance_weight: float = option(0.1, "Error that a lack of distance is worth", unit="mm/mm")
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class QualityOptions:
+    """Objective of a layout, and the subspace that it is for."""
+
+    objective: Objective = option("expected", "Expected error of all angles, or condition number in the subspace")
+    key_frames: int = option(
+        10, "Postures that the objective is evaluated in", source=f"{_PAPER}, Sec. 5.2: 3 to 10", least=1, most=1000
+    )
+    components: int = option(
+        6,
+        "Synergies l of the subspace, at most; no more than markers",
+        source=f"{_PAPER}, Sec. 3.2: 3 to 6",
+        least=1,
+        most=20,
+    )
     anchored: bool = option(
         True, "The position of the hand is known from a marker at the wrist; otherwise the layout determines it too"
     )
-    robust: bool = option(False, "Count the condition number after the loss of the worst marker")
+    robust: bool = option(False, "Judge a layout after the loss of its worst marker")
+    condition: ConditionOptions = option(ConditionOptions(), "Condition number")
+    expected: ExpectedOptions = option(ExpectedOptions(), "Expected error")
 
     def __post_init__(self) -> None:
-        if not (1 <= self.key_frames <= 1000 and 1 <= self.components <= 20):
-            raise InputError(
-                "a layout needs 1 to 1000 key-frames and 1 to 20 components, "
-                f"found {self.key_frames} and {self.components}"
-            )
-        if min(self.condition_weight, self.distance_weight, self.occlusion_weight) < 0:
-            raise InputError("the weights of the objective of a layout must not be negative")
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -56,7 +90,9 @@ class LayoutOptions:
     feasible: FeasibleOptions = option(FeasibleOptions(), "Feasible places")
     quality: QualityOptions = option(QualityOptions(), "Objective")
     swarm: SwarmOptions = option(
-        SwarmOptions(particles=1000, generations=100), f"Particle swarm ({_PAPER}, Sec. 5.2)", advanced=True
+        SwarmOptions(particles=100, generations=40),
+        f"Particle swarm; the paper has 1000 particles and 100 generations ({_PAPER}, Sec. 5.2)",
+        advanced=True,
     )
     exchange: bool = option(True, "Exchange single markers after the swarm until no exchange improves the layout")
     kicks: int = option(10, "Times that three markers of the best layout are moved at random, and exchanged again")

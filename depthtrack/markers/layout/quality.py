@@ -1,54 +1,58 @@
-"""Quality of a marker layout (Schroeder et al. 2015, Sec. 4 and 5.1)."""
+"""Quality of a marker layout: the objectives that a search minimises."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from depthtrack.errors import InputError
-from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import make_pose
 from depthtrack.hand.synergies import Synergies
 from depthtrack.markers.layout.candidates import Candidates
-from depthtrack.markers.layout.energy import Tables, layout_energies, layout_terms
+from depthtrack.markers.layout.conditioning import Conditioning, conditions_of, grown_conditions
 from depthtrack.markers.layout.key_frames import key_frames
 from depthtrack.markers.layout.options import QualityOptions
+from depthtrack.markers.layout.placement import Placement, least_distance, mean_hidden, placement_energies
+from depthtrack.markers.layout.posterior import Posterior, errors_of, grown_errors
 from depthtrack.markers.layout.sharing import share_rows
+from depthtrack.markers.layout.tables import conditioning_of, placement_of, posterior_of
 from depthtrack.types import Array, Index
 
 
 class Terms(NamedTuple):
-    """Terms of the objective of a layout.
+    """Terms of the objectives of a layout.
 
-    energy: E of Eq. (7), with the occlusion.
-    condition: E_cond, the mean condition number over the key-frames, Eq. (8).
-    lost: the same after the loss of the marker that raises it most.
+    energy: E of the chosen objective.
+    error: expected root mean square error, metres. error_lost: after the loss of the marker that raises it most.
+    condition: E_cond, the mean condition number over the key-frames, Eq. (8). condition_lost: likewise.
     distance: least distance between two markers in any key-frame, metres, the root of Eq. (6).
     occlusion: share of the samples that too few cameras see; 0 without cameras.
     """
 
     energy: float
+    error: float
+    error_lost: float
     condition: float
-    lost: float
+    condition_lost: float
     distance: float
     occlusion: float
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutQuality:
-    """The objective for layouts of candidates, precomputed for a set of postures.
+    """The objectives for layouts of candidates, precomputed for a set of postures.
 
-    synergies: of the subspace, l components.
+    synergies: of the postures, all components; the subspace has the first l = `options.components`.
     postures: (F, 20) of the key-frames, rad.
-    tables: what the compiled objective reads.
     """
 
     candidates: Candidates
     synergies: Synergies
     postures: Array
     options: QualityOptions
-    tables: Tables
+    placement: Placement
+    conditioning: Conditioning
+    posterior: Posterior
 
     @classmethod
     def of(
@@ -57,32 +61,56 @@ class LayoutQuality:
         postures: Array,
         options: QualityOptions | None = None,
         synergies: Synergies | None = None,
+        noise: Array | None = None,
     ) -> Self:
-        """Return the objective for postures (N, 20), rad.
+        """Return the objectives for postures (N, 20), rad.
 
-        synergies: of the subspace; those of the postures if None.
+        synergies: those of the postures if None.
+        noise: (V,) standard deviation of a coordinate of each candidate, metres; that of the options if None.
 
         Raises:
-            InputError: if the postures are equal, or there are fewer synergies than asked for.
+            InputError: if the postures are equal.
         """
         options = options or QualityOptions()
         fitted = Synergies.fit(postures) if synergies is None else synergies
-        kept = fitted.truncated(min(options.components, len(fitted)))
+        options = replace(options, components=min(options.components, len(fitted)))
+        subspace = fitted.truncated(options.components)
         chosen = postures[key_frames(postures, options.key_frames)]
-        return cls(candidates, kept, chosen, options, _tables(candidates, kept, chosen, options))
+        each = np.full(len(candidates), options.expected.residual) if noise is None else noise
+        return cls(
+            candidates,
+            fitted,
+            chosen,
+            options,
+            placement_of(candidates, chosen, options),
+            conditioning_of(candidates, chosen, subspace, options),
+            posterior_of(candidates, chosen, fitted, options, each),
+        )
 
     @property
     def fewest(self) -> int:
-        """Number of markers whose coordinates are as many as the parameters, at least."""
-        parameters = self.tables.size + (0 if self.options.anchored else 3)
-        return -(-parameters // 3) + int(self.options.robust)
+        """Fewest markers of a layout.
+
+        Their coordinates are as many as the parameters of the subspace, or they are three points with the wrist.
+        """
+        parameters = self.conditioning.size if self.options.objective == "condition" else 3
+        parameters += 0 if self.options.anchored else 3
+        return max(-(-parameters // 3), 2 if self.options.anchored else 3) + int(self.options.robust)
 
     def with_occlusion(self, hidden: Array) -> Self:
-        """Return the objective with the hidden share (V,) of each candidate, see `Tables`."""
-        return replace(self, tables=self.tables._replace(hidden=np.array(hidden, dtype=np.float64)))
+        """Return the objectives with the share (V,) of the samples that too few cameras see.
+
+        For the expected error, a marker that is seen in half of the samples is half a measurement.
+        """
+        hidden = np.array(hidden, dtype=np.float64)
+        return replace(
+            self,
+            placement=self.placement._replace(hidden=hidden),
+            posterior=self.posterior._replace(precision=self.posterior.precision * np.maximum(1 - hidden, 1e-3)),
+        )
 
     def energies(self, layouts: Index, bounds: Array | None = None, pool: ThreadPoolExecutor | None = None) -> Array:
-        """Return E (N,) of layouts (N, K) of candidates, Eq. (7).
+        """Return E (N,) of layouts (N, K) of candidates.
 
         bounds: (N,) energies from which a layout is of no interest; it may then have infinity.
         pool: threads to share the layouts.
@@ -92,49 +120,82 @@ class LayoutQuality:
         out = np.empty(len(layouts))
 
         def work(part: slice) -> None:
-            layout_energies(layouts[part], self.tables, limits[part], out[part])
+            placed, found = np.empty(len(layouts[part])), np.empty(len(layouts[part]))
+            placement_energies(layouts[part], self.placement, placed)
+            worst = np.full(len(placed), -np.inf)
+            for some in self._judged(layouts[part]):
+                self._measure(some, limits[part] - placed, found)
+                np.maximum(worst, found, out=worst)
+            out[part] = placed + worst
 
         share_rows(pool, len(layouts), work)
         return out
 
+    def grown(self, base: Index, bound: float = np.inf, pool: ThreadPoolExecutor | None = None) -> Array:
+        """Return E (V,) of the layout `base` (K,) with each of the candidates added.
+
+        bound: energy from which a layout is of no interest; it may then have infinity.
+        """
+        base = np.ascontiguousarray(base, dtype=np.int64)
+        count, placed = len(self.candidates), np.empty(len(self.candidates))
+        layouts = np.column_stack([np.broadcast_to(base, (count, len(base))), np.arange(count)])
+        placement_energies(layouts, self.placement, placed)
+        worst = self._grown(base, bound - placed, pool)
+        if self.options.robust:
+            lost = np.empty(1)
+            self._measure(base[None], np.full(1, np.inf), lost)
+            np.maximum(worst, lost[0], out=worst)
+            for k in range(len(base)):
+                np.maximum(worst, self._grown(np.delete(base, k), bound - placed, pool), out=worst)
+        worst[base] = np.inf
+        return placed + worst
+
     def terms(self, layout: Index) -> Terms:
         """Return the terms of a layout (K,) of candidates."""
         rows = np.ascontiguousarray(layout, dtype=np.int64)
-        condition, lost, distance, occlusion = layout_terms(rows, self.tables)
-        energy = float(self.energies(rows[None])[0])
-        return Terms(energy, condition, lost, distance * self.tables.length, occlusion)
+        energy, endless = float(self.energies(rows[None])[0]), np.full(1, np.inf)
 
+        def measured(measure: Callable[[Index, Array], None]) -> tuple[float, float]:
+            each = np.empty(1 + len(rows))
+            measure(rows[None], each[:1])
+            for k in range(len(rows)):
+                measure(np.delete(rows, k)[None], each[k + 1 : k + 2])
+            return float(each[0]), float(each.max())
 
-def _tables(candidates: Candidates, synergies: Synergies, postures: Array, options: QualityOptions) -> Tables:
-    """Return the products of the vertex Jacobians, and the distances over all key-frames."""
-    model = HandModel(candidates.hand)
-    poses = make_pose(np.zeros(3), [1.0, 0, 0, 0], postures)
-    points = model.transform_points(poses, candidates.bodies, candidates.offsets)
-    J = model.point_jacobian(poses, candidates.bodies, points)
-    # The hand turns about the anchor at the wrist, which keeps its place.
-    wrist = model.point_jacobian(poses, [0], model.wrist(poses)[:, None])
-    turned = J[..., 3:6] - wrist[..., 3:6]
-    J_pc = np.concatenate([turned, J[..., 6:] @ synergies.components], axis=-1)
-    n = J_pc.shape[-1]
-    if n > 23:
-        raise InputError(f"a layout has at most 20 synergies, found {n - 3}")
-    low = np.tril_indices(n)
-    products = np.einsum("fvcp,fvcp->fvp", J_pc[..., low[0]], J_pc[..., low[1]])
-    flat = np.moveaxis(points, 1, 0)
-    squares = np.stack([np.min(np.sum((flat - one) ** 2, axis=-1), axis=1) for one in flat])
-    # The length L of the flat hand from the wrist to the farthest fingertip.
-    flat_hand = model.endpoints(make_pose(np.zeros(3), [1.0, 0, 0, 0], np.zeros(20)))
-    length = float(np.linalg.norm(flat_hand - candidates.hand.wrist, axis=-1).max())
-    return Tables(
-        products=np.ascontiguousarray(products),
-        sums=np.ascontiguousarray(J_pc.reshape(len(postures), len(candidates), 3 * n)),
-        squares=squares / length**2,
-        hidden=np.zeros(len(candidates)),
-        size=n,
-        length=length,
-        condition_weight=options.condition_weight,
-        distance_weight=options.distance_weight,
-        occlusion_weight=options.occlusion_weight,
-        anchored=options.anchored,
-        robust=options.robust,
-    )
+        errors = measured(lambda some, out: errors_of(some, self.posterior, endless, out))
+        plain = self.conditioning._replace(weight=1.0)
+        conditions = measured(lambda some, out: conditions_of(some, plain, endless, out))
+        return Terms(
+            energy,
+            errors[0] / 1000,
+            errors[1] / 1000,
+            *conditions,
+            least_distance(rows, self.placement) * self.placement.length,
+            mean_hidden(rows, self.placement),
+        )
+
+    def _judged(self, layouts: Index) -> list[Index]:
+        """Return the layouts (N, K); also those without one marker if they must be robust."""
+        lost = range(layouts.shape[1]) if self.options.robust else ()
+        return [layouts, *(np.ascontiguousarray(np.delete(layouts, k, axis=1)) for k in lost)]
+
+    def _measure(self, layouts: Index, bounds: Array, out: Array) -> None:
+        if self.options.objective == "condition":
+            conditions_of(layouts, self.conditioning, bounds, out)
+        else:
+            errors_of(layouts, self.posterior, bounds, out)
+
+    def _grown(self, base: Index, bounds: Array, pool: ThreadPoolExecutor | None) -> Array:
+        count = len(self.candidates)
+        if self.options.objective == "condition":
+            every, out = np.arange(count), np.empty(count)
+            share_rows(
+                pool,
+                count,
+                lambda part: grown_conditions(base, every[part], self.conditioning, bounds[part], out[part]),
+            )
+            return out
+        frames = np.arange(len(self.postures))
+        squares = np.empty((len(frames), count))
+        share_rows(pool, len(frames), lambda part: grown_errors(base, frames[part], self.posterior, squares))
+        return np.asarray(np.sqrt(squares.mean(axis=0)))

@@ -15,7 +15,7 @@ from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.synergies import Synergies
 from depthtrack.markers.models.marker_model import MarkerModel
-from depthtrack.options import option
+from depthtrack.options import check_ranges, option
 from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import solve_each
 from depthtrack.solver.normal_equations import NormalEquations
@@ -38,12 +38,18 @@ class ReconstructionOptions:
     """Inverse kinematics from sparse markers."""
 
     method: Method = option("prior", "Subspace and free refinement, subspace and refinement with a prior, or neither")
+    components: int = option(6, "Synergies of the subspace, at most", least=1, most=20)
     iterations: int = option(10, "Gauss-Newton steps in each of both stages", source="Schroeder et al. 2015: 5 to 10")
     damping: float = option(1e-7, "Damping D of each angle or synergy", unit="m^2/rad^2", source="Eq. (2)")
-    residual: float = option(0.0005, "Standard deviation of a marker, which the prior is weighed against", unit="m")
-    beyond: float = option(
-        float(np.radians(5.0)), "Standard deviation of an angle from its reconstruction by the synergies", unit="rad"
+    residual: float = option(
+        0.0003, "Standard deviation of a coordinate of a marker, which the prior is weighed against", unit="m"
     )
+    beyond: float = option(
+        0.035, "Standard deviation of each angle about the postures of the synergies, for the prior", unit="rad"
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 class _Stage(NamedTuple):
@@ -61,7 +67,7 @@ def reconstruct(
     """Return the poses (T, 27) of a hand whose markers were measured.
 
     positions: (T, M, 3) metres, NaN if not measured.
-    synergies: of the subspace; `plain` starts from their mean.
+    synergies: their first components are the subspace, all of them the prior; `plain` starts from their mean.
     anchors: (T, 3) measured positions of the wrist, metres; None if there is no marker.
 
     Each frame starts at the last pose, and the first one at the best of several postures of the subspace.
@@ -97,7 +103,7 @@ def _stages(synergies: Synergies, options: ReconstructionOptions) -> tuple[_Stag
     free = _Stage(FULL, Prior.none())
     if options.method == "plain":
         return free, free
-    within = PostureSubspace.of(synergies)
+    within = PostureSubspace.of(synergies, min(options.components, len(synergies)))
     if options.method == "subspace":
         return _Stage(within, Prior.none()), free
     prior = Prior.from_synergies(synergies, options.residual**2, options.beyond)

@@ -34,8 +34,8 @@ def find_layout_of(
     check_seed(seed)
     if not quality.fewest <= count <= min(len(quality.candidates), 64):
         raise InputError(
-            f"{len(quality.synergies)} synergies need {quality.fewest} to {min(len(quality.candidates), 64)} markers, "
-            f"found {count}: ask for more markers, or fewer components"
+            f"a layout needs {quality.fewest} to {min(len(quality.candidates), 64)} markers for the objective "
+            f"'{quality.options.objective}', found {count}"
         )
     generator = np.random.Generator(np.random.Philox(key=[seed, count]))
     with ThreadPoolExecutor(usable_cores() if threads is None else threads) as pool:

@@ -96,6 +96,11 @@ class MarkerModel:
         """
         return replace(self, **changes)
 
+    def part(self, rows: Index) -> Self:
+        """Return the model of some of its markers."""
+        labels = tuple(self.labels[row] for row in rows)
+        return self.with_(labels=labels, bodies=self.bodies[rows], offsets=self.offsets[rows], spread=self.spread[rows])
+
     def mirrored(self) -> Self:
         """Return the model of the hand's other side; a name that is the side changes with it."""
         assert self.hand is not None

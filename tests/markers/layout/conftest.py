@@ -27,4 +27,11 @@ def postures() -> Array:
 
 @pytest.fixture(scope="session")
 def quality(candidates: Candidates, postures: Array) -> LayoutQuality:
-    return LayoutQuality.of(candidates, postures, QualityOptions(key_frames=4, components=3))
+    """The objective of the paper."""
+    return LayoutQuality.of(candidates, postures, QualityOptions(objective="condition", key_frames=4, components=3))
+
+
+@pytest.fixture(scope="session")
+def expected(candidates: Candidates, postures: Array) -> LayoutQuality:
+    """The expected error."""
+    return LayoutQuality.of(candidates, postures, QualityOptions(key_frames=3))

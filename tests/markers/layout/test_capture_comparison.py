@@ -8,7 +8,7 @@ from depthtrack.hand.pose import make_pose
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.layout.candidates import Candidates
-from depthtrack.markers.layout.capture_comparison import compare_choices, farthest_points
+from depthtrack.markers.layout.capture_comparison import HeldOutHalf, compare_choices, farthest_points
 from depthtrack.markers.models.layout import load_layout
 from depthtrack.types import Array
 
@@ -20,13 +20,14 @@ def test_few_markers_give_the_others(candidates: Candidates, postures: Array) ->
     columns = np.tile(np.arange(13), (len(poses), 1))
     capture = MarkerCapture(100.0, model.labels, positions)
     labelled = LabelledCapture(capture, (model,), (columns,), (poses,), (np.ones(columns.shape),))
-    found = compare_choices(labelled, 0, 6, draws=5, seed=0)
+    halves = HeldOutHalf.of(labelled, 0)
+    found = compare_choices(halves, 6, draws=5, seed=0)
     assert len(set(found.ours.labels)) == 6
     assert found.random.shape == (5,)
     assert found.ours.error < 0.006
     assert found.ours.error < np.median(found.random)
     with pytest.raises(InputError, match="choose 3 to 12"):
-        compare_choices(labelled, 0, 13, draws=1, seed=0)
+        compare_choices(halves, 13, draws=1, seed=0)
 
 
 def test_farthest_points_are_apart() -> None:

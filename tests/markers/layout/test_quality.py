@@ -14,9 +14,9 @@ from depthtrack.hand.pose import make_pose, retract
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.markers.layout.candidates import Candidates
-from depthtrack.markers.layout.condition import LARGEST, condition_number
+from depthtrack.markers.layout.condition import LARGEST, condition_number, least_condition
 from depthtrack.markers.layout.key_frames import key_frames
-from depthtrack.markers.layout.options import QualityOptions
+from depthtrack.markers.layout.options import OBJECTIVES, ConditionOptions, ExpectedOptions, Objective, QualityOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.models.layout import Layout
 from depthtrack.types import Array, Index
@@ -39,9 +39,18 @@ def test_condition_numbers_equal_those_of_singular_values(seed: int) -> None:
         assert condition_of(J.T @ J) == pytest.approx(expected, rel=1e-5)
 
 
+@given(seed=seeds)
+def test_the_lower_bound_is_below_the_condition_number(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 24))
+    J = rng.normal(size=(n + int(rng.integers(0, 9)), n)) * 10 ** rng.uniform(-1.0, 1.0, n)
+    assert 1 <= least_condition(J.T @ J) <= condition_of(J.T @ J) * (1 + 1e-6)
+
+
 def test_a_singular_matrix_has_the_largest_condition_number() -> None:
     assert condition_of(np.zeros((4, 4))) == LARGEST
     assert condition_of(np.diag([1.0, 2.0, 0.0])) == LARGEST
+    assert least_condition(np.diag([1.0, 2.0, 0.0])) == LARGEST
 
 
 def oracle_jacobian(quality: LayoutQuality, layout: Index, posture: Array) -> Array:
@@ -50,7 +59,7 @@ def oracle_jacobian(quality: LayoutQuality, layout: Index, posture: Array) -> Ar
     model, pose = HandModel(hand), make_pose(np.zeros(3), [1.0, 0, 0, 0], posture)
     bodies, offsets = quality.candidates.bodies[layout], quality.candidates.offsets[layout]
     columns = []
-    for k in range(3 + len(quality.synergies)):
+    for k in range(3 + quality.options.components):
         ends = []
         for step in (-1e-5, 1e-5):
             tangent = np.zeros(26)
@@ -77,7 +86,7 @@ def oracle_energy(quality: LayoutQuality, layout: Index) -> float:
         )
         apart = np.linalg.norm(points[:, None] - points, axis=-1) + 10 * np.eye(len(layout))
         least = min(least, float(apart.min()))
-    return float(0.1 * np.mean(conditions) - 100 * least / quality.tables.length)
+    return float(0.1 * np.mean(conditions) - 100 * least / quality.placement.length)
 
 
 def test_the_objective_equals_equations_5_to_9(quality: LayoutQuality) -> None:
@@ -95,7 +104,8 @@ def test_a_bound_leaves_better_layouts_unchanged(quality: LayoutQuality) -> None
 
 
 def test_without_an_anchor_the_translation_is_eliminated(candidates: Candidates, postures: Array) -> None:
-    options = QualityOptions(key_frames=1, components=2, condition_weight=1.0, distance_weight=0.0)
+    alone = ConditionOptions(condition_weight=1.0, distance_weight=0.0)
+    options = QualityOptions(objective="condition", key_frames=1, components=2, condition=alone)
     anchored = LayoutQuality.of(candidates, postures, options)
     free = LayoutQuality.of(candidates, postures, replace(options, anchored=False))
     layout = np.array([3, 400, 500, 700])
@@ -106,14 +116,28 @@ def test_without_an_anchor_the_translation_is_eliminated(candidates: Candidates,
     assert anchored.fewest == 2
 
 
-def test_the_loss_of_the_worst_marker_counts_if_asked_for(candidates: Candidates, postures: Array) -> None:
-    options = QualityOptions(key_frames=3, components=2, condition_weight=1.0, distance_weight=0.0)
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_the_loss_of_the_worst_marker_counts_if_asked_for(
+    objective: Objective, candidates: Candidates, postures: Array
+) -> None:
+    alone = ConditionOptions(condition_weight=1.0, distance_weight=0.0)
+    options = QualityOptions(objective=objective, key_frames=3, components=2, condition=alone)
     plain = LayoutQuality.of(candidates, postures, options)
     robust = LayoutQuality.of(candidates, postures, replace(options, robust=True))
     layout = np.array([3, 400, 500, 700])
-    of_rest = [plain.terms(np.delete(layout, k)).condition for k in range(4)]
-    assert robust.terms(layout).lost == plain.terms(layout).lost
-    assert robust.energies(layout[None])[0] >= max(of_rest) - 1e-9
+    terms, of_rest = plain.terms(layout), [plain.terms(np.delete(layout, k)) for k in range(4)]
+    if objective == "condition":
+        worst = max(terms.condition, *(rest.condition for rest in of_rest))
+        assert terms.condition_lost == pytest.approx(worst)
+    else:
+        worst = 1000 * max(rest.error for rest in of_rest)
+        assert 1000 * terms.error_lost == pytest.approx(worst)
+    lost = robust.energies(layout[None])[0]
+    assert lost - plain.energies(layout[None])[0] == pytest.approx(
+        worst - (terms.condition if objective == "condition" else 1000 * terms.error)
+    )
+    grown = robust.grown(layout[:3])
+    assert grown[700] == pytest.approx(lost)
 
 
 def test_candidates_face_the_back_of_their_bone(candidates: Candidates) -> None:
@@ -146,6 +170,12 @@ def test_key_frames_are_far_from_each_other() -> None:
 
 
 def test_options_out_of_range_are_rejected() -> None:
-    for wrong in ({"key_frames": 0}, {"components": 0}, {"components": 21}, {"condition_weight": -1.0}):
+    for count in (0, 21):
         with pytest.raises(InputError):
-            QualityOptions(**wrong)
+            QualityOptions(components=count)
+    with pytest.raises(InputError):
+        QualityOptions(key_frames=0)
+    with pytest.raises(InputError):
+        ConditionOptions(condition_weight=-1.0)
+    with pytest.raises(InputError):
+        ExpectedOptions(residual=0.0)

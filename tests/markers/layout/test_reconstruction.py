@@ -20,19 +20,20 @@ def model_and_poses(candidates: Candidates, synergies: Synergies) -> tuple[Marke
     """Return a hand of five markers, and a motion (12, 27) in the subspace."""
     model = manual_layout("4F-1T").on(candidates.hand)
     turn = np.linspace(0, 0.5, 12)[:, None]
-    coefficients = synergies.lower + np.linspace(0.3, 0.7, 12)[:, None] * (synergies.upper - synergies.lower)
+    few = synergies.truncated(3)
+    coefficients = few.lower + np.linspace(0.3, 0.7, 12)[:, None] * (few.upper - few.lower)
     quaternion = np.concatenate([np.cos(turn), 0 * turn, np.sin(turn), 0 * turn], axis=1)
-    return model, make_pose(np.concatenate([turn, turn, turn], axis=1), quaternion, synergies.angles(coefficients))
+    return model, make_pose(np.concatenate([turn, turn, turn], axis=1), quaternion, few.angles(coefficients))
 
 
 def test_postures_of_the_subspace_are_found_from_few_markers(candidates: Candidates, postures: Array) -> None:
-    synergies = Synergies.fit(postures).truncated(3)
+    synergies = Synergies.fit(postures)
     model, truth = model_and_poses(candidates, synergies)
     wrist = model.kinematics.wrist(truth)
     errors = {}
     methods: tuple[Method, ...] = ("subspace", "prior", "plain")
     for method in methods:
-        options = ReconstructionOptions(method=method, iterations=20)
+        options = ReconstructionOptions(method=method, components=3, iterations=20)
         poses = reconstruct(model, model.positions(truth), synergies, options, wrist)
         errors[method] = np.abs(tangent_between(poses, truth)).max()
     assert errors["subspace"] < 1e-3
@@ -41,11 +42,11 @@ def test_postures_of_the_subspace_are_found_from_few_markers(candidates: Candida
 
 
 def test_missing_markers_keep_the_posture_plausible(candidates: Candidates, postures: Array) -> None:
-    synergies = Synergies.fit(postures).truncated(3)
+    synergies = Synergies.fit(postures)
     model, truth = model_and_poses(candidates, synergies)
     positions = model.positions(truth)
     positions[4:8, 2] = np.nan
-    poses = reconstruct(model, positions, synergies, None, model.kinematics.wrist(truth))
+    poses = reconstruct(model, positions, synergies, ReconstructionOptions(components=3), model.kinematics.wrist(truth))
     assert np.isfinite(poses).all()
     assert VertexErrors.between(Skin.of(candidates.hand), poses, truth).mean.max() < 0.003
     positions[0, 2:] = np.nan
