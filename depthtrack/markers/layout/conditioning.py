@@ -5,36 +5,49 @@ from typing import NamedTuple
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.markers.layout.condition import LARGEST, condition_number, least_condition
+from depthtrack.markers.layout.condition import LANES, LARGEST, condition_numbers, least_conditions
+from depthtrack.simd.functions import vsum
+from depthtrack.simd.vectors import F64X8, loader, store
 from depthtrack.types import Array, Index
+
+_load = loader(F64X8)
 
 
 class Conditioning(NamedTuple):
     """What the mean condition number reads, for F key-frames and V candidates.
 
-    products: (F, V, n (n + 1) / 2) lower triangle of J^T J of each candidate, rotations first, then synergies.
-    sums: (F, V, 3 n) Jacobians J, row by row.
+    Blocks of eight key-frames are lanes; lanes beyond F repeat one of them and have the share 0.
+
+    products: (V, B, 8 n (n + 1) / 2) lower triangle of J^T J of each candidate, rotations first, then synergies.
+    sums: (V, B, 24 n) Jacobians J, row by row.
+    shares: (B, 8) w1 of Eq. (7), divided by F.
     size: n.
-    weight: w1 of Eq. (7).
     anchored: whether the columns of the translation are omitted (Sec. 4.1). Otherwise they are eliminated: J^T J
         becomes that of the Jacobians less their mean.
     """
 
     products: Array
     sums: Array
+    shares: Array
     size: int
-    weight: float
     anchored: bool
 
+    @staticmethod
+    def of(jacobians: Array, weight: float, anchored: bool) -> "Conditioning":
+        """Return the tables of Jacobians (F, V, 3, n), of rotations and synergies."""
+        F, V, _, n = jacobians.shape
+        blocks = -(-F // LANES)
+        J = np.take(jacobians, np.minimum(np.arange(blocks * LANES), F - 1), axis=0)
+        low = np.tril_indices(n)
+        products = np.einsum("fvcp,fvcp->vpf", J[..., low[0]], J[..., low[1]])
+        sums = J.reshape(blocks * LANES, V, 3 * n).transpose(1, 2, 0)
+        shares = np.where(np.arange(blocks * LANES) < F, weight / F, 0.0)
 
-class Summed(NamedTuple):
-    """Sums over the markers of a layout, in each key-frame.
+        def laned(table: Array) -> Array:
+            split = table.reshape(V, -1, blocks, LANES).swapaxes(1, 2)
+            return np.ascontiguousarray(split.reshape(V, blocks, -1))
 
-    products: (F, n (n + 1) / 2). sums: (F, 3 n), empty with an anchor.
-    """
-
-    products: Array
-    sums: Array
+        return Conditioning(laned(products), laned(sums), shares.reshape(blocks, LANES), n, anchored)
 
 
 @compiled(nogil=True)
@@ -43,15 +56,15 @@ def conditions_of(layouts: Index, tables: Conditioning, bounds: Array, out: Arra
 
     bounds: (N,) values from which it is infinity.
     """
-    whole, none = sum_of(np.empty(0, np.int64), tables), sum_of(np.empty(0, np.int64), tables)
-    work, lows = np.empty((tables.size + 2, tables.size)), np.empty(tables.products.shape[0])
+    n, count = tables.size, layouts.shape[1]
+    products, sums = np.empty(tables.products.shape[1:]), np.empty(tables.sums.shape[1:])
+    A, d, e = np.empty(LANES * n * n), np.empty(LANES * n), np.empty(LANES * n)
+    lows = np.empty(tables.shares.shape)
     for i in range(layouts.shape[0]):
-        layout = layouts[i]
-        whole.products[:], whole.sums[:] = none.products, none.sums
-        for k in range(layout.shape[0] - 1):
-            _add(whole, layout[k], tables)
-        last = layout[layout.shape[0] - 1]
-        out[i] = _grown_condition(whole, last, layout.shape[0], tables, bounds[i], work, lows)
+        products[:], sums[:] = 0.0, 0.0
+        for k in range(count - 1):
+            _add(products, sums, layouts[i, k], tables)
+        out[i] = _grown_condition(products, sums, layouts[i, count - 1], count, tables, bounds[i], A, d, e, lows)
 
 
 @compiled(nogil=True)
@@ -60,83 +73,89 @@ def grown_conditions(base: Index, added: Index, tables: Conditioning, bounds: Ar
 
     bounds: (N,) values from which it is infinity.
     """
-    whole = sum_of(base, tables)
-    work, lows = np.empty((tables.size + 2, tables.size)), np.empty(tables.products.shape[0])
+    n, count = tables.size, base.shape[0] + 1
+    products, sums = np.zeros(tables.products.shape[1:]), np.zeros(tables.sums.shape[1:])
+    A, d, e = np.empty(LANES * n * n), np.empty(LANES * n), np.empty(LANES * n)
+    lows = np.empty(tables.shares.shape)
+    for k in range(base.shape[0]):
+        _add(products, sums, base[k], tables)
     for i in range(added.shape[0]):
-        out[i] = _grown_condition(whole, added[i], base.shape[0] + 1, tables, bounds[i], work, lows)
+        out[i] = _grown_condition(products, sums, added[i], count, tables, bounds[i], A, d, e, lows)
 
 
 @compiled(nogil=True)
-def sum_of(layout: Index, tables: Conditioning) -> Summed:
-    """Return the sums over the markers of a layout (K,)."""
-    F = tables.products.shape[0]
-    columns = 0 if tables.anchored else tables.sums.shape[2]
-    whole = Summed(np.zeros((F, tables.products.shape[2])), np.zeros((F, columns)))
-    for k in range(layout.shape[0]):
-        _add(whole, layout[k], tables)
-    return whole
-
-
-@compiled(nogil=True)
-def _add(whole: Summed, candidate: int, tables: Conditioning) -> None:
-    for f in range(whole.products.shape[0]):
-        row, total = tables.products[f, candidate], whole.products[f]
-        for p in range(total.shape[0]):
-            total[p] += row[p]
-        moved, first = tables.sums[f, candidate], whole.sums[f]
-        for p in range(first.shape[0]):
-            first[p] += moved[p]
+def _add(products: Array, sums: Array, candidate: int, tables: Conditioning) -> None:
+    for b in range(products.shape[0]):
+        total, row = products[b], tables.products[candidate, b]
+        for p in range(0, total.shape[0], LANES):
+            store(total, p, _load(total, p) + _load(row, p))
+        if not tables.anchored:
+            first, moved = sums[b], tables.sums[candidate, b]
+            for p in range(0, first.shape[0], LANES):
+                store(first, p, _load(first, p) + _load(moved, p))
 
 
 @compiled(nogil=True)
 def _grown_condition(
-    whole: Summed, candidate: int, count: int, tables: Conditioning, bound: float, work: Array, lows: Array
+    products: Array,
+    sums: Array,
+    candidate: int,
+    count: int,
+    tables: Conditioning,
+    bound: float,
+    A: Array,
+    d: Array,
+    e: Array,
+    lows: Array,
 ) -> float:
-    """Return w1 E_cond of the layout `whole` with a candidate.
+    """Return w1 E_cond of a layout with a candidate.
 
-    bound: value from which it is infinity.
-    count: of the markers with the candidate.
-    work: (n + 2, n). lows: (F,) receives lower bounds of the condition numbers.
+    products, sums: of the layout. count: of its markers with the candidate.
+    bound: value from which the result is infinity.
+    A, d, e, lows: work space.
 
-    The bounds of all key-frames are summed first: most layouts of a search end there.
+    Lower bounds of all key-frames are summed first: most layouts of a search end there.
     """
-    n, F = tables.size, whole.products.shape[0]
-    A, d, e = work[:n], work[n], work[n + 1]
-    share = tables.weight / F
+    n, B = tables.size, tables.shares.shape[0]
     if 3 * count < n + (0 if tables.anchored else 3):
-        return tables.weight * LARGEST if tables.weight * LARGEST < bound else np.inf
-    energy = tables.weight
-    for f in range(F):
-        _fill(whole, candidate, count, f, tables, A, d)
-        lows[f] = least_condition(A)
-        energy += share * (lows[f] - 1.0)
+        weight = tables.shares.sum()
+        return weight * LARGEST if weight * LARGEST < bound else np.inf
+    energy = 0.0
+    for b in range(B):
+        _fill_matrices(products[b], sums[b], candidate, count, b, tables, A, d)
+        least_conditions(A, n, d, lows[b])
+        energy += vsum(_load(tables.shares[b], 0) * _load(lows[b], 0))
         if energy >= bound:
             return np.inf
-    for f in range(F):
-        _fill(whole, candidate, count, f, tables, A, d)
-        energy += share * (condition_number(A, d, e) - lows[f])
+    for b in range(B):
+        _fill_matrices(products[b], sums[b], candidate, count, b, tables, A, d)
+        low = vsum(_load(tables.shares[b], 0) * _load(lows[b], 0))
+        condition_numbers(A, n, d, e, lows[b])
+        energy += vsum(_load(tables.shares[b], 0) * _load(lows[b], 0)) - low
         if energy >= bound:
             return np.inf
     return energy
 
 
 @compiled(nogil=True)
-def _fill(whole: Summed, candidate: int, count: int, f: int, tables: Conditioning, A: Array, d: Array) -> None:
-    """Write J^T J of the layout with a candidate in key-frame f to A (n, n).
-
-    Its lower triangle is written.
-    """
-    n, p = tables.size, 0
-    total, row = whole.products[f], tables.products[f, candidate]
+def _fill_matrices(
+    products: Array, sums: Array, candidate: int, count: int, b: int, tables: Conditioning, A: Array, d: Array
+) -> None:
+    """Write J^T J of a layout with a candidate in the key-frames of block b to A."""
+    n, p, row = tables.size, 0, tables.products[candidate, b]
     for i in range(n):
         for j in range(i + 1):
-            A[i, j] = total[p] + row[p]
-            p += 1
-    if not tables.anchored:
-        first, moved = whole.sums[f], tables.sums[f, candidate]
-        for c in range(3):
-            for i in range(n):
-                d[i] = first[c * n + i] + moved[c * n + i]
-            for i in range(n):
-                for j in range(i + 1):
-                    A[i, j] -= d[i] * d[j] / count
+            store(A, LANES * (i * n + j), _load(products, p) + _load(row, p))
+            p += LANES
+    if tables.anchored:
+        return
+    moved, share = tables.sums[candidate, b], 1.0 / count
+    for c in range(3):
+        for i in range(n):
+            at = LANES * (c * n + i)
+            store(d, LANES * i, _load(sums, at) + _load(moved, at))
+        for i in range(n):
+            factor = _load(d, LANES * i) * share
+            for j in range(i + 1):
+                at = LANES * (i * n + j)
+                store(A, at, _load(A, at) - factor * _load(d, LANES * j))

@@ -163,7 +163,8 @@ class LayoutQuality:
             return float(each[0]), float(each.max())
 
         errors = measured(lambda some, out: errors_of(some, self.posterior, endless, out))
-        plain = self.conditioning._replace(weight=1.0)
+        shares = self.conditioning.shares
+        plain = self.conditioning._replace(shares=shares / shares.sum())
         conditions = measured(lambda some, out: conditions_of(some, plain, endless, out))
         return Terms(
             energy,

@@ -50,15 +50,7 @@ def conditioning_of(
     wrist = model.point_jacobian(poses, [0], model.wrist(poses)[:, None])
     turned = J[..., 3:6] - wrist[..., 3:6]
     J_pc = np.concatenate([turned, J[..., 6:] @ synergies.components], axis=-1)
-    n = J_pc.shape[-1]
-    low = np.tril_indices(n)
-    return Conditioning(
-        products=np.ascontiguousarray(np.einsum("fvcp,fvcp->fvp", J_pc[..., low[0]], J_pc[..., low[1]])),
-        sums=np.ascontiguousarray(J_pc.reshape(len(postures), len(candidates), 3 * n)),
-        size=n,
-        weight=options.condition.condition_weight,
-        anchored=options.anchored,
-    )
+    return Conditioning.of(J_pc, options.condition.condition_weight, options.anchored)
 
 
 def posterior_of(
