@@ -1,4 +1,4 @@
-"""Condition numbers of eight symmetric matrices of a few rows at once (Schroeder et al. 2015, Eq. 5).
+"""Condition numbers of eight symmetric matrices at once (Schroeder et al. 2015, Eq. 5).
 
 Householder tridiagonalisation, then Laguerre's iteration for both extreme eigenvalues. From beyond all eigenvalues of a
 symmetric matrix it converges to the nearest one, monotonically and cubically (Wilkinson, The Algebraic Eigenvalue
@@ -23,7 +23,9 @@ _load, _fill = loader(F64X8), filler(F64X8)
 
 @kernel_part
 def condition_numbers(A: Array, n: int, d: Array, e: Array, out: Array) -> None:
-    """Write the ratios of the largest to the smallest eigenvalue, at most `LARGEST`, to `out` (8,).
+    """Write the ratios of the largest to the smallest eigenvalue to `out` (8,).
+
+    They are at most `LARGEST`.
 
     A: (8 n n,) positive semidefinite matrices; they are overwritten.
     d, e: (8 n,) work space.
@@ -44,8 +46,8 @@ def least_conditions(A: Array, n: int, x: Array, out: Array) -> None:
 
     A: as there; it is overwritten. x: (8 n,) work space.
 
-    The largest eigenvalue is at least each element of the diagonal. The smallest is at most the Rayleigh quotient of any
-    vector: here that of one inverse iteration, with the triangular factors L D L^T of A.
+    The largest eigenvalue is at least each element of the diagonal. The smallest is at most the Rayleigh quotient of
+    any vector: here that of one inverse iteration, with the triangular factors L D L^T of A.
     """
     high, low = _fill(0.0), _fill(1e300)
     for i in range(n):
@@ -149,14 +151,14 @@ def _nearest_eigenvalues(d: Array, squares: Array, n: int, start: Array, side: f
     for _ in range(_ITERATIONS):
         # The pivots of T - x, and the first two derivatives of the logarithm of its determinant.
         pivot = _load(d, 0) - x
-        beyond = 0.0 > pivot * side
+        beyond = pivot * side < 0.0
         pivot = select(beyond, pivot, -side)
         slope = -1.0 / pivot
         curve, first, second = _fill(0.0), slope, slope * slope
         for i in range(1, n):
             t = _load(squares, LANES * i) / pivot
             pivot = _load(d, LANES * i) - x - t
-            still = 0.0 > pivot * side
+            still = pivot * side < 0.0
             beyond = both(beyond, still)
             pivot = select(still, pivot, -side)
             inverse = 1.0 / pivot

@@ -40,7 +40,12 @@ class ReconstructionOptions:
     method: Method = option("prior", "Subspace and free refinement, subspace and refinement with a prior, or neither")
     components: int = option(6, "Synergies of the subspace, at most", least=1, most=20)
     iterations: int = option(10, "Gauss-Newton steps in each of both stages", source="Schroeder et al. 2015: 5 to 10")
-    damping: float = option(1e-7, "Damping D of each angle or synergy", unit="m^2/rad^2", source="Eq. (2)")
+    damping: float = option(
+        1e-5,
+        "Damping D of each angle or synergy; a weak one lets angles swing that the markers hardly determine",
+        unit="m^2/rad^2",
+        source="Eq. (2)",
+    )
     residual: float = option(
         0.0003, "Standard deviation of a coordinate of a marker, which the prior is weighed against", unit="m"
     )
