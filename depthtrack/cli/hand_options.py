@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from depthtrack.tracking.side_choice import SideChoice
 
 
+_CLEAR_MARGIN = 0.1
+"""Share by which the energy of the stated side is higher if the other one is reported."""
+
+
 @dataclass(frozen=True)
 class HandOptions:
     """Sizes and surface of the tracker's hand."""
@@ -104,6 +108,27 @@ def side_text(choice: "SideChoice") -> str:
     uncertain = "" if choice.sure else "; the side is uncertain: give --side"
     margin = f"a {other} one fits {100 * choice.margin:.0f} % worse in {choice.frames} frames"
     return f"a {choice.side} hand: {margin}{uncertain}"
+
+
+def quick_side(
+    sequence: "Sequence", segmentation: "SegmentationOptions", threads: int = 1, frames: int | None = None
+) -> "SideChoice":
+    """Return the side that fits better in 24 frames, with the average hand of both sides."""
+    from depthtrack.tracking.side_choice import SideOptions, choose_side
+    from depthtrack.tracking.stretches import StretchOptions
+
+    options = SideOptions(StretchOptions(stretches=4, stretch_frames=6))
+    return choose_side(sequence, segmentation, threads, frames, options)
+
+
+def other_side_text(choice: "SideChoice", stated: "Side") -> str | None:
+    """Return a sentence if a hand of the other side than `stated` fits clearly better."""
+    if choice.margin < _CLEAR_MARGIN or choice.side == stated:
+        return None
+    return (
+        f"a {choice.side} hand fits {100 * choice.margin:.0f} % better than a {stated} one in {choice.frames} frames:"
+        f" give --side {choice.side}, or --mirror if the images are mirrored"
+    )
 
 
 def measured_text(found: "Calibration") -> str:

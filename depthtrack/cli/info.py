@@ -1,6 +1,6 @@
 """`depthtrack info`: summarise a recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -10,7 +10,9 @@ from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import number
 
 if TYPE_CHECKING:
+    from depthtrack.recording import Sequence
     from depthtrack.recording.summary import RecordingSummary
+    from depthtrack.tracking.side_choice import SideChoice
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class Command:
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     sample: Annotated[int | None, number(1, 10**7, metavar="FRAMES")] = None
     """Number of evenly spaced frames to read (default: all)."""
+    side: bool = False
+    """Track hands of both sides in 24 frames, and name the side that fits better."""
     json: bool = False
     """Print JSON, in SI units and radians, instead of text."""
 
@@ -40,11 +44,40 @@ class Command:
             self.recording.on_damage,
             progress=lambda frames: bar(frames, total=count),
         )
-        print(json_text(asdict(summary), indent=2) if self.json else _text(summary))
+        choice = self._side(sequence) if self.side and sequence.has_depth else None
+        if self.json:
+            fields = {name: value for name, value in vars(choice).items() if name != "views"} if choice else None
+            print(json_text(asdict(summary) | {"side": fields}, indent=2))
+        else:
+            print(_text(summary, _side_lines(choice, sequence)))
+
+    def _side(self, sequence: "Sequence") -> "SideChoice":
+        from depthtrack.cli.hand_options import quick_side
+        from depthtrack.cli.recording_notes import with_registered_colour
+        from depthtrack.segmentation.options import SegmentationOptions
+
+        depth_only = replace(self.recording, reading=replace(self.recording.reading, depth_only=True))
+        registered = with_registered_colour(sequence, lambda: depth_only.open(with_notes=False))
+        return quick_side(registered, SegmentationOptions())
 
 
-def _text(summary: "RecordingSummary") -> str:
-    """Return aligned lines, with angles in degrees."""
+def _side_lines(choice: "SideChoice | None", sequence: "Sequence") -> list[str]:
+    """Return lines on the side of the hand."""
+    from depthtrack.cli.hand_options import other_side_text, side_text
+
+    if choice is None:
+        return ["not compared (--side)"]
+    if choice.frames == 0:
+        return ["open: no hand was found in the frames that were tried"]
+    better = None if sequence.hand is None else other_side_text(choice, sequence.hand.side)
+    return [side_text(choice) if better is None else better]
+
+
+def _text(summary: "RecordingSummary", side: list[str]) -> str:
+    """Return aligned lines, with angles in degrees.
+
+    side: lines on the side of the hand.
+    """
     from math import degrees
 
     camera = summary.camera
@@ -63,6 +96,7 @@ def _text(summary: "RecordingSummary") -> str:
         ("depth", _depth_lines(summary)),
         ("no reading", [f"{100 * summary.missing:.1f} % of the pixels"]),
         ("colour", [f"{summary.colours} frames{of_those_read}" if summary.colours else "none"]),
+        ("side", side),
         ("ground truth", _truth_lines(summary, of_those_read)),
         (
             "made as",

@@ -11,7 +11,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FOLDER
 from depthtrack.cli.config_options import chosen_config, options_type
-from depthtrack.cli.hand_options import HandOptions, side_text
+from depthtrack.cli.hand_options import HandOptions, other_side_text, quick_side, side_text
 from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.segmentation_options import SegmentationArguments, SegmentationShortcuts
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
     from depthtrack.recording.sequence import Sequence as Recording
     from depthtrack.tracking.run_configuration import RunConfiguration
-
-
-_CLEAR_MARGIN = 0.1
-"""Share by which the energy of the given side is higher if the other one is reported."""
 
 
 @dataclass(frozen=True)
@@ -145,22 +141,6 @@ class TrackCommand:
         check_run(configuration, sequence, self.out, self.resume)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
-    def _better_side(self, sequence: "Recording") -> str | None:
-        """Return a sentence if a hand of the other side fits better than that of `--side`."""
-        from depthtrack.tracking.side_choice import SideOptions, choose_side
-        from depthtrack.tracking.stretches import StretchOptions
-
-        if self.hands.side == "auto":
-            return None
-        options = SideOptions(StretchOptions(stretches=4, stretch_frames=6))
-        choice = choose_side(sequence, self.segmentation_options, self.threads or 1, self.frames, options)
-        if choice.margin < _CLEAR_MARGIN or choice.side == self.hands.side:
-            return None
-        return (
-            f"a {choice.side} hand fits {100 * choice.margin:.0f} % better in {choice.frames} frames: give"
-            f" --side {choice.side}, or --mirror if the images are mirrored"
-        )
-
     def _report(self, sequence: "Recording", rate: str) -> None:
         import numpy as np
 
@@ -177,8 +157,10 @@ class TrackCommand:
             print(no_hand_note(sequence))
         elif sequence.has_depth and (poor := poor_agreement_note(sequence, explained)) is not None:
             print(poor)
-        elif (better := self._better_side(sequence)) is not None:
-            print(better)
+        elif self.hands.given_side is not None:
+            choice = quick_side(sequence, self.segmentation_options, self.threads or 1, self.frames)
+            if (better := other_side_text(choice, self.hands.given_side)) is not None:
+                print(better)
         failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""
         print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}{rate}")
         print(f"errors and timing:  depthtrack evaluate {self.out}")

@@ -13,8 +13,11 @@ from depthtrack.cli import main
 from depthtrack.cli.reading_arguments import ReadingArguments
 from depthtrack.cli.recording_options import PresetName, RecordingOptions
 from depthtrack.geometry.camera import PRESETS, Camera
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.summary import field_of_view
+from depthtrack.tracking import side_choice
+from depthtrack.tracking.side_choice import SideChoice
 from tests.support.recordings import CAMERA, TIMES, depth_at, write_plain_tum, write_sample
 
 
@@ -201,6 +204,49 @@ def test_unusable_camera_options_are_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert message in refusal(capsys, write_plain_tum(tmp_path / "tum"), *arguments)
+
+
+# The side of the hand.
+
+
+@pytest.mark.parametrize(
+    ("stated", "choice", "line"),
+    [
+        (None, SideChoice("left", 0.3, True, 24), "a left hand: a right one fits 30 % worse in 24 frames"),
+        (
+            "right",
+            SideChoice("left", 0.3, True, 24),
+            "a left hand fits 30 % better than a right one in 24 frames: give",
+        ),
+        ("left", SideChoice("left", 0.3, True, 24), "a left hand: a right one fits 30 % worse in 24 frames"),
+        (
+            "right",
+            SideChoice("left", 0.05, False, 24),
+            "a left hand: a right one fits 5 % worse in 24 frames; the side",
+        ),
+        (None, SideChoice("right", 0.0, False, 0), "open: no hand was found"),
+    ],
+)
+def test_the_side_that_fits_better_is_named(
+    sample: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    stated: Side | None,
+    choice: SideChoice,
+    line: str,
+) -> None:
+    monkeypatch.setattr(side_choice, "choose_side", lambda *arguments: choice)
+    (sample / "hand.json").unlink(missing_ok=True)
+    if stated is not None:
+        (sample / "hand.json").write_text(HandShape(side=stated).to_json())
+    assert main(["info", str(sample), "--side"]) == 0
+    assert f"side           {line}" in capsys.readouterr().out
+    assert main(["info", str(sample), "--side", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["side"]["side"] == choice.side
+
+
+def test_the_side_is_compared_on_demand(info: Any, sample: Path) -> None:
+    assert info(sample)["side"] is None
 
 
 # The program in a process.
