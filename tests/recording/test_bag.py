@@ -273,6 +273,29 @@ def test_the_files_of_the_realsense_sdk(tmp_path: Path) -> None:
     path = tmp_path / "film.db3"
     depth, _ = seen(DEPTH, np.eye(4))
     _, colour = seen(COLOUR, T_COLOUR_DEPTH)
-    record(path, DEPTH, COLOUR, T_COLOUR_DEPTH, stored(depth, 0.0001), colour, 0.0001)
-    assert open_sequence(path).camera.depth_scale == 0.0001
+    record(path, DEPTH, COLOUR, T_COLOUR_DEPTH, [stored(depth, 0.0001)] * 6, [colour] * 6, 0.0001)
+    sequence = open_sequence(path)
+    assert sequence.camera.depth_scale == 0.0001
+    np.testing.assert_allclose(sequence.timestamps, np.arange(6) / 30, atol=1e-6)
     check_registered(path)
+
+
+@pytest.mark.parametrize("kind", ["camera", "another clock", "one missing", "not increasing", "no number"])
+def test_times_are_those_of_the_realsense_camera_if_all_images_have_them(tmp_path: Path, kind: str) -> None:
+    received, bag = (0.0, 0.021, 0.06, 0.071), Bag()
+    for index, time in enumerate(received):
+        for stream, image in (("Depth", stored(depth_at(index))), ("Color", colour_at(index))):
+            topic = f"/device_0/sensor_0/{stream}_0"
+            bag.image(f"{topic}/image/data", time, image, "16UC1" if stream == "Depth" else "rgb8")
+            bag.info(f"{topic}/image/camera_info", CAMERA, time=time)
+            clock = "System Time" if kind == "another clock" and stream == "Color" else "Hardware Clock"
+            stamp = "5" if kind == "not increasing" else "late" if kind == "no number" else f"{1e5 + index * 33.25:.6f}"
+            if kind != "one missing" or index != 2:
+                text = f"Frame number={index};timestamp_domain={clock};timestamp={stamp};Actual Fps=30;"
+                bag.add(f"{topic}/image/metadata", time, "std_msgs/msg/String", data=text)
+    sequence = open_sequence(bag.write(tmp_path / "film.db3"))
+    expected = 100 + np.arange(4) * 0.03325 if kind == "camera" else received
+    np.testing.assert_allclose(
+        sequence.timestamps - sequence.timestamps[0], np.subtract(expected, expected[0]), atol=1e-9
+    )
+    assert (sequence.timestamps[0] > 99) == (kind == "camera")

@@ -12,7 +12,7 @@ from depthtrack.recording.reading import ReadingOptions
 from depthtrack.recording.sequences.base import BaseSequence
 from depthtrack.recording.sequences.capture import CaptureSequence
 from depthtrack.recording.sequences.tum import TumSequence
-from depthtrack.types import Depth
+from depthtrack.types import Depth, Image
 
 CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
 
@@ -24,7 +24,7 @@ class ArraySequence(BaseSequence):
 
     def _open(self, camera: Camera | None) -> None:
         self._depth = np.load(self.path, allow_pickle=False)
-        self.camera = camera or CAMERA
+        self.camera, self.has_colour = camera or CAMERA, True
         self.timestamps = np.arange(len(self._depth)) / 30
 
     @classmethod
@@ -34,6 +34,9 @@ class ArraySequence(BaseSequence):
     @classmethod
     def image_size(cls, path: Path, reading: ReadingOptions | None = None) -> tuple[int, int]:
         return CAMERA.width, CAMERA.height
+
+    def read_colour(self, index: int) -> Image:
+        return np.full((*CAMERA.shape, 3), index, dtype=np.uint8)
 
     def read_depth(self, index: int) -> Depth:
         depth: Depth = self._depth[index].astype(np.float32)
@@ -55,12 +58,20 @@ def test_a_new_format_has_the_defaults_of_the_base(path: Path) -> None:
     assert registry.image_size(path) == (4, 3)
     assert sequence.hand is None
     assert sequence.ground_truth is None
-    assert not sequence.has_colour
     assert sequence.description == {}
     assert sequence.notes == []
     assert sequence.hand_mask(0) is None
     assert sequence.exact_depth(0) is None
     assert sequence[-1].timestamp == pytest.approx(2 / 30)
+
+
+def test_colour_is_ignored_on_demand_in_every_format(path: Path) -> None:
+    sequence = open_sequence(path)
+    assert sequence.has_colour
+    assert sequence[0].colour is not None
+    alone = open_sequence(path, reading=ReadingOptions(depth_only=True))
+    assert not alone.has_colour
+    assert alone[0].colour is None
 
 
 def test_damaged_frames_of_a_new_format_are_skipped_or_rejected(path: Path) -> None:

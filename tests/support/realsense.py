@@ -1,6 +1,7 @@
 """A recording by the software device of the RealSense SDK."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,13 @@ def record(
     depth_camera: Camera,
     colour_camera: Camera,
     T_colour_depth: Array,
-    depth: Any,
-    colour: Image,
+    depths: Sequence[Any],
+    colours: Sequence[Image],
     unit: float,
-    frames: int = 6,
 ) -> None:
-    """Record equal frames of both cameras to a file.
+    """Record frames of both cameras to a file.
 
-    depth: (h, w) uint16 in units of `unit` metres.
+    depths: each (h, w) uint16 in units of `unit` metres.
     """
     import pyrealsense2 as rs
 
@@ -45,14 +45,14 @@ def record(
     for sensor in recorded:
         sensor.open(sensor.get_stream_profiles()[0])
         sensor.start(queue)
-    for number in range(frames):
-        for sensor, profile, image in zip(sensors, profiles, (depth, colour), strict=True):
+    for number, images in enumerate(zip(depths, colours, strict=True)):
+        for sensor, profile, image in zip(sensors, profiles, images, strict=True):
             frame = rs.software_video_frame()
             frame.pixels = np.ascontiguousarray(image)
             frame.stride, frame.bpp = image.strides[0], image.strides[1]
-            frame.timestamp, frame.domain = number * 33.3, rs.timestamp_domain.hardware_clock
+            frame.timestamp, frame.domain = number * 1000 / 30, rs.timestamp_domain.hardware_clock
             frame.frame_number, frame.profile = number, profile.as_video_stream_profile()
-            if image is depth:
+            if sensor is sensors[0]:
                 frame.depth_units = unit
             sensor.on_video_frame(frame)
         time.sleep(0.02)

@@ -20,6 +20,7 @@ from depthtrack.recording.bags.cameras import (
 from depthtrack.recording.bags.images import colour_of, depth_of, encoding_of, size_of_image
 from depthtrack.recording.bags.messages import Messages
 from depthtrack.recording.bags.opening import is_bag, open_storage
+from depthtrack.recording.bags.realsense import camera_stamps
 from depthtrack.recording.bags.topics import choose_topics
 from depthtrack.recording.colour_association import associate_colour
 from depthtrack.recording.reading import ReadingOptions
@@ -42,6 +43,8 @@ class BagSequence(BaseSequence):
         """
         self._messages = Messages(open_storage(self.path))
         self._choice = choose_topics(self._messages, self.reading)
+        chosen = [topic for topic in (self._choice.depth, self._choice.colour) if topic is not None]
+        self._camera_stamps = camera_stamps(self._messages, chosen)
         self._depth_rows, self.timestamps = self._times(self._choice.depth)
         if self._messages.storage.cut is not None:
             self.notes.append(
@@ -110,7 +113,9 @@ class BagSequence(BaseSequence):
 
         Of messages with equal times, the first is taken.
         """
-        stamps = self._messages.stamps(topic)
+        stamps = self._camera_stamps.get(topic)
+        if stamps is None:
+            stamps = self._messages.stamps(topic)
         rows = np.argsort(stamps, kind="stable")
         rows = rows[np.concatenate([[True], np.diff(stamps[rows]) > 0])]
         if len(rows) < len(stamps):

@@ -62,6 +62,7 @@ class BaseSequence(ABC):
         self._damaged: dict[int, DamagedFrame] = {}
         self._damaged_colour: dict[int, DamagedFrame] = {}
         self._open(camera)
+        self.has_colour = self.has_colour and not self.reading.depth_only
         if self.reading.depth_scale is not None:
             self.camera = replace(self.camera, depth_scale=self.reading.depth_scale)
 
@@ -143,6 +144,8 @@ class BaseSequence(ABC):
 
     def _readable_colour(self, index: int) -> Image | None:
         """Return the colour of a frame; None, and an entry in `damaged_colour`, if damaged."""
+        if self.reading.depth_only:
+            return None
         try:
             return self.read_colour(index)
         except DamagedFrameError as error:
