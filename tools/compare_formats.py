@@ -1,4 +1,4 @@
-"""Write a recording in every format that is read, and compare the poses tracked in each copy.
+"""Write a recording in every format, and compare the poses tracked in each copy.
 
 Usage: compare_formats.py FOLDER [--frames 20] [--only TEXT]
 
@@ -51,7 +51,7 @@ def main() -> None:
 
 
 def tried(copy: FormatCopy, source: Source, out: Path) -> tuple[int, Array | None, str]:
-    """Return the size of a copy, bytes, its tracked keypoints (T, 21, 3), metres, and the commands that failed."""
+    """Return the size of a copy, bytes, its keypoints (T, 21, 3), m, and what failed."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     try:

@@ -1,4 +1,4 @@
-"""Copies of a recording in every format that is read, each written by the tests' writer of the format."""
+"""Copies of a recording in every format that is read, by the writers of the tests."""
 
 import json
 import math
