@@ -16,8 +16,8 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.types import Array, Depth, Image
 
 Edges = NDArray[np.float32]
-LEAST_SHIFT = 5.0
-"""Shift between colour and depth that is reported, pixels."""
+LEAST_SHIFT = 4.0
+"""Shift between colour and depth that is reported, pixels: one of 5, which is found to a pixel."""
 _FRAMES = 8
 _FARTHEST = 0.1
 """Largest shift that is searched, in widths of the image."""
@@ -25,8 +25,8 @@ _DEPTH_STEP = 0.04
 """Relative step of depth at the edge of an object."""
 _LEAST_EDGES = 300
 """Pixels of depth edges in all frames together that a shift is measured with."""
-_LEAST_GAIN = 1.15
-"""Factor by which edges correlate better at a shift that is reported than without it."""
+LEAST_GAIN = 1.03
+"""Factor by which edges correlate better at a shift that is reported than without it, by tools/tune_colour_shift.py."""
 _WINDOW = np.ones((3, 3), np.uint8)
 _BLUR = 1.5
 """Standard deviation of the edges, pixels: registered colour may be off by so much."""
@@ -46,7 +46,7 @@ class ColourShift:
     @property
     def is_sure(self) -> bool:
         """Whether the colour is not registered to the depth."""
-        return float(np.hypot(*self.pixels)) >= LEAST_SHIFT and self.gain >= _LEAST_GAIN
+        return float(np.hypot(*self.pixels)) >= LEAST_SHIFT and self.gain >= LEAST_GAIN
 
     @property
     def note(self) -> str:
@@ -59,17 +59,26 @@ class ColourShift:
 
 def measure_shift(sequence: Sequence) -> ColourShift | None:
     """Return the shift of the colour in a few frames; None without edges or colour."""
-    frames = list(_coloured_frames(sequence))
+    correlation = edge_correlation(list(coloured_frames(sequence)))
+    return None if correlation is None else best_shift(correlation)
+
+
+def edge_correlation(frames: list[Frame]) -> Array | None:
+    """Return the circular correlation (h, w) of edges of depth and colour, by shift.
+
+    It is the sum over frames with colour. Rows are shifts down, columns shifts to the right. None is returned if there are
+    few edges.
+    """
     for edges_of in (depth_edges, silhouette_edges):
         edges = [edges_of(frame.depth) for frame in frames]
         if sum(int(each.sum()) for each in edges) >= _LEAST_EDGES:
             pairs = zip(edges, frames, strict=True)
             correlations = [_correlation(each, colour_edges(_colour(frame))) for each, frame in pairs]
-            return _best(np.sum(correlations, axis=0))
+            return np.asarray(np.sum(correlations, axis=0))
     return None
 
 
-def _coloured_frames(sequence: Sequence) -> Iterator[Frame]:
+def coloured_frames(sequence: Sequence) -> Iterator[Frame]:
     """Yield a few readable frames with colour."""
     for index in np.unique(np.linspace(0, len(sequence) - 1, _FRAMES).astype(int)):
         try:
@@ -109,8 +118,8 @@ def _correlation(of_depth: Edges, of_colour: Edges) -> Array:
     return np.asarray(np.fft.irfft2(np.conj(np.fft.rfft2(a)) * np.fft.rfft2(b), s=a.shape), dtype=np.float64)
 
 
-def _best(correlation: Array) -> ColourShift:
-    """Return the shift of the largest correlation within reach."""
+def best_shift(correlation: Array) -> ColourShift:
+    """Return the shift of the largest correlation (h, w) within reach."""
     height, width = correlation.shape
     reach = max(1, round(_FARTHEST * width))
     rows, columns = (np.minimum(np.arange(side), side - np.arange(side)) for side in (height, width))

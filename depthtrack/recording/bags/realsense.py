@@ -24,7 +24,7 @@ _CLOCK = re.compile(r"(?:^|;)timestamp_domain=([^;]{1,40})")
 
 
 def camera_stamps(messages: Messages, topics: Iterable[str]) -> dict[str, Index]:
-    """Return the times (N,) of the images of topics by one clock of the camera, nanoseconds, increasing.
+    """Return the times (N,) of images by one clock of the camera, nanoseconds, increasing.
 
     They are absent if an image of any topic has no such time, or the clocks differ.
     """
