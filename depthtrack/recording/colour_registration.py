@@ -66,8 +66,8 @@ def measure_shift(sequence: Sequence) -> ColourShift | None:
 def edge_correlation(frames: list[Frame]) -> Array | None:
     """Return the circular correlation (h, w) of edges of depth and colour, by shift.
 
-    It is the sum over frames with colour. Rows are shifts down, columns shifts to the right. None is returned if there are
-    few edges.
+    It is the sum over frames with colour. Rows are shifts down, columns shifts to the right.
+    None is returned if there are few edges.
     """
     for edges_of in (depth_edges, silhouette_edges):
         edges = [edges_of(frame.depth) for frame in frames]
