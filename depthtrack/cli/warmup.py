@@ -11,7 +11,7 @@ SCENES: tuple[dict[str, Any], ...] = (
 TRACKERS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("hybrid", {}),
     ("ik", {"surface": "cylinders"}),
-    ("pso", {"refine": True}),
+    ("pso", {}),
 )
 """Trackers that use all kernels together, and their options."""
 

@@ -96,7 +96,7 @@ class PsoConfig:
         unit="m, rad, rad",
     )
     widen: float = option(0.5, "Share of the last motion that widens the first generation", advanced=True)
-    refine: bool = option(False, "Fit the swarm's best pose to the surface that the points lie on")
+    refine: bool = option(True, "Fit the swarm's best pose to the surface that the points lie on")
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of that surface", advanced=True)
     final_fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the swarm's best pose", advanced=True)
     search: GlobalSearchOptions = option(GlobalSearchOptions(resolution=64), "Global search", advanced=True)

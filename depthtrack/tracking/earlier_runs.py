@@ -141,8 +141,9 @@ def _nested(fields: Mapping[str, Any], where: str) -> dict[str, Any]:
     for flat, path in _NAMES.items():
         if fields.get(flat) is not None:
             _set(options, path, fields[flat])
-    if fields.get("finish") == "skin" and "refine" in options:
-        options["refine"] = True
+    if "refine" in options:
+        options["refine"] = fields.get("finish") == "skin"
+    if fields.get("finish") == "skin":
         _set(options, ("surface_choice", "surfaces"), ["skin"])
     rest = {key: value for key, value in fields.items() if key not in _REPLACED}
     segmentation = {"skin_model": fields.get("skin_model")}

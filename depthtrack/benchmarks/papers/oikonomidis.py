@@ -11,8 +11,10 @@ from depthtrack.benchmarks.papers.no_recovery import without_recovery
 from depthtrack.evaluation.metrics import angle_error, endpoint_error
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.options import with_options
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import observed_motion
+from depthtrack.tracking.configuration import PsoConfig, TrackerConfig
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 OIKONOMIDIS_2011 = "Oikonomidis, Kyriazis and Argyros, BMVC 2011"
@@ -27,8 +29,8 @@ DEFAULTS: Cell = {
 }
 """Values that an experiment does not vary: the budget that the paper retained, 0.5 m, a perfect sensor."""
 
-TRACKERS = {"default": "pso", "paper": "oikonomidis2011"}
-"""Tracker of each variant."""
+TRACKERS: dict[str, TrackerConfig] = {"default": PsoConfig(refine=False), "paper": tracker_config("oikonomidis2011")}
+"""Tracker of each variant: the swarm alone, whose particles and generations the experiments vary."""
 
 
 def cells(options: ExperimentOptions, conditions: Iterable[Cell]) -> list[Cell]:
@@ -77,13 +79,15 @@ def track_motion(
         )
     )
     config = without_recovery(
-        tracker_config(
+        with_options(
             TRACKERS[variant],
-            particles=particles,
-            generations=generations,
-            seed=repetition,
-            renderer=renderer,
-            resolution=resolution,
+            {
+                "particles": particles,
+                "generations": generations,
+                "seed": repetition,
+                "renderer": renderer,
+                "resolution": resolution,
+            },
         )
     )
     with closing(create_tracker(config, motion.hand)) as tracker:

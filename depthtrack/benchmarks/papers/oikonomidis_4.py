@@ -15,9 +15,10 @@ from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION
+from depthtrack.options import with_options
 from depthtrack.synthesis.generate import Synthesis
 from depthtrack.synthesis.observations import observed_motion
-from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.registry import create_tracker
 from depthtrack.types import Array
 
 FRAMES = 45
@@ -54,7 +55,8 @@ def measure(
     `mirrored`: the palm's normal is more than 90 degrees from the true one, as if back and inside were swapped.
     """
     motion = observed_motion(Synthesis())
-    config = tracker_config(oikonomidis.TRACKERS[variant], seed=repetition, renderer=renderer, resolution=resolution)
+    tools = {"seed": repetition, "renderer": renderer, "resolution": resolution}
+    config = with_options(oikonomidis.TRACKERS[variant], tools)
     with closing(create_tracker(config, motion.hand)) as tracker:
         estimate = tracker.start(motion[frame])
     assert estimate.pose is not None

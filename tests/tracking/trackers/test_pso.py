@@ -80,7 +80,7 @@ def test_initialises_without_a_pose(made: Synthesiser, frame: int) -> None:
 
 def test_a_hand_that_jumps_is_found_in_the_same_frame(made: Synthesiser) -> None:
     """The mean jump of the joints exceeds 3 cm, which the swarm does not cover."""
-    tracker = create_tracker(tracker_config("pso", resolution=64), HandShape())
+    tracker = create_tracker(tracker_config("pso", resolution=64, refine=False), HandShape())
     *_, before = follow(made, tracker, range(10, 14))
     assert errors_mm(made, [before], range(300, 301))[0] > 30
     found = tracker.track(observe(made, 300))
