@@ -49,7 +49,7 @@ def test_the_page_of_parameters_is_up_to_date() -> None:
 
 def test_the_page_of_parameters_gives_unit_default_and_source() -> None:
     lines = PARAMETERS["page"]().splitlines()
-    assert "| `--max-distance` | m | 0.04 | 0.0001 to 100 | Largest distance of a correspondence |  |" in lines
+    assert "| `--max-distance` | m | 0.04 | 0.0001 to 1 | Largest distance of a correspondence |  |" in lines
     assert any(line.startswith("| `--recovery.proposals` \\* |") for line in lines)
     assert any("Oikonomidis et al. 2011, Sec. 2.3" in line for line in lines)
 

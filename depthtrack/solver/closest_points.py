@@ -27,8 +27,9 @@ def closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, clo
     min_normal_cosine: smallest cosine between the normals.
     closest: (N,) rows of `visible`, -1 for none.
 
-    Cells are searched in growing squares around the cell of the point, until no point beyond can be closer. The cells
-    of a row are contiguous in memory. A load of sixteen points may include further cells, whose points are valid too.
+    Cells are searched in growing squares around the cell of the point, until no point beyond can be closer or no cell
+    is left. The cells of a row are contiguous in memory. A load of sixteen points may include further cells, whose
+    points are valid too.
     """
     points, normals, origin, first = cloud.points, cloud.normals, visible.origin, visible.first
     sx, sy, sz, nx, ny, nz = (
@@ -76,7 +77,7 @@ def closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, clo
             lowest = min(one, other)
             # The next square begins where the nearest side of this one ends.
             margin = (ring + inside) * side
-            if margin * margin >= lowest:
+            if margin * margin >= lowest or ring >= max(cells.columns, cells.rows):
                 break
             ring += 1
         one, other = lowest_of_halves(select(best > lowest, FAR, chosen))

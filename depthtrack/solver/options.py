@@ -41,7 +41,7 @@ class IcpOptions:
         "Scale of the Geman-McClure robust kernel in the first and the last round; 0 weighs all points alike",
         unit="m",
     )
-    max_distance: float = option(0.04, "Largest distance of a correspondence", unit="m", least=1e-4)
+    max_distance: float = option(0.04, "Largest distance of a correspondence", unit="m", least=1e-4, most=1)
     min_normal_cosine: tuple[float, float] = option(
         (0.25, 0.6),
         "Least cosine between the normals of a correspondence, in the first and the last round",

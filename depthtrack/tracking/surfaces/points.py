@@ -19,6 +19,9 @@ from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
 from depthtrack.types import Array, Array32, Index
 
+_MOST_CELLS = 512
+"""Most cells of a row or column, which bound the memory."""
+
 
 class SurfacePoints(NamedTuple):
     """Points of a hand's surface at rest.
@@ -169,7 +172,8 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
     """Return the cells that cover the image of points and a margin around it.
 
     points: (N, 3) metres, camera frame.
-    size, margin: side of a cell and width of the margin, metres at the mean depth of the points.
+    size, margin: side of a cell and width of the margin, metres at the mean depth of the points. Cells are larger where
+        a side would need more than _MOST_CELLS.
     """
     if points.shape[0] == 0:
         return Cells(0.0, 0.0, 1.0, 1, 1)
@@ -182,9 +186,11 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
         low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
         depth += z
     depth /= points.shape[0]
-    side, around = size / depth, margin / depth
-    columns = min(int((high_u - low_u + 2 * around) / side) + 1, 512)
-    rows = min(int((high_v - low_v + 2 * around) / side) + 1, 512)
+    around = margin / depth
+    width, height = high_u - low_u + 2 * around, high_v - low_v + 2 * around
+    side = max(size / depth, max(width, height) / (_MOST_CELLS - 1))
+    columns = min(int(width / side) + 1, _MOST_CELLS)
+    rows = min(int(height / side) + 1, _MOST_CELLS)
     return Cells(low_u - around, low_v - around, side, rows, columns)
 
 

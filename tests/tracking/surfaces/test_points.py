@@ -113,16 +113,16 @@ def test_vertices_behind_another_finger_are_not_visible() -> None:
 
 @given(
     seed=st.integers(0, 2**32 - 1),
-    max_distance=st.sampled_from([0.005, 0.04]),
+    max_distance=st.sampled_from([0.005, 0.04, 1.0]),
     min_normal_cosine=st.sampled_from([-1.1, 0.3, 0.9]),
-    cell=st.sampled_from([0.002, 0.004, 0.02]),
+    cell=st.sampled_from([1e-4, 0.002, 0.004, 0.02]),
 )
 def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
     seed: int, max_distance: float, min_normal_cosine: float, cell: float
 ) -> None:
     rng = np.random.default_rng(seed)
     posed = posed_hand(random_pose(rng))
-    cloud = cloud_near(posed, rng, spread=0.5 * max_distance)
+    cloud = cloud_near(posed, rng, spread=min(0.5 * max_distance, 0.02))
     cells = surface.cells_over(cloud.points, cell, max_distance)
     seen, correspondences = (
         surface.sort_visible(posed, cells, TOLERANCE),
@@ -153,14 +153,22 @@ def _index(seen: Visible, vertex: np.ndarray) -> np.ndarray:
     return np.asarray(np.argmax(seen.vertex == vertex[:, None], axis=1))
 
 
-@pytest.mark.parametrize("depth", [0.2, 0.5, 2.5])
-def test_cells_cover_the_cloud_and_its_surroundings(depth: float) -> None:
+@pytest.mark.parametrize(
+    ("depth", "size", "around", "side"),
+    [
+        *((depth, 0.004, 0.04, pytest.approx(0.004)) for depth in (0.2, 0.5, 2.5)),
+        (0.5, 1e-4, 0.04, pytest.approx(0.28 / 511, rel=0.1)),
+        (0.5, 0.004, 100.0, pytest.approx(200.2 / 511, rel=0.1)),
+    ],
+)
+def test_cells_cover_the_cloud_and_its_surroundings(depth: float, size: float, around: float, side: float) -> None:
     points = np.random.default_rng(0).uniform([-0.1, -0.1, depth], [0.1, 0.1, depth + 0.05], (50, 3))
-    cells = surface.cells_over(points, 0.004, 0.04)
+    cells = surface.cells_over(points, size, around)
     uv = points[:, :2] / points[:, 2:]
-    margin = 0.04 / points[:, 2].mean()
+    margin = around / points[:, 2].mean()
     assert np.all(uv.min(axis=0) - margin >= np.array([cells.u, cells.v]) - 1e-12)
     assert np.all(
         uv.max(axis=0) + margin <= np.array([cells.u, cells.v]) + cells.size * np.array([cells.columns, cells.rows])
     )
-    assert cells.size * points[:, 2].mean() == pytest.approx(0.004)
+    assert max(cells.columns, cells.rows) <= 512
+    assert cells.size * points[:, 2].mean() == side
