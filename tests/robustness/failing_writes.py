@@ -16,8 +16,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import cv2
-
 from tests.robustness.acts import command, quiet, write_file, write_recording, write_run
 from tests.robustness.file_faults import FAULTS, Fault, FaultyDisk
 from tests.robustness.forked import Ended, run_forked
@@ -108,7 +106,6 @@ class Campaign:
 
     def __init__(self, folder: Path, short: bool) -> None:
         self._folder, self._short = folder, short
-        cv2.setNumThreads(1)  # no threads of libraries live in the children
         if short:
             return
         for arguments in (

@@ -4,6 +4,7 @@ import faulthandler
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable
@@ -12,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
+
+import cv2
+from tqdm import tqdm
 
 from depthtrack.cli import main
 
@@ -49,7 +53,11 @@ def run_forked(
     around: context of the command.
     limit: seconds after which it is killed.
     act: what the arguments are given to.
+
+    Raises:
+        RuntimeError: this process has other threads.
     """
+    end_threads()
     with TemporaryFile() as output, TemporaryFile() as error:
         child = os.fork()
         if child == 0:
@@ -62,6 +70,25 @@ def run_forked(
         output.seek(0)
         error.seek(0)
         return Ended(code, output.read().decode(errors="replace"), error.read().decode(errors="replace"))
+
+
+def end_threads() -> None:
+    """End the threads of libraries, and wait for others: a lock that one holds stays locked in a forked child.
+
+    Raises:
+        RuntimeError: a thread does not end within 5 s.
+    """
+    cv2.setNumThreads(1)
+    tqdm.monitor_interval = 0
+    if tqdm.monitor is not None:
+        tqdm.monitor.exit()
+        tqdm.monitor = None
+    end = time.monotonic() + 5.0
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread():
+            thread.join(max(0.0, end - time.monotonic()))
+    if threading.active_count() > 1:
+        raise RuntimeError(f"threads run beside a fork: {[each.name for each in threading.enumerate()]}")
 
 
 def _run(arguments: list[str], folder: Path, around: Callable[[], Any], act: Callable[[list[str]], int]) -> int:

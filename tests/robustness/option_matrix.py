@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn, get_args
 
-import cv2
+from tqdm import tqdm
 
 from depthtrack.cli import COMMANDS, CommandEntry
 from depthtrack.cli.markers import COMMANDS as MARKER_COMMANDS
@@ -31,6 +31,8 @@ from tests.robustness.test_outputs import arguments_of, types_in
 
 MATRIX: dict[str, Any] = json.loads((Path(__file__).parent / "options.json").read_text(encoding="utf-8"))
 _KEPT = ("recording", "run", "capture")
+_LIMIT = 120.0
+"""Seconds of a command, which takes 5 s by default."""
 
 
 @dataclass(frozen=True)
@@ -110,25 +112,34 @@ def _is_strict(text: str) -> bool:
 def run(names: list[str], show: Callable[[str], None] = print) -> int:
     """Run the cases of some commands, print a table, and return the number of faults."""
     faults = 0
-    cv2.setNumThreads(1)
     with TemporaryDirectory() as folder:
         place = Path(folder)
         for arguments in MATRIX["prepare"]:
             quiet(command, arguments, place)
         show(f"{'command':24}{'cases':>8}{'faults':>8}")
         for name in names:
-            found: list[str] = []
+            if name in MATRIX["commands"]:
+                _clear(place)
+                quiet(command, MATRIX["commands"][name], place)  # compiles and loads what the children need
             tried = list(cases(name))
-            for case in tried:
-                for path in place.iterdir():
-                    if path.name not in _KEPT:
-                        shutil.rmtree(path) if path.is_dir() else path.unlink()
-                ended = run_forked(list(case.arguments), place, limit=300)
-                if (problem := case.problem(ended.code, ended.output, ended.error)) is not None:
-                    found.append(f"    {' '.join(case.arguments)}: {problem}")
+            found = [problem for case in tqdm(tried, name, disable=None) if (problem := _problem(case, place))]
             show("\n".join([f"{name:24}{len(tried):>8}{len(found):>8}", *found]))
             faults += len(found)
     return faults
+
+
+def _problem(case: Case, place: Path) -> str | None:
+    """Run a case, and return a line about what is wrong, if anything."""
+    _clear(place)
+    ended = run_forked(list(case.arguments), place, limit=_LIMIT)
+    problem = case.problem(ended.code, ended.output, ended.error)
+    return None if problem is None else f"    {' '.join(case.arguments)}: {problem}"
+
+
+def _clear(place: Path) -> None:
+    for path in place.iterdir():
+        if path.name not in _KEPT:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def main() -> int:
