@@ -1,5 +1,6 @@
 """A converted recording holds the same frames, and is complete or absent."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,16 @@ def test_a_folder_survives_mcap(sample: Path, tmp_path: Path, capsys: pytest.Cap
     check_equal(sample, tmp_path / "film.mcap")
     check_equal(sample, tmp_path / "again")
     assert [each.name for each in tmp_path.glob(".*")] == []
+
+
+def test_an_mcap_file_has_the_same_bits_from_another_process(
+    sample: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for process in (1, 2):
+        monkeypatch.setattr(os, "getpid", lambda process=process: process)
+        convert(open_sequence(sample), tmp_path / "film.mcap", overwrite=True)
+        (tmp_path / "film.mcap").replace(tmp_path / str(process))
+    assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
 
 
 def test_a_folder_keeps_its_ground_truth_in_a_folder(sample: Path, tmp_path: Path) -> None:

@@ -49,9 +49,11 @@ class McapWriter:
             raise InputError(f"{self._path} exists already: choose another name, or use --overwrite")
         self._replacing = replace_atomically(self._path)
         self._temporary = self._replacing.__enter__()
-        # rosbags writes a folder; its MCAP file is complete on its own.
-        self._folder = self._temporary.with_suffix(".parts")
-        shutil.rmtree(self._folder, ignore_errors=True)
+        # rosbags writes a folder; its MCAP file is complete on its own, and holds the name of the folder.
+        self._parts = self._temporary.with_suffix(".parts")
+        shutil.rmtree(self._parts, ignore_errors=True)
+        self._parts.mkdir()
+        self._folder = self._parts / self._path.stem
         self._types = get_typestore(Stores.ROS2_HUMBLE)
         self._writer = Writer(self._folder, version=8, storage_plugin=StoragePlugin.MCAP)
         self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
@@ -99,7 +101,7 @@ class McapWriter:
                 (written,) = self._folder.glob("*.mcap")
                 written.replace(self._temporary)
         finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            shutil.rmtree(self._parts, ignore_errors=True)
             self._replacing.__exit__(None, None, None)
 
     def _describe(self, time: int) -> None:
