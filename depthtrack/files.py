@@ -1,14 +1,16 @@
 """Read files of bounded size and write files that are complete or absent."""
 
 import ctypes
+import errno
 import os
 import secrets
 import shutil
+import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from depthtrack.errors import InputError
 from depthtrack.strict_data import exact_json_text, parse_json
@@ -26,6 +28,19 @@ def check_size(path: Path, largest: int) -> None:
     size = path.stat().st_size
     if size > largest:
         raise InputError(f"{path} must be at most {largest:,} bytes long, found {size:,}")
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file to read bytes. A pipe, which would wait for a writer, or a device is an OSError."""
+
+    def opener(name: str, flags: int) -> int:
+        handle = os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            os.close(handle)
+            raise OSError(errno.EINVAL, "it is no regular file", name)
+        return handle
+
+    return open(path, "rb", opener=opener)
 
 
 def read_bounded(path: Path, largest: int) -> bytes:

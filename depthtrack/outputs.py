@@ -76,15 +76,18 @@ def check_input(path: Path) -> None:
     """Check that a path can be followed; whether something is there is left to the reader.
 
     Raises:
-        InputError: it is a loop of links, or no file can have its name.
+        InputError: it is a loop of links or a pipe, or no file can have its name.
     """
     try:
-        path.stat()
+        mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"cannot read {path}: {reason}: name a file or folder that exists") from error
+    else:
+        if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode):
+            raise InputError(f"cannot read {path}: it is a pipe: write its content to a file")
 
 
 def check_distinct(outputs: dict[str, Path], inputs: list[Path]) -> None:

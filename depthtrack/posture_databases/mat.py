@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_lines
+from depthtrack.files import open_regular, read_lines
 from depthtrack.number_text import parse_numbers
 from depthtrack.posture_databases.posture_set import MAX_BYTES, PostureSet, check_angles, check_count
 
@@ -50,7 +50,7 @@ def read(path: Path) -> PostureSet:
     Raises:
         InputError: if a line does not have 26 finite numbers.
     """
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         start = file.read(6)
     if start.startswith(_BINARY):
         raise InputError(

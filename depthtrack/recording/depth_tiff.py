@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image as Pictures
 
 from depthtrack.errors import DamagedFrameError, InputError
-from depthtrack.files import read_bounded
+from depthtrack.files import open_regular, read_bounded
 from depthtrack.types import Depth
 
 _MILLIMETRES, _METRES = ("I;16", "I;16L"), "F"
@@ -21,7 +21,7 @@ def read_tiff_size(path: Path) -> tuple[int, int]:
         DamagedFrameError: if the file is missing or its header is damaged.
     """
     try:
-        with Pictures.open(path, formats=("TIFF",)) as image:
+        with open_regular(path) as file, Pictures.open(file, formats=("TIFF",)) as image:
             return image.size
     except Exception as error:  # Pillow raises many types for damaged files
         raise DamagedFrameError(f"{path} must be a TIFF image with an intact header") from error

@@ -17,7 +17,7 @@ from PIL import Image as Pictures
 from PIL import UnidentifiedImageError
 
 from depthtrack.errors import DamagedFrameError, InputError
-from depthtrack.files import read_bounded
+from depthtrack.files import open_regular, read_bounded
 from depthtrack.types import Image, Mask
 
 # Level 1 balances size and time: 2 % of the raw size for clean depth, a third for noisy, in 4-8 ms at 640x480.
@@ -133,7 +133,7 @@ def read_size(path: Path) -> tuple[int, int]:
         DamagedFrameError: if the file is missing or its header is damaged.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return decode_size(path, file.read(_HEADER_BYTES))
     except OSError as error:
         raise DamagedFrameError(f"{path} cannot be read: {error.strerror}") from error

@@ -78,6 +78,8 @@ def formats() -> tuple[type[BaseSequence], ...]:
 def _format_of(path: Path) -> type[BaseSequence]:
     if not path.exists():
         raise InputError(f"there is no recording at {path}: no such file or folder")
+    if not path.is_dir() and not path.is_file():
+        raise InputError(f"{path} must be a file or a folder, found a pipe or a device: write its content to a file")
     for candidate in formats():
         if candidate.matches(path):
             return candidate

@@ -130,9 +130,11 @@ def library() -> Any:
 def open_video(path: Path) -> Any:
     """Return a file that PyAV has opened; text in it that is not UTF-8 is ignored.
 
-    Raises MissingExtraError, or an error of PyAV.
+    Raises InputError if it is no regular file, MissingExtraError, or an error of PyAV.
     """
     av = library()
+    if not path.is_file():  # FFmpeg would wait for the writer of a pipe
+        raise InputError(f"{path} is missing or no regular file")
     # PyAV 19 keeps text that is not UTF-8, and has no choice.
     choices = {"metadata_errors": "ignore"} if int(av.__version__.partition(".")[0]) < 19 else {}
     return av.open(str(path), **choices)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.files import open_regular
 
 _HEADER = struct.Struct("<4s5H3I2H")
 _DESCRIPTOR = struct.Struct("<4s3I")
@@ -82,7 +83,7 @@ class ZipMembers:
         if member.method not in (_STORED, _DEFLATED):
             raise DamagedFrameError(f"{where} must be stored or deflated, found method {member.method}")
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 data = _content(file, member)
         except (OSError, struct.error, zlib.error, ValueError) as error:
             raise DamagedFrameError(f"{where} is damaged: {error}") from error
@@ -93,7 +94,7 @@ class ZipMembers:
 
 def _listed(path: Path) -> dict[str, _Member]:
     """Return the members in the list at the end of the file."""
-    with zipfile.ZipFile(path) as archive:
+    with open_regular(path) as file, zipfile.ZipFile(file) as archive:
         return {
             info.filename: _Member(info.header_offset, info.compress_type, info.CRC, info.compress_size, info.file_size)
             for info in archive.infolist()
@@ -104,7 +105,7 @@ def _scanned(path: Path) -> dict[str, _Member]:
     """Return the complete members in front of the cut."""
     found: dict[str, _Member] = {}
     end = path.stat().st_size
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         offset = 0
         while len(found) <= _MAX_MEMBERS and (read := _header(file, offset)) is not None:
             name, begin, member = read

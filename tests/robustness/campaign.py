@@ -5,12 +5,14 @@ reader otherwise than by a result or one sentence is kept below `--faults`.
 """
 
 import argparse
+import os
 import shutil
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -29,6 +31,14 @@ KINDS: dict[str, tuple[Mutation, ...]] = {
     ".png": (change_png, change_png, *BINARY),
 }
 """Mutations by suffix; those of binary files for others."""
+NO_FILES: dict[str, Callable[[Path], None]] = {
+    "nothing": lambda path: None,
+    "a folder": lambda path: path.mkdir(),
+    "a pipe": lambda path: os.mkfifo(path),
+    "a loop of links": lambda path: path.symlink_to(path.name),
+    "a device without an end": lambda path: path.symlink_to("/dev/zero"),
+}
+"""What stands in the place of a file."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +62,15 @@ class Changer:
         self.root, self.files = root, [path for path in files if "unused" not in path.parts]
         self.whole = reader.read(self.path)
 
-    def attempt(self, seed: int) -> tuple[Outcome, Path]:
-        """Return the outcome of the change of this seed, and the file. Raises FaultError."""
-        rng = np.random.default_rng([seed, *self.reader.name.encode()])
-        path = self.files[int(rng.integers(len(self.files)))]
+    def attempt(self, seed: int) -> Outcome:
+        """Return the outcome of the change of this seed. Raises FaultError."""
+        rng, path = self._chosen(seed)
         data = path.read_bytes()
         is_text = path.suffix in ("", ".mat") and b"\0" not in data
         kinds = TEXT if is_text else KINDS.get(path.suffix, BINARY)
         path.write_bytes(kinds[int(rng.integers(len(kinds)))](data, rng))
         try:
-            return outcome(self.reader.read, self.path, self.whole), path
+            return outcome(self.reader.read, self.path, self.whole)
         except FaultError as fault:
             fault.add_note(str(path))
             fault.data = path.read_bytes()
@@ -69,17 +78,44 @@ class Changer:
         finally:
             path.write_bytes(data)
 
+    def replace(self, kind: str, seed: int) -> Outcome:
+        """Return the outcome with one of `NO_FILES` in the place of a file. Raises FaultError."""
+        _, path = self._chosen(seed)
+        data = path.read_bytes()
+        path.unlink()
+        NO_FILES[kind](path)
+        try:
+            return outcome(self.reader.read, self.path, self.whole)
+        except FaultError as fault:
+            fault.add_note(str(path))
+            fault.data = kind.encode()
+            raise
+        finally:
+            if path.is_dir():
+                path.rmdir()
+            path.unlink(missing_ok=True)
+            path.write_bytes(data)
+
+    def _chosen(self, seed: int) -> tuple[np.random.Generator, Path]:
+        rng = np.random.default_rng([seed, *self.reader.name.encode()])
+        return rng, self.files[int(rng.integers(len(self.files)))]
+
 
 def run(reader: Reader, seeds: range, faults: Path | None = None) -> tuple[Counter[str], list[Kept]]:
-    """Return the number of each outcome, and the faults; their files are copied."""
+    """Return the number of each outcome, and the faults; their files are copied.
+
+    Each seed changes a file, and each of `NO_FILES` replaces one.
+    """
     counts: Counter[str] = Counter()
     kept: list[Kept] = []
     with TemporaryDirectory() as name:
         changer = Changer(reader, Path(name))
         with memory_limit():
-            for seed in seeds:
+            attempts = [(seed, partial(changer.attempt, seed)) for seed in seeds]
+            attempts += [(seeds.start, partial(changer.replace, kind, seeds.start)) for kind in NO_FILES]
+            for seed, attempt in attempts:
                 try:
-                    counts[changer.attempt(seed)[0]] += 1
+                    counts[attempt()] += 1
                 except FaultError as fault:
                     counts["fault"] += 1
                     file = Path(fault.__notes__[0]).relative_to(changer.root)

@@ -47,7 +47,7 @@ def outcome(read: Callable[[Path], int], path: Path, whole: int) -> Outcome:
         FaultError: if the reader raises another error than ours, or exceeds a limit.
     """
     try:
-        with cpu_limit(SECONDS):
+        with time_limit(SECONDS):
             count = read(path)
     except DepthtrackError as error:
         message = str(error)
@@ -55,26 +55,38 @@ def outcome(read: Callable[[Path], int], path: Path, whole: int) -> Outcome:
             raise FaultError(f"the message must be a printable line, found {message[:80]!r}") from error
         return Outcome.REFUSED
     except _TimeLimit:
-        raise FaultError(f"more than {SECONDS} s of CPU time") from None
+        raise FaultError(f"more than {SECONDS} s of CPU time, or it waits") from None
     except (Exception, RecursionError) as error:
         raise FaultError(f"{type(error).__name__}: {str(error)[:200]}") from error
     return Outcome.CUT if count < whole else Outcome.READ
 
 
 @contextmanager
-def cpu_limit(seconds: float) -> Iterator[None]:
-    """Interrupt the block after its CPU time."""
+def time_limit(seconds: float, waiting: float = 120.0) -> Iterator[None]:
+    """Interrupt the block after its CPU time, or after a longer wall-clock time.
+
+    waiting: the latter, in seconds; a block that waits for a pipe uses no CPU time.
+    """
+    interrupted = False
 
     def interrupt(*_: object) -> None:
+        nonlocal interrupted
+        interrupted = True
         raise _TimeLimit
 
-    before = signal.signal(signal.SIGVTALRM, interrupt)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    timers = {signal.SIGVTALRM: (signal.ITIMER_VIRTUAL, seconds), signal.SIGALRM: (signal.ITIMER_REAL, waiting)}
+    before = {number: signal.signal(number, interrupt) for number in timers}
+    for timer, limit in timers.values():
+        signal.setitimer(timer, limit)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before)
+        for timer, _ in timers.values():
+            signal.setitimer(timer, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if interrupted:
+            raise _TimeLimit  # C code may have taken the first one for an error of the file
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """Arguments of any characters end in one printable line or in work, never in a traceback."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -43,6 +44,21 @@ def test_other_characters_are_names_of_files(
     write_sample(tmp_path / f"x{good}")
     assert main(["info", f"x{good}", "--json"]) == 0
     assert open_sequence(Path(f"x{good}")).name == f"x{good}"
+
+
+@pytest.mark.parametrize("command", ["info", "track -o R", "live --source", "train-skin -o s.json", "lift S"])
+def test_pipes_are_refused(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A reader would wait for the writer for ever."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    rest = ["-o", "R"] if command == "lift S" else []
+    assert main([*command.split(), "pipe", *rest]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "write its content to a file" in line
+    with pytest.raises(InputError, match="a pipe or a device"):
+        open_sequence(Path("pipe"))
 
 
 def test_paths_that_are_no_text_are_refused_by_the_api(tmp_path: Path) -> None:

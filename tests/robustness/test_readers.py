@@ -4,6 +4,7 @@ The long form is `make robustness`. A file that was a fault once is kept in `fau
 """
 
 import inspect
+import os
 import shutil
 from importlib import import_module
 from pathlib import Path
@@ -13,8 +14,8 @@ import pytest
 
 from depthtrack.recording import sequences
 from depthtrack.recording.sequences.base import BaseSequence
-from tests.robustness.campaign import Changer, run
-from tests.robustness.limits import FaultError, Outcome, cpu_limit, memory_limit, outcome
+from tests.robustness.campaign import NO_FILES, Changer, run
+from tests.robustness.limits import FaultError, Outcome, memory_limit, outcome, time_limit
 from tests.robustness.readers import READERS, Reader
 
 TRIALS, SLOW_TRIALS = 12, 2
@@ -31,9 +32,10 @@ def readers() -> list[object]:
 
 @pytest.mark.parametrize("reader", readers())
 def test_changed_files_are_read_or_refused(reader: Reader) -> None:
-    counts, kept = run(reader, range(FIRST, FIRST + (SLOW_TRIALS if reader.slow else TRIALS)))
+    trials = SLOW_TRIALS if reader.slow else TRIALS
+    counts, kept = run(reader, range(FIRST, FIRST + trials))
     assert kept == []
-    assert sum(counts.values()) == (SLOW_TRIALS if reader.slow else TRIALS)
+    assert sum(counts.values()) == trials + len(NO_FILES)
 
 
 @pytest.mark.parametrize("path", sorted(FAULTS.rglob("*.*")), ids=lambda path: f"{path.parent.name}/{path.name}")
@@ -82,5 +84,8 @@ def test_limits_are_kept(tmp_path: Path) -> None:
     for read, message in ((large, "MemoryError"), (foreign, "RecursionError")):
         with pytest.raises(FaultError, match=message):
             outcome(read, tmp_path, 1)
-    with pytest.raises(BaseException, match=r"^$"), cpu_limit(0.05):
+    with pytest.raises(BaseException, match=r"^$"), time_limit(0.05):
         endless(tmp_path)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(BaseException, match=r"^$"), time_limit(2.0, waiting=0.05):
+        (tmp_path / "pipe").open("rb")

@@ -1,15 +1,20 @@
 """Journal of a sweep: one JSON object per line, readable after a kill at any time."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
+from depthtrack.files import check_size
 from depthtrack.strict_data import json_text, parse_json
 
 Cell = dict[str, Any]
 """Parameters of one measurement: plain JSON values by name."""
+
+_LARGEST = 1 << 28
+"""Bytes of a journal at most."""
 
 Row = dict[str, Any]
 """A cell and its measured values: plain JSON values by name; None for a value that is not finite."""
@@ -24,10 +29,12 @@ class Journal(Closing):
         names: keys of all cells.
 
         Raises:
-            InputError: if a line is no JSON object.
+            InputError: if it is no regular file, or a line is no JSON object.
         """
         self._names, self._rows = tuple(names), dict[str, Row]()
         path.parent.mkdir(parents=True, exist_ok=True)
+        if os.path.lexists(path):
+            check_size(path, _LARGEST)
         self._file = path.open("a+b")
         self._file.seek(0)
         whole, line_break, cut = self._file.read().rpartition(b"\n")

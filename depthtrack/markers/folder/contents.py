@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from depthtrack.errors import InputError
-from depthtrack.files import compact_json, read_json
+from depthtrack.files import compact_json, open_regular, read_json
 
 FORMAT = 1
 CONTENTS_FILE = "markers.json"
@@ -156,7 +156,7 @@ def check_names(names: Sequence[str]) -> None:
 def _digest(path: Path) -> str:
     found = sha256()
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             while chunk := file.read(_CHUNK):
                 found.update(chunk)
     except OSError as error:

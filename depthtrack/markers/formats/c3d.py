@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import check_size
+from depthtrack.files import check_size, open_regular
 from depthtrack.markers.formats.c3d_layout import LARGEST_SECTION, Layout, read_layout
 from depthtrack.markers.formats.c3d_parameters import floats, word_type
 from depthtrack.markers.formats.c3d_writing import write
@@ -39,7 +39,7 @@ def read(path: Path) -> StoredCapture:
     """
     check_size(path, MAX_BYTES)
     length = path.stat().st_size
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(LARGEST_SECTION)
     layout = read_layout(head, length, str(path))
     positions, residuals = _samples(path, layout)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
+from depthtrack.files import open_regular
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.formats import c3d, motive_csv, plain_csv, qualisys_tsv, trc, vicon_csv
 from depthtrack.markers.formats.conditioning import to_capture
@@ -62,7 +63,7 @@ def find_format(path: Path) -> CaptureFormat:
         raise InputError(f"{path} must be a file of a capture, found a folder or a device")
     if not path.exists():
         raise InputError(f"there is no capture at {path}: no such file")
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
     if not head:
         raise InputError(f"{path} must hold a capture, found an empty file")

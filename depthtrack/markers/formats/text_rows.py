@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import check_size
+from depthtrack.files import check_size, open_regular
 from depthtrack.markers.formats.stored_capture import FARTHEST, MAX_SAMPLES, check_dimensions
 from depthtrack.number_text import parse_number, parse_numbers
 from depthtrack.types import Array, Index
@@ -34,7 +34,7 @@ def text_lines(path: Path) -> Iterator[Line]:
         InputError: if the file is missing, too long, or holds a line that is too long or binary.
     """
     check_size(path, MAX_BYTES)
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         number = 0
         while line := file.readline(_LONGEST_LINE + 1):
             number += 1

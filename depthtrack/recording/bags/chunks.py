@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from depthtrack.errors import DamagedFrameError, InputError, MissingExtraError
+from depthtrack.files import open_regular
 
 LARGEST_CHUNK = 1 << 29
 """Bound on the declared size of a chunk, compressed or not, and of a message, bytes."""
@@ -35,7 +36,7 @@ class ChunkedFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self.file: BinaryIO = path.open("rb")
+            self.file: BinaryIO = open_regular(path)
         except OSError as error:
             raise InputError(f"cannot read {path}: {error.strerror}") from error
         self.size = path.stat().st_size

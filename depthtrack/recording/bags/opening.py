@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
+from depthtrack.files import open_regular
 from depthtrack.recording.bags import mcap, ros1, sqlite
 from depthtrack.recording.bags.mcap import McapStorage
 from depthtrack.recording.bags.ros1 import Ros1Storage
@@ -111,7 +112,7 @@ def _is_compressed(path: Path) -> bool:
 
 def _start_of(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return file.read(16)
     except OSError:
         return b""

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import read_lines
+from depthtrack.files import open_regular, read_lines
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.benchmark_joints import BENCHMARKS
 from depthtrack.number_text import parse_numbers
@@ -76,8 +76,8 @@ def _label_files(folder: Path) -> list[Path]:
     for above in list(folder.parents)[:_LEVELS]:
         for path in sorted(above.glob("*.txt")):
             try:
-                with path.open(encoding="utf-8") as file:
-                    first = file.readline(4096)
+                with open_regular(path) as file:
+                    first = file.readline(4096).decode()
             except (OSError, UnicodeDecodeError):
                 continue
             if _LABEL.fullmatch(first):

@@ -16,6 +16,7 @@ from typing import BinaryIO
 import numpy as np
 
 from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.files import open_regular
 from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.recording import depth16z
 from depthtrack.recording.reading import ReadingOptions
@@ -86,7 +87,7 @@ class OniSequence(BaseSequence):
         """See `BaseSequence`."""
         if not path.is_file():
             return False
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return file.read(4) == _FILE_MAGIC
 
     @classmethod
@@ -113,7 +114,7 @@ class OniSequence(BaseSequence):
                 f"{self.path}: frame {index} must be smaller than {4 * count:,} bytes, found {size:,}"
             )
         try:
-            with self.path.open("rb") as file:
+            with open_regular(self.path) as file:
                 file.seek(offset)
                 data = file.read(size)
             values = _CODEC[depth.codec](data, count)
@@ -139,7 +140,7 @@ def _read(path: Path) -> _DepthNode:
     """
     found, number = _DepthNode(), None
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             for record in _records(file, path):
                 if record.kind == _END:
                     found.truncated = False

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.files import open_regular
 from depthtrack.geometry.camera import MAX_SIDE, Camera
 from depthtrack.recording.images import decode_colour
 from depthtrack.recording.lzfse import decompress
@@ -73,7 +74,7 @@ class Record3dSequence(BaseSequence):
         """See `BaseSequence`."""
         if not path.is_file():
             return False
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             if file.read(4) != b"PK\3\4":
                 return False
         try:

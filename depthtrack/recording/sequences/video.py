@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from depthtrack.errors import DamagedFrameError, InputError
+from depthtrack.files import open_regular
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.distortion import Undistortion
 from depthtrack.geometry.registration import Registration
@@ -162,7 +163,7 @@ def _content(stream: Any) -> bytes:
 
 
 def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         return file.read(_HEAD_BYTES)
 
 
