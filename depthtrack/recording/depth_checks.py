@@ -40,6 +40,9 @@ _DISPARITY_MISSING = 2047
 """Raw disparity of Kinect v1 without a reading: eleven bits."""
 _DISPARITIES = (250, 1092)
 """Raw disparities of Kinect v1 between 0.3 m and infinity."""
+_DISPARITY_ROOM, _ROOM_SHARE = 860, 0.5
+"""Raw disparity at 1.5 m, and the share of the readings that is farther in a room."""
+_CONVERSION = "convert it by depth = 1 / (3.33 - 0.00307 * value) metres"
 _BYTE = 255
 
 
@@ -57,7 +60,7 @@ def depth_notes(histogram: Index, camera: Camera) -> list[str]:
     if (coarse := _too_few_bits(readings)) is not None:
         return [coarse]
     notes = list(_values_without_meaning(readings, int(histogram.sum()), camera))
-    return [*notes, *_units(readings, camera)]
+    return [*notes, *_units(readings, camera), *_possible_disparity(readings, camera)]
 
 
 def check_depth(sequence: Sequence) -> None:
@@ -194,5 +197,16 @@ def _disparity(readings: Index) -> str | None:
     share = 100 * missing / readings.sum()
     return (
         f"values end at {_DISPARITY_MISSING}, which covers {share:.1f} % of the readings: this is raw disparity of"
-        " Kinect v1, so convert it by depth = 1 / (3.33 - 0.00307 * value) metres"
+        f" Kinect v1, so {_CONVERSION}"
     )
+
+
+def _possible_disparity(readings: Index, camera: Camera) -> Iterator[str]:
+    """Yield a sentence if most readings lie where raw disparity of Kinect v1 has a room.
+
+    No reading may lie beyond. In millimetres, that is a wall at 1 m, so depth cannot settle it. With 2047 it is sure.
+    """
+    first, last = np.flatnonzero(readings)[[0, -1]] if readings.any() else (0, 0)
+    room = readings[_DISPARITY_ROOM : _DISPARITIES[1] + 1].sum()
+    if np.isclose(camera.depth_scale, 0.001) and last <= _DISPARITIES[1] and room > _ROOM_SHARE * readings.sum():
+        yield f"values run from {first} to {last}: if they are raw disparity of Kinect v1, {_CONVERSION}"

@@ -97,6 +97,8 @@ def test_a_wrong_unit_is_named_with_the_likely_one(kind: str) -> None:
 
 
 def test_raw_disparity_is_named() -> None:
+    (possible,) = notes(disparity(scene() / 1000, missing=0))
+    assert "if they are raw disparity" in possible
     (note,) = notes(disparity(scene() / 1000))
     assert "raw disparity of Kinect v1" in note
     assert "convert it by" in note

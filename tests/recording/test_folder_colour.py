@@ -107,7 +107,7 @@ def test_damaged_colour_is_counted(sample: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_every_command_that_reads_a_recording_takes_depth_only(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("info", "view", "segment", "track", "calibrate", "lift", "compare", "demo", "convert"):
+    for command in ("info", "view", "segment", "track", "calibrate", "lift", "compare", "demo", "convert", "live"):
         with pytest.raises(SystemExit):
             main([command, "--help"])
         assert "--depth-only" in capsys.readouterr().out, command
