@@ -1,84 +1,195 @@
-"""Search for the visible point closest to each observed point, sixteen at a time."""
+"""Search for the visible point closest to each observed point, sixteen at a time.
+
+Observed points are sorted by cell once. Sixteen neighbours in a row of cells search the visible points of their cells
+and of those around. The few that have none near search squares of cells that grow.
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from depthtrack.compilation import compiled
 from depthtrack.simd.functions import lowest_of_halves
-from depthtrack.simd.vectors import F32X16, both, filler, kernel_part, loader, select
-from depthtrack.types import Array32
+from depthtrack.simd.vectors import F32X16, both, filler, kernel_part, loader, select, store
+from depthtrack.types import Array, Array32, Index
 
 LANES = F32X16.lanes
 FAR = np.float32(1e6)
 """Metres: coordinate of padding, beyond any point."""
+_WIDEST = 12
+"""Cells of a row that a group of points spans at most."""
 _LANE: Array32 = np.arange(LANES, dtype=np.float32)
 
 _load = loader(F32X16)
 _fill = filler(F32X16)
 
 
+class Groups(NamedTuple):
+    """Observed points sorted by cell, in groups of at most `LANES` points of a row of cells.
+
+    order: (N,) rows of the cloud.
+    first: (G + 1,) group g has the sorted points from first[g] up to first[g + 1].
+    cells: (G, 3) row, and first and last column of the cells of a group.
+    points: (3, N) metres, camera frame.
+    normals: (3, N + LANES) unit.
+    margin: (N,) distance to the nearest cell that is not beside the point's own, metres.
+    place, best, chosen: working memory: (3, N + LANES) points relative to the origin, and twice (N + LANES,) the
+        squared distance of the closest visible point, and its row.
+    """
+
+    order: Index
+    first: Index
+    cells: Index
+    points: Array
+    normals: Array32
+    margin: Array
+    place: Array32
+    best: Array32
+    chosen: Array32
+
+
+@compiled(nogil=True)
+def grouped(points, normals, cells):
+    """Return the groups of observed points and normals (N, 3) among cells."""
+    count = points.shape[0]
+    cell, slots = np.empty((count, 2), np.int64), np.zeros(cells.rows * cells.columns + 1, np.int64)
+    inside = np.empty(count)
+    for i in range(count):
+        cell[i, 0], cell[i, 1], inside[i] = place_in_cell(cells, points[i, 0], points[i, 1], points[i, 2])
+        slots[cell[i, 1] * cells.columns + cell[i, 0] + 1] += 1
+    for c in range(1, slots.shape[0]):
+        slots[c] += slots[c - 1]
+    order = np.empty(count, np.int64)
+    for i in range(count):
+        slot = cell[i, 1] * cells.columns + cell[i, 0]
+        order[slots[slot]] = i
+        slots[slot] += 1
+    first, span, total = np.zeros(count + 1, np.int64), np.empty((count, 3), np.int64), 0
+    sorted_points, sorted_normals = np.empty((3, count)), np.zeros((3, count + LANES), np.float32)
+    margin, slant = np.empty(count), _slant(cells)
+    for j in range(count):
+        i = order[j]
+        column, row = cell[i, 0], cell[i, 1]
+        begun = first[total - 1] if total > 0 else 0
+        if total == 0 or row != span[total - 1, 0] or j - begun == LANES or column - span[total - 1, 1] >= _WIDEST:
+            first[total] = j
+            span[total, 0], span[total, 1] = row, column
+            total += 1
+        span[total - 1, 2] = column
+        margin[j] = max(1.0 + inside[i], 0.0) * (cells.size * points[i, 2] * slant)
+        for k in range(3):
+            sorted_points[k, j], sorted_normals[k, j] = points[i, k], normals[i, k]
+    first[total] = count
+    place, memory = np.zeros((3, count + LANES), np.float32), np.zeros((2, count + LANES), np.float32)
+    return Groups(
+        order,
+        first[: total + 1].copy(),
+        span[:total].copy(),
+        sorted_points,
+        sorted_normals,
+        margin,
+        place,
+        memory[0],
+        memory[1],
+    )
+
+
+@compiled(nogil=True)
+def place_in_cell(cells, x, y, z):
+    """Return column and row of a point, and its distance from the sides of its cell, in cells."""
+    p, q = (x / z - cells.u) / cells.size, (y / z - cells.v) / cells.size
+    column, row = min(max(int(p), 0), cells.columns - 1), min(max(int(q), 0), cells.rows - 1)
+    return column, row, min(p - column, column + 1 - p, q - row, row + 1 - q)
+
+
+@compiled(nogil=True)
+def _slant(cells):
+    """Return the smallest ratio of the distance between two rays to that in the image plane.
+
+    Rays through image points that are d apart pass a point at depth z no closer than d z / |(u, v, 1)|.
+    """
+    u = max(abs(cells.u), abs(cells.u + cells.columns * cells.size))
+    v = max(abs(cells.v), abs(cells.v + cells.rows * cells.size))
+    return 1.0 / math.sqrt(1.0 + u * u + v * v)
+
+
 @kernel_part
-def closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, closest):
+def closest_vertices(cloud, groups, visible, cells, max_distance, min_normal_cosine, closest):
     """Write the row of the visible point closest to each observed point to `closest`.
 
     cloud: N observed points and normals, camera frame.
+    groups: of the cloud.
     visible: visible points sorted by cell, see `surfaces.points.Visible`.
     max_distance: largest distance, m.
     min_normal_cosine: smallest cosine between the normals.
     closest: (N,) rows of `visible`, -1 for none.
+    """
+    first, table = visible.first, visible.table
+    limit, least = np.float32(max_distance * max_distance), np.float32(min_normal_cosine)
+    for k in range(3):
+        for j in range(groups.points.shape[1]):
+            groups.place[k, j] = np.float32(groups.points[k, j] - visible.origin[k])
+    for g in range(groups.cells.shape[0]):
+        row, low, high = groups.cells[g, 0], groups.cells[g, 1], groups.cells[g, 2]
+        left, right, at = max(low - 1, 0), min(high + 1, cells.columns - 1), groups.first[g]
+        px, py, pz = _load(groups.place[0], at), _load(groups.place[1], at), _load(groups.place[2], at)
+        mx, my, mz = _load(groups.normals[0], at), _load(groups.normals[1], at), _load(groups.normals[2], at)
+        best, chosen = _fill(limit), _fill(FAR)
+        for r in range(max(row - 1, 0), min(row + 1, cells.rows - 1) + 1):
+            base = r * cells.columns
+            for k in range(first[base + left], first[base + right + 1]):
+                dx, dy, dz = table[0, k] - px, table[1, k] - py, table[2, k] - pz
+                d = dx * dx + dy * dy + dz * dz
+                same = table[3, k] * mx + table[4, k] * my + table[5, k] * mz
+                better = both(d < best, same >= least)
+                best, chosen = select(better, d, best), select(better, np.float32(k), chosen)
+        # Lanes beyond the group are those of the next one, which writes them again.
+        store(groups.best, at, best)
+        store(groups.chosen, at, chosen)
+    for j in range(groups.order.shape[0]):
+        nearest = groups.chosen[j]
+        if groups.margin[j] * groups.margin[j] < groups.best[j]:
+            nearest = _search_beyond(groups, j, cloud.points[groups.order[j]], visible, cells, least, _slant(cells))
+        closest[groups.order[j]] = int(nearest) if nearest < FAR else -1
 
-    Cells are searched in growing squares around the cell of the point, until no point beyond can be closer or no cell
-    is left. The cells of a row are contiguous in memory. A load of sixteen points may include further cells, whose
+
+@kernel_part
+def _search_beyond(groups, j, point, visible, cells, least, slant):
+    """Return the row of the visible point closest to sorted point j, or FAR for none.
+
+    The cells beside its own have been searched. Further ones are searched in growing squares, until no point beyond can
+    be closer or no cell is left. The cells of a row are contiguous in memory. A load of sixteen points may include further cells, whose
     points are valid too.
     """
-    points, normals, origin, first = cloud.points, cloud.normals, visible.origin, visible.first
-    sx, sy, sz, nx, ny, nz = (
-        visible.table[0],
-        visible.table[1],
-        visible.table[2],
-        visible.table[3],
-        visible.table[4],
-        visible.table[5],
-    )
-    # Rays through image points that are d apart pass a point at depth z no closer than d z / |(u, v, 1)|.
-    u = max(abs(cells.u), abs(cells.u + cells.columns * cells.size))
-    v = max(abs(cells.v), abs(cells.v + cells.rows * cells.size))
-    slant = 1.0 / math.sqrt(1.0 + u * u + v * v)
-    lanes, limit, least = _load(_LANE, 0), np.float32(max_distance * max_distance), np.float32(min_normal_cosine)
-    for i in range(points.shape[0]):
-        z = points[i, 2]
-        # The position of the point among the cells, and the side of a cell in metres there.
-        p, q = (points[i, 0] / z - cells.u) / cells.size, (points[i, 1] / z - cells.v) / cells.size
-        column, row, side = int(p), int(q), cells.size * z * slant
-        inside = min(p - column, column + 1 - p, q - row, row + 1 - q)
-        px, py, pz = (
-            np.float32(points[i, 0] - origin[0]),
-            np.float32(points[i, 1] - origin[1]),
-            np.float32(z - origin[2]),
-        )
-        mx, my, mz = np.float32(normals[i, 0]), np.float32(normals[i, 1]), np.float32(normals[i, 2])
-        best, chosen, lowest, ring = _fill(limit), _fill(FAR), limit, 1
-        while True:
-            left, right = max(column - ring, 0), min(column + ring, cells.columns - 1)
-            for r in range(max(row - ring, 0), min(row + ring, cells.rows - 1) + 1):
-                base = r * cells.columns
-                whole = ring == 1 or r == row - ring or r == row + ring
-                # Only both ends of the middle rows of a square are new.
-                for end in range(1 if whole else 2):
-                    low = left if whole or end == 0 else right
-                    high = right if whole or end == 1 else left
-                    for k in range(first[base + low], first[base + high + 1], LANES):
-                        dx, dy, dz = _load(sx, k) - px, _load(sy, k) - py, _load(sz, k) - pz
-                        d = dx * dx + dy * dy + dz * dz
-                        same = _load(nx, k) * mx + _load(ny, k) * my + _load(nz, k) * mz
-                        better = both(d < best, same >= least)
-                        best, chosen = select(better, d, best), select(better, lanes + np.float32(k), chosen)
-            one, other = lowest_of_halves(best)
-            lowest = min(one, other)
-            # The next square begins where the nearest side of this one ends.
-            margin = (ring + inside) * side
-            if margin * margin >= lowest or ring >= max(cells.columns, cells.rows):
-                break
-            ring += 1
-        one, other = lowest_of_halves(select(best > lowest, FAR, chosen))
-        closest[i] = int(min(one, other)) if min(one, other) < FAR else -1
+    first, table = visible.first, visible.table
+    px, py, pz = groups.place[0, j], groups.place[1, j], groups.place[2, j]
+    mx, my, mz = groups.normals[0, j], groups.normals[1, j], groups.normals[2, j]
+    column, row, inside = place_in_cell(cells, point[0], point[1], point[2])
+    side = cells.size * point[2] * slant
+    lanes, lowest, ring = _load(_LANE, 0), groups.best[j], 2
+    best, chosen = _fill(lowest), _fill(FAR)
+    while True:
+        left, right = max(column - ring, 0), min(column + ring, cells.columns - 1)
+        for r in range(max(row - ring, 0), min(row + ring, cells.rows - 1) + 1):
+            base = r * cells.columns
+            whole = r == row - ring or r == row + ring
+            # Only both ends of the middle rows of a square are new.
+            for end in range(1 if whole else 2):
+                low = left if whole or end == 0 else right
+                high = right if whole or end == 1 else left
+                for k in range(first[base + low], first[base + high + 1], LANES):
+                    dx, dy, dz = _load(table[0], k) - px, _load(table[1], k) - py, _load(table[2], k) - pz
+                    d = dx * dx + dy * dy + dz * dz
+                    same = _load(table[3], k) * mx + _load(table[4], k) * my + _load(table[5], k) * mz
+                    better = both(d < best, same >= least)
+                    best, chosen = select(better, d, best), select(better, lanes + np.float32(k), chosen)
+        one, other = lowest_of_halves(best)
+        lowest = min(one, other)
+        # The next square begins where the nearest side of this one ends.
+        margin = (ring + inside) * side
+        if (margin >= 0.0 and margin * margin >= lowest) or ring >= max(cells.columns, cells.rows):
+            break
+        ring += 1
+    one, other = lowest_of_halves(select(best > lowest, FAR, chosen))
+    return min(one, other) if min(one, other) < FAR else groups.chosen[j]

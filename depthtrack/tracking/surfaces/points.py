@@ -14,7 +14,7 @@ from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
 from depthtrack.simd.vectors import kernel_part
-from depthtrack.solver.closest_points import FAR, LANES, closest_vertices
+from depthtrack.solver.closest_points import FAR, LANES, Groups, closest_vertices, grouped
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
 from depthtrack.types import Array, Array32, Index
@@ -99,6 +99,7 @@ class PointSurface:
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
         self._max_distance = max_distance
         self._cells = cells_over(cloud.points, self._options.cell, max_distance)
+        self._groups: list[tuple[PointCloud, Groups]] = []
 
     def match(
         self,
@@ -109,7 +110,16 @@ class PointSurface:
         correspondences: Correspondences,
     ) -> None:
         limits = (self._options.hidden_depth, self._max_distance, min_normal_cosine)
-        match_points(self._points, bodies, self._posed, self._cells, cloud, limits, correspondences)
+        groups = self._groups_of(cloud)
+        match_points(self._points, bodies, self._posed, self._cells, cloud, groups, limits, correspondences)
+
+    def _groups_of(self, cloud: PointCloud) -> Groups:
+        """Return the groups of a cloud of the target, made at its first search."""
+        for known, groups in self._groups:
+            if known is cloud:
+                return groups
+        self._groups.append((cloud, grouped(cloud.points, cloud.normals, self._cells)))
+        return self._groups[-1][1]
 
 
 @compiled(nogil=True)
@@ -119,6 +129,7 @@ def match_points(
     posed: Posed,
     cells: Cells,
     cloud: PointCloud,
+    groups: Groups,
     limits: tuple[float, float, float],
     correspondences: Correspondences,
 ) -> None:
@@ -129,7 +140,7 @@ def match_points(
     tolerance, max_distance, min_normal_cosine = limits
     pose_points(points, bodies, posed)
     visible = sort_visible(posed, cells, tolerance)
-    closest_vertices(cloud, visible, cells, max_distance, min_normal_cosine, correspondences.body)
+    closest_vertices(cloud, groups, visible, cells, max_distance, min_normal_cosine, correspondences.body)
     resolve_bodies(points, posed, visible, correspondences)
 
 

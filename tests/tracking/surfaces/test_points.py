@@ -128,7 +128,8 @@ def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
         surface.sort_visible(posed, cells, TOLERANCE),
         Correspondences.allocate(len(cloud.points)),
     )
-    closest.closest_vertices(cloud, seen, cells, max_distance, min_normal_cosine, correspondences.body)
+    groups = closest.grouped(cloud.points, cloud.normals, cells)
+    closest.closest_vertices(cloud, groups, seen, cells, max_distance, min_normal_cosine, correspondences.body)
     found, vertex = correspondences.body >= 0, seen.vertex[correspondences.body]
     surface.resolve_bodies(MODEL, posed, seen, correspondences)
     np.testing.assert_array_equal(correspondences.body >= 0, found)
