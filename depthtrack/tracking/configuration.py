@@ -161,11 +161,17 @@ class IkConfig:
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     deadline: float | None = option(
         None,
-        "Time after a frame arrives at which its searches end, to go on in the next frames. "
+        "Time after a frame arrives at which its pose is due: searches end before, to go on in the next frames. "
         "Poses then depend on the speed of the machine",
         unit="ms",
         least=0,
         most=3_600_000,
+    )
+    deadline_reserve: float = option(
+        0.15,
+        "Share of the deadline that searches leave to the step under way, and to the confidence of the pose",
+        advanced=True,
+        most=1,
     )
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
@@ -220,11 +226,17 @@ class HybridConfig:
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     deadline: float | None = option(
         None,
-        "Time after a frame arrives at which its searches end, to go on in the next frames. "
+        "Time after a frame arrives at which its pose is due: searches end before, to go on in the next frames. "
         "Poses then depend on the speed of the machine",
         unit="ms",
         least=0,
         most=3_600_000,
+    )
+    deadline_reserve: float = option(
+        0.15,
+        "Share of the deadline that searches leave to the step under way, and to the confidence of the pose",
+        advanced=True,
+        most=1,
     )
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 

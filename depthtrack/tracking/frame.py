@@ -24,6 +24,9 @@ from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.tracking.timing import Deadline
 from depthtrack.types import Array
 
+TO_BEGIN = 0.5
+"""Share of the deadline that must be left to begin a search: its proposals are scored at once."""
+
 
 class Toolkit:
     """Scorers, fitters and synergies of one hand, created on first use and then kept."""
@@ -136,6 +139,16 @@ class FrameContext:
     def clamp(self) -> float:
         """Unit of energies in options: see `Objective.clamp`."""
         return self.tools.scoring.objective.clamp
+
+    def puts_search_off(self) -> bool:
+        """Return whether the deadline leaves too little time to begin a search.
+
+        The next frame begins it then.
+        """
+        if not self.deadline.sooner(TO_BEGIN).is_over:
+            return False
+        self.search = InterruptedSearch.put_off(self.observation.centre)
+        return True
 
     def evaluate(self, poses: Array, resolution: int | None = None) -> list[Candidate]:
         """Score poses (N, 27); return them by increasing energy.

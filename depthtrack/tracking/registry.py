@@ -7,7 +7,14 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
 from depthtrack.options import with_options
-from depthtrack.tracking.configuration import CONFIGURATIONS, MarkersConfig, RunConfig, TrackerConfig
+from depthtrack.tracking.configuration import (
+    CONFIGURATIONS,
+    HybridConfig,
+    IkConfig,
+    MarkersConfig,
+    RunConfig,
+    TrackerConfig,
+)
 from depthtrack.tracking.frame import Toolkit
 from depthtrack.tracking.stage_tracker import StageTracker
 
@@ -57,5 +64,7 @@ def create_tracker(
         synergies = synergies.truncated(chosen.components)
     tools = Toolkit(hand, config.scoring, threads, synergies)
     stages = getattr(import_module(BUILDERS[config.name]), config.name)(config, tools)
-    deadline = getattr(config, "deadline", None)
+    deadline = None
+    if isinstance(config, HybridConfig | IkConfig) and config.deadline is not None:
+        deadline = (1 - config.deadline_reserve) * config.deadline
     return StageTracker(config.name, stages, tools, config.thresholds, config.seed, deadline)

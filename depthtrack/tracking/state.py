@@ -42,6 +42,16 @@ class InterruptedSearch(NamedTuple):
     improved: Array
     centre: Array
 
+    @staticmethod
+    def put_off(centre: Array) -> "InterruptedSearch":
+        """Return a search that the next frame begins."""
+        return InterruptedSearch(0, np.empty((0, 27)), np.empty((0, 27)), centre)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there are poses to go on with."""
+        return len(self.waiting) + len(self.improved) > 0
+
 
 class TrackState:
     """Last pose, motion and energy of a track.

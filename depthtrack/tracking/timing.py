@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 
@@ -26,11 +26,13 @@ class Deadline:
     """The time at which the searches of a frame end, so that its pose is not late.
 
     ends: seconds of `clock`; infinity for none.
+    length: time that a frame has, seconds; 0 for none.
 
     The poses of frames that end by it depend on the speed of the machine.
     """
 
     ends: float = math.inf
+    length: float = 0.0
     clock: Callable[[], float] = time.perf_counter
 
     @classmethod
@@ -38,7 +40,12 @@ class Deadline:
         """Return the deadline of a frame that arrived at a time, seconds; now if NaN."""
         if milliseconds is None:
             return cls()
-        return cls((cls.clock() if math.isnan(arrived) else arrived) + 1e-3 * milliseconds)
+        length = 1e-3 * milliseconds
+        return cls((cls.clock() if math.isnan(arrived) else arrived) + length, length)
+
+    def sooner(self, share: float) -> "Deadline":
+        """Return the deadline that leaves a share of the length for work after it."""
+        return replace(self, ends=self.ends - share * self.length)
 
     @property
     def is_set(self) -> bool:

@@ -2,7 +2,7 @@
 
 import math
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,13 +15,21 @@ from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.synthesis.generate import Synthesiser
+from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.frame import FrameContext, Toolkit
-from depthtrack.tracking.options import FitRound, FitSearchOptions, GlobalSearchOptions, TrackingThresholds
+from depthtrack.tracking.options import (
+    FitRound,
+    FitSearchOptions,
+    GlobalSearchOptions,
+    RecoveryOptions,
+    TrackingThresholds,
+)
 from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.stages.recover import RecoverLocally
 from depthtrack.tracking.stages.search_in_parts import SearchInParts
 from depthtrack.tracking.stages.searches import FitSearch, search_globally
-from depthtrack.tracking.state import TrackState
+from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.timing import Deadline
 from tests.support.observations import observe
 
@@ -30,6 +38,17 @@ SEARCH = FitSearch(FitSearchOptions((FitRound(6, 8, 3), FitRound(2, None, 6))), 
 GLOBAL = GlobalSearchOptions(proposals=1500, resolution=64, synergy_share=0.5, attempts=1)
 OVER = Deadline(-math.inf)
 """A deadline that was over before the frame arrived."""
+
+
+@dataclass(frozen=True)
+class _Finds:
+    """Stage that finds one candidate."""
+
+    found: Candidate
+    name: str = "search"
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        return [self.found]
 
 
 @pytest.fixture(scope="module")
@@ -105,3 +124,30 @@ def test_a_tracker_that_is_always_late_follows_the_hand(everyday_skin: Synthesis
 def test_impossible_deadlines_are_rejected(milliseconds: float) -> None:
     with pytest.raises(InputError, match="deadline must be from 0 to"):
         IkConfig(deadline=milliseconds)
+
+
+def test_a_search_that_would_be_late_begins_in_the_next_frame(tools: Toolkit, everyday_skin: Synthesiser) -> None:
+    observation = observe(everyday_skin, 11)
+    assert not _frame(tools, observation, Deadline()).puts_search_off()
+    frame = _frame(tools, observation, Deadline(ends=10.0, length=0.03, clock=lambda: 9.99))
+    assert not frame.deadline.is_over
+    assert frame.puts_search_off()
+    assert frame.search is not None
+    assert not frame.search.has_begun
+    later = _frame(tools, observation, OVER)
+    later.state.search = frame.search
+    SearchInParts(SEARCH, GLOBAL)(later, [])
+    assert later.search is not None
+    assert later.search.has_begun
+
+
+def test_an_interrupted_search_goes_on_beside_a_track_that_fits_poorly(
+    tools: Toolkit, everyday_skin: Synthesiser
+) -> None:
+    observation, found = observe(everyday_skin, 11), Candidate(everyday_skin.poses[11], 1.0, 1.0)
+    recover = RecoverLocally(SEARCH, RecoveryOptions(every=0), elsewhere=[_Finds(found)])
+    poor = found._replace(energy=1e3)
+    frame = _frame(tools, observation, Deadline())
+    frame.state.search = InterruptedSearch.put_off(observation.centre)
+    assert recover(frame, [poor]) == [found]
+    assert frame.restarted

@@ -104,7 +104,8 @@ class RefineFingers:
 class RecoverLocally:
     """Search near the pose: at once in doubtful frames, in every n-th frame if it fits poorly.
 
-    If the pose is still doubtful then, the stages `elsewhere` run; a pose from there restarts the track.
+    If the pose is still doubtful then, the stages `elsewhere` run; a pose from there restarts the track. They also run
+    while a search goes on that the deadline interrupted.
 
     routine: smaller search of frames that are not doubtful; None for `search`.
     """
@@ -122,17 +123,20 @@ class RecoverLocally:
         doubtful = self._is_doubtful(frame, best)
         due = options.every > 0 and frame.observation.frame_index % options.every == 0
         due = due and frame.state.is_elevated(best.energy, options.elevated_ratio)
-        if not (due or doubtful):
+        goes_on = frame.state.search is not None
+        if not (due or doubtful or goes_on):
             return candidates
         search, spread = self.search, options
         if self.routine is not None and not doubtful:
             search, spread = self.routine, options.routine
-        if frame.state.search is None:
+        if not goes_on:
             proposals = local_proposals(best.pose, search.random(frame), spread)
             near = search.improve(frame, frame.evaluate(proposals, options.resolution), options.min_angle)[0]
             if near.energy < (1 if doubtful else options.accept_local) * best.energy:
                 best = near
-        if self.elsewhere and doubtful and self._is_doubtful(frame, best):
+        if self.elsewhere and (goes_on or (doubtful and self._is_doubtful(frame, best))):
+            if not goes_on and frame.puts_search_off():
+                return [best]
             found = run_stages(self.elsewhere, frame)
             if found[0].energy < options.accept_global * best.energy:
                 frame.restarted = True
@@ -170,6 +174,8 @@ class Reinitialise:
         is_due = state.search is not None or state.is_search_due(frame.observation.timestamp)
         if near and state.lost is not None and (not is_due or self._is_good(frame, near[0], state.lost)):
             return near
+        if near and frame.puts_search_off():
+            return near
         brief = state.lost is not None and state.last_trusted is not None
         found = run_stages(self.elsewhere if brief else self.start, frame)
         return near if near and found[0].energy >= self.options.accept_global * near[0].energy else found
@@ -197,8 +203,13 @@ class Reinitialise:
 
 
 def run_stages(stages: Sequence[Stage], frame: FrameContext, candidates: Sequence[Candidate] = ()) -> list[Candidate]:
-    """Return the candidates after all stages."""
+    """Return the candidates after all stages.
+
+    If the deadline interrupts a search, the stages after it do not run.
+    """
     found = list(candidates)
     for stage in stages:
         found = stage(frame, found)
+        if frame.search is not None and frame.deadline.is_over:
+            break
     return found

@@ -13,6 +13,10 @@ from depthtrack.tracking.proposals.global_ import distinct_orientations, global_
 from depthtrack.tracking.stages.coarse_to_fine import fit_in_synergies
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.state import InterruptedSearch
+from depthtrack.tracking.timing import Deadline
+
+_FOR_FIT = 0.25
+"""Share of the deadline that is left to fit the best pose so far."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +32,16 @@ class SearchInParts:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         before = frame.state.search
-        part = self._begun(frame) if before is None else _moved(before, frame)
+        part = _moved(before, frame) if before is not None and before.has_begun else self._begun(frame)
         rounds = self.search.options.rounds
         fitter, kept = frame.fitter(self.search.surface), frame.posture_kept(self.search.surface.icp)
-        found = self._scored(frame, part)
+        found, deadline = self._scored(frame, part), frame.deadline.sooner(_FOR_FIT)
         while part.turn < len(rounds):
-            part = self._improved(frame, part, rounds[part.turn], fitter, kept)
+            part = self._improved(frame, part, rounds[part.turn], fitter, kept, deadline)
             found = self._scored(frame, part)
             if not len(part.waiting):
                 part = self._next_round(part, found)
-            if frame.deadline.is_over:
+            if deadline.is_over:
                 break
         frame.search = part if part.turn < len(rounds) else None
         return found[:1]
@@ -51,13 +55,19 @@ class SearchInParts:
         return InterruptedSearch(0, chosen, np.empty((0, 27)), frame.observation.centre)
 
     def _improved(
-        self, frame: FrameContext, part: InterruptedSearch, turn: FitRound, fitter: IcpFitter, kept: float
+        self,
+        frame: FrameContext,
+        part: InterruptedSearch,
+        turn: FitRound,
+        fitter: IcpFitter,
+        kept: float,
+        deadline: Deadline,
     ) -> InterruptedSearch:
         """Return the search after fits until the deadline, one at least."""
         fitted = []
         for pose in part.waiting:
             fitted.append(fit_in_synergies(fitter, pose, frame.tools.synergies, turn, kept))
-            if frame.deadline.is_over:
+            if deadline.is_over:
                 break
         improved = np.concatenate([part.improved, np.stack(fitted)])
         return part._replace(waiting=part.waiting[len(fitted) :], improved=improved)
