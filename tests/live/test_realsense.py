@@ -55,7 +55,7 @@ def record(path: Path) -> None:
             if size == 2:
                 frame.depth_units = 0.0005
             sensor.on_video_frame(frame)
-        time.sleep(0.01)
+        time.sleep(0.05)  # a file plays at the pace at which it was recorded
     for sensor in recorded:
         sensor.stop()
         sensor.close()

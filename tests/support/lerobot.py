@@ -11,7 +11,7 @@ from PIL import Image
 
 KEY = "observation.images.front_depth"
 QUANTISATION = {"video.depth_min": 0.01, "video.depth_max": 10.0, "video.shift": 3.5, "video.use_log": True}
-LOSSLESS = {"x265-params": "lossless=1:keyint=4:log-level=none"}
+LOSSLESS = {"x265-params": "lossless=1:keyint=4:bframes=0:log-level=none"}
 
 
 def write_info(root: Path, info: Mapping[str, Any] | None = None, rate: float = 30) -> Path:
