@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import depthtrack
 from depthtrack.cli import main
 from depthtrack.errors import DamagedFrameError, InputError
 from depthtrack.recording import image_size, open_sequence
-from depthtrack.recording.run_folder import Run
 from tests.support.record3d import copy_as_r3d, metadata, write_r3d
 from tests.support.recordings import CAMERA, TIMES, colour_at, depth_at
 from tests.support.runs import synthesise
@@ -33,14 +33,10 @@ def sample(path: Path, **fields: Any) -> Path:
 def test_poses_are_those_of_the_folder_that_it_was_copied_from(tmp_path: Path) -> None:
     folder = synthesise(tmp_path / "folder", 3)
     file = copy_as_r3d(folder, tmp_path / "copy.r3d")
-    poses = []
-    for path in (folder, file):
-        run = tmp_path / f"run-{path.name}"
-        options = ["--tracker", "ik", "--hand", "average", "--side", "right"]
-        assert main(["track", str(path), "-o", str(run), *options]) == 0
-        poses.append(Run.load(run).poses)
-    assert np.isfinite(poses[0]).all()
-    np.testing.assert_allclose(poses[1], poses[0], atol=1e-9)
+    runs = [list(depthtrack.track(open_sequence(path), "average", tracker="ik")) for path in (folder, file)]
+    expected, found = (np.array([each.estimate.pose for each in run]) for run in runs)
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_depth_colour_camera_and_times_are_those_written(tmp_path: Path) -> None:
