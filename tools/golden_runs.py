@@ -20,7 +20,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from depthtrack.cli import main as depthtrack
-from depthtrack.hand.pose import POSE_SIZE
+from depthtrack.hand.pose import POSE_NAMES
 
 FRAMES = 60
 RECORDINGS = {
@@ -47,7 +47,7 @@ def digest(run: Path) -> str:
     Energies are left out: they may differ in the last bit.
     """
     with (run / "poses.csv").open(newline="", encoding="utf-8") as file:
-        rows = [[*row[:3], *row[-POSE_SIZE:]] for row in csv.reader(file)]
+        rows = [[*list(row.values())[:3], *(row[name] for name in POSE_NAMES)] for row in csv.DictReader(file)]
     return hashlib.sha256(repr(rows).encode()).hexdigest()
 
 
