@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from depthtrack.calibration.acceptance import check_resembles_hand
-from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly
+from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.residuals import CalibrationView
@@ -21,7 +21,7 @@ from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures, prior_covariance
+from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
@@ -135,7 +135,7 @@ def calibrate(
     report("done", 1.0)
     return Calibration(
         hand_of(values, side, f"calibrated on {sequence.name}"),
-        measured_sizes(values, fitted.covariance),
+        measured_sizes(values, fitted.covariance, size_covariance(joint)),
         None,
         1000 * float(np.median(before.distances)),
         1000 * float(np.median(after.distances)),
@@ -196,9 +196,12 @@ def with_usual_proportions(values: Array) -> Array:
     return out
 
 
-def measured_sizes(values: Array, covariance: Array) -> dict[str, Measured]:
-    """Return each length and width, with its standard deviation and confidence."""
-    prior = prior_covariance()
+def measured_sizes(values: Array, covariance: Array, prior: Array) -> dict[str, Measured]:
+    """Return each length and width, with its standard deviation and confidence.
+
+    values: (35,) sizes.
+    covariance, prior: (35, 35) of them, with and without the views.
+    """
     table = {}
     for name, (metres, gradient) in measures(values).items():
         variance, before = float(gradient @ covariance @ gradient), float(gradient @ prior @ gradient)

@@ -17,7 +17,7 @@ from depthtrack.calibration.solid_hands import solid_step
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import Side
-from depthtrack.hand.size_parameters import COUNT, hand_of, prior_covariance
+from depthtrack.hand.size_parameters import COUNT, hand_of, placement_covariance, prior_covariance
 from depthtrack.solver.shared_parameters import EliminatedPose, eliminate_pose, solve_free
 from depthtrack.types import Array
 
@@ -59,7 +59,7 @@ def fit_jointly(
     options = options or JointFitOptions()
     soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale
     poses, values = within_limits(poses), values.copy()
-    prior = np.linalg.inv(prior_covariance())
+    prior = np.linalg.inv(size_covariance(options))
     held = np.ones(COUNT, dtype=np.bool_)
     held[free] = False
     for k in range(iterations):
@@ -77,6 +77,14 @@ def fit_jointly(
         poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])
     return JointFit(values, np.linalg.inv(information + prior), poses, distances)
+
+
+def size_covariance(options: JointFitOptions) -> Array:
+    """Return the prior covariance (35, 35) of the sizes.
+
+    It is that among people, and that of the places of joints in their flesh.
+    """
+    return prior_covariance() + placement_covariance(options.joint_places, options.palm_flesh)
 
 
 def _eliminate(view: CalibrationView, evidence: Evidence, pose: Array, options: JointFitOptions) -> EliminatedPose:

@@ -3,7 +3,7 @@
 Views are kept from the frames that were tracked. Sizes and poses are optimised jointly in them, again and again, less
 often when the sizes stay. Each time the poses come from a hand of better sizes, and the views are spread over a longer
 time. Sizes as slow states with an uncertainty follow Tkach et al., "Online generative model personalization for hand
-tracking", SIGGRAPH Asia 2017; the prior is that of `parameters`.
+tracking", SIGGRAPH Asia 2017; the prior is that of `joint_optimisation`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.calibrate import Measured, best_views, measured_sizes, with_usual_proportions
-from depthtrack.calibration.joint_optimisation import fit_jointly
+from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import OngoingOptions
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.calibration.solid_hands import nearest_solid
@@ -87,4 +87,4 @@ def measure(views: Sequence[TrackedView], sizes: OngoingSizes, options: OngoingO
     fitted = fit_jointly(observed, poses, sizes.values, side, options.iterations, options=options.joint)
     values = nearest_solid(with_usual_proportions(fitted.values), side)
     hand = hand_of(values, side, "measured while it was tracked")
-    return OngoingSizes(values, hand, measured_sizes(fitted.values, fitted.covariance))
+    return OngoingSizes(values, hand, measured_sizes(fitted.values, fitted.covariance, size_covariance(options.joint)))

@@ -32,6 +32,13 @@ class JointFitOptions:
         "Standard deviation of a step in translation, rotation and angles; keeps what the view does not determine",
         unit="m, rad, rad",
     )
+    joint_places: tuple[float, float, float] = option(
+        (0.006, 0.003, 0.002),
+        "Standard deviation of the places of a finger's joints in its flesh, base to tip, beside that of hand sizes",
+        unit="m",
+        source="chosen on the tuning seeds of the cross-model benchmark",
+    )
+    palm_flesh: float = option(0.1, "Standard deviation of the logarithm of the palm's thickness, beside that of sizes")
     largest_change: float = option(
         0.08, "Change of the logarithm of a size in one iteration; the skin is linear within about that"
     )

@@ -82,6 +82,30 @@ def prior_covariance() -> Array:
     return C
 
 
+def placement_covariance(joints: tuple[float, float, float], thickness: float) -> Array:
+    """Return the covariance (35, 35) of sizes by the places of joints in the same flesh.
+
+    joints: standard deviations of the places of a finger's three joints along it, metres in a hand of scale 1. A joint
+        that moves outward lengthens the bone before it and shortens the one beyond.
+    thickness: standard deviation of the logarithm of the palm's thickness.
+    """
+    average = HandShape()
+    C = np.zeros((COUNT, COUNT))
+    for finger in range(5):
+        for joint, spread in enumerate(joints):
+            shift = np.zeros(COUNT)
+            shift[LENGTHS.start + 3 * finger + joint] = -1 / average.lengths[finger, joint]
+            if joint > 0:
+                shift[LENGTHS.start + 3 * finger + joint - 1] = 1 / average.lengths[finger, joint - 1]
+            elif finger > 0:
+                shift[KNUCKLES.start + 2 * (finger - 1) + 1] = 1.0
+            else:
+                shift[THUMB_BASE] = average.thumb_direction / np.linalg.norm(average.thumb_direction)
+            C += spread**2 * np.outer(shift, shift)
+    C[PALM.start + 2, PALM.start + 2] += thickness**2
+    return C
+
+
 def motion_of(model: HandModel, pose: Array, bodies: Index, points: Array) -> Array:
     """Return the derivative (N, 3, 35) of points on the skin by the sizes of `model`.
 
@@ -136,6 +160,7 @@ def measures(values: Array, reference: HandShape | None = None) -> dict[str, tup
     whole = np.eye(COUNT)[0]
     whole[LENGTHS.start + 6 : LENGTHS.start + 9] = lengths[2] / (palm + lengths[2].sum())
     whole[PALM.start + 1] = palm / (palm + lengths[2].sum())
+    whole[KNUCKLES.start + 3] = hand.scale / (palm + lengths[2].sum())
     table["hand_length"] = float(palm + lengths[2].sum()), whole
     for f, finger in enumerate(FINGERS):
         gradient = np.eye(COUNT)[0]

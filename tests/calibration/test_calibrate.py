@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
-from depthtrack.calibration.joint_optimisation import fit_jointly
-from depthtrack.calibration.options import CalibrationOptions
+from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
+from depthtrack.calibration.options import CalibrationOptions, JointFitOptions
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise
 from depthtrack.calibration.solid_hands import is_solid, nearest_solid, solid_step
 from depthtrack.calibration.views import choose_views, finger_area
@@ -171,18 +171,21 @@ def test_usual_proportions_do_not_change_the_hand() -> None:
 
 
 def test_sizes_without_observations_keep_the_prior() -> None:
-    """An open hand determines finger lengths better than a fist, and a fist better than none."""
+    """An open hand determines the hand's length better than a fist.
+
+    Straight fingers leave open where their base joints are: a finger's length begins there, the hand's at the wrist.
+    """
     frames = {"fist": POSTURES["fist"], "open": POSTURES["open"]}
-    sigma = {}
-    for name, angles in frames.items():
+    gradients = {name: g for name, (_, g) in measures(_sizes()).items() if name.endswith("_length")}
+    variances = {"nothing": {name: float(g @ size_covariance(JointFitOptions()) @ g) for name, g in gradients.items()}}
+    for posture, angles in frames.items():
         pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], angles)
         view = CalibrationView(_rendered(pose))
         fit = fit_jointly([view], pose[None], _sizes(), "right", iterations=1)
-        of_lengths = [g for measure, (_, g) in measures(_sizes()).items() if measure.endswith("_length")]
-        sigma[name] = sum(float(g @ fit.covariance @ g) for g in of_lengths)
-        sigma["nothing"] = sum(float(g @ prior_covariance() @ g) for g in of_lengths)
-    assert sigma["open"] < 0.9 * sigma["fist"]
-    assert sigma["fist"] < 0.5 * sigma["nothing"]
+        variances[posture] = {name: float(g @ fit.covariance @ g) for name, g in gradients.items()}
+    assert variances["open"]["hand_length"] < 0.9 * variances["fist"]["hand_length"]
+    of_fingers = {name: sum(each.values()) for name, each in variances.items()}
+    assert max(of_fingers["open"], of_fingers["fist"]) < 0.5 * of_fingers["nothing"]
 
 
 def test_the_true_hand_in_its_true_pose_has_no_residuals(made: Synthesiser) -> None:
