@@ -50,6 +50,10 @@ _BASES_MM = {
 _SOURCE = "depthtrack default: Buryanov and Kotiuk 2010; Greiner 1991; Garrett 1971; Youm et al. 1978"
 
 
+CALIBRATED = 0.004
+"""Metres: uncertainty of calibrated hands. Source: see `tools/fit_confidence.py`."""
+
+
 @dataclass(frozen=True)
 class HandShape:
     """Sizes of one hand, and the file of its surface if that is a user's rigged mesh.
@@ -62,6 +66,8 @@ class HandShape:
     bases: (5, 3) base joints.
     thumb_direction, thumb_pad: (3,) directions of the resting thumb and of its pad.
     rig: the mesh that the sizes were measured on; None if the surface is built from the sizes (`Skin.of`).
+    uncertainty: standard deviation of a point of the person's hand from that of this one in the same pose, metres. By
+        default it is that of a calibrated hand; 0 for the true one.
 
     Raises:
         InputError: if a size, the scale or the side is out of range.
@@ -81,6 +87,7 @@ class HandShape:
     wrist_thickness: float = 0.039
     source: str = _SOURCE
     rig: RigFile | None = None
+    uncertainty: float = CALIBRATED
 
     def __post_init__(self) -> None:
         if self.side not in get_args(Side):
@@ -92,6 +99,8 @@ class HandShape:
             object.__setattr__(self, name, array)
             if array.shape != shape or not np.all(np.isfinite(array)):
                 raise InputError(f"hand {name} must be {shape} finite numbers, found shape {array.shape}")
+        if not 0 <= self.uncertainty <= 0.1:
+            raise InputError(f"hand uncertainty must lie between 0 and 100 mm, found {1000 * self.uncertainty!r}")
         sizes = np.concatenate([self.lengths.ravel(), self.radii.ravel(), [getattr(self, n) for n in _PALM_SIZES]])
         if sizes.min() < 1e-4 or sizes.max() > 0.5 or np.abs(self.bases).max() > 0.5:
             raise InputError("hand sizes must lie between 0.1 and 500 mm; is the file in millimetres?")
@@ -140,6 +149,7 @@ class HandShape:
                 for f, finger in enumerate(FINGERS)
             },
             "source": self.source,
+            **({} if self.uncertainty == CALIBRATED else {"uncertainty_mm": _mm(self.uncertainty)}),
             **({} if self.rig is None else {"rig": self.rig.to_fields()}),
         }
 
@@ -171,6 +181,7 @@ class HandShape:
             thumb_direction=_frozen(fields["thumb_at_rest"]["direction"]),
             thumb_pad=_frozen(fields["thumb_at_rest"]["pad"]),
             source=str(fields.get("source", "")),
+            uncertainty=float(fields.get("uncertainty_mm", 1000 * CALIBRATED)) / 1000,
             rig=None if fields.get("rig") is None else RigFile.from_fields(fields["rig"]),
             **{name: float(fields["palm"][f"{name}_mm"]) / 1000 for name in _PALM_SIZES},
         )

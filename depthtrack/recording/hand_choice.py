@@ -37,4 +37,4 @@ def chosen_hand(sequence: Sequence, hand: str | None = None, side: Side | None =
         raise InputError(
             f"the recording {sequence.name} shows a {own.side} hand, but --side {side} was given: leave it out"
         )
-    return own
+    return own.with_(uncertainty=0.0)

@@ -67,7 +67,7 @@ def evidence_of(pose: Array, rendered: Depth, target: Target, bones: BonesInView
     return Evidence(
         energy=math.log(max(energy, 1e-3)),
         unexplained=unexplained_share(rendered, target, float(pose[2])),
-        spread=math.log(1e3 * float(bones.spread.max())),
+        spread=math.log(1e3 * bones.widest),
         posture=bones.posture,
     )
 

@@ -1,9 +1,9 @@
 """Spread of the keypoints: how far each of them may be from the truth.
 
 A point of a bone is measured if its own flesh is what the camera sees, at the depth of the posed hand. The pose has a
-normal distribution. Its precision is the sum of J^T J / MEASURED^2 over the measured points, plus that of a prior from
+normal distribution. Its precision is the sum of J^T J / s^2 over the measured points, plus that of a prior from
 synergies. The sum is the matrix of Gauss-Newton (Schroeder et al. 2014, Eq. 4). Hidden fingers therefore spread like
-common postures that share their visible parts.
+common postures that share their visible parts. The standard deviation s is the uncertainty of the hand's sizes.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 from depthtrack.compilation import compiled
 from depthtrack.hand.compiled_kinematics import BodyPoses, endpoints
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel, body_of
-from depthtrack.hand.shape import HandShape
+from depthtrack.hand.shape import CALIBRATED, HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.rendering.visibility import FLESH, points_in_view
 from depthtrack.solver.point_spread import point_spread
@@ -21,8 +21,8 @@ from depthtrack.solver.prior import prior_energy
 from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.types import Array, Depth, Mask
 
-MEASURED = 0.004
-"""Metres: standard deviation of a measured point. Source: see `tools/fit_confidence.py`."""
+LEAST = 0.0004
+"""Metres: standard deviation of a measured point of a true hand, chosen on `synth random`, seeds 200 to 203."""
 AGREES = 0.01
 """Metres: largest difference of rendered and observed depth at a measured point."""
 OWN_FLESH = 0.003
@@ -41,12 +41,14 @@ class BonesInView(NamedTuple):
     differences: (5, 3, 2) of rendered and observed depth around it, clipped, metres.
     spread: (21,) root mean square distance of the keypoints from the truth, metres. A normal distribution has about
         68 % of its points closer than that, in one dimension or three.
+    widest: largest spread of a keypoint if the hand were a calibrated one. The confidence depends on it.
     posture: distance of the finger angles from common postures, in standard deviations.
     """
 
     visible: Mask
     differences: Array
     spread: Array
+    widest: float
     posture: float
 
     @property
@@ -78,8 +80,11 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
         # Bones lie inside the fingers: none is behind an object that does not hide its finger.
         visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
     measured = visible & own & (differences < AGREES)
-    spread = keypoint_spread(model, bodies, ends, points, measured)
-    return BonesInView(visible, differences, spread, float(np.sqrt(2 * prior_energy(pose, common_postures()))))
+    posture, uncertainty = float(np.sqrt(2 * prior_energy(pose, common_postures()))), model.shape.uncertainty
+    usual = spread = keypoint_spread(model, bodies, ends, points, measured, CALIBRATED)
+    if uncertainty != CALIBRATED:
+        spread = keypoint_spread(model, bodies, ends, points, measured, max(LEAST, uncertainty))
+    return BonesInView(visible, differences, spread, float(usual.max()), posture)
 
 
 def bone_radii(shape: HandShape) -> Array:
@@ -88,12 +93,15 @@ def bone_radii(shape: HandShape) -> Array:
     return np.stack([radii[:, 1:], (radii[:, 1:] + radii[:, :-1]) / 2], axis=2)
 
 
-def keypoint_spread(model: HandModel, bodies: BodyPoses, ends: Array, points: Array, measured: Mask) -> Array:
+def keypoint_spread(
+    model: HandModel, bodies: BodyPoses, ends: Array, points: Array, measured: Mask, uncertainty: float
+) -> Array:
     """Return the root mean square distance (21,) of the keypoints from the truth, metres.
 
     ends: (5, 4, 3) endpoints of the phalanges, metres, camera frame.
     points: (5, 3, 2, 3) far end and middle of each bone, metres, camera frame.
     measured: (5, 3, 2) which of them are measured; the palm always is.
+    uncertainty: standard deviation of a measured point, metres.
     """
     palm, keypoints = bodies.T[0], np.empty((21, 3))
     keypoints[0], keypoints[1:] = palm[:, :3] @ model.shape.wrist + palm[:, 3], ends.reshape(20, 3)
@@ -101,7 +109,15 @@ def keypoint_spread(model: HandModel, bodies: BodyPoses, ends: Array, points: Ar
     at = np.concatenate([points.reshape(-1, 3)[seen], keypoints[_PALM]])
     fixed_to = np.append(_BODIES[seen], KEYPOINT_BODIES[_PALM])
     return np.asarray(
-        point_spread(bodies, common_postures().precision, MEASURED, fixed_to, at, KEYPOINT_BODIES, keypoints)
+        point_spread(
+            bodies,
+            common_postures().precision,
+            uncertainty,
+            fixed_to,
+            at,
+            KEYPOINT_BODIES,
+            keypoints,
+        )
     )
 
 

@@ -30,8 +30,8 @@ def recording(folder: Path) -> Sequence:
 def test_true_sizes_are_used_only_by_name(recording: Sequence) -> None:
     assert chosen_hand(recording) == HandShape()
     assert chosen_hand(recording, side="left") == HandShape(side="left")
-    assert chosen_hand(recording, "truth") == TRUE_HAND
-    assert chosen_hand(recording, "truth", "left") == TRUE_HAND
+    assert chosen_hand(recording, "truth") == TRUE_HAND.with_(uncertainty=0.0)
+    assert chosen_hand(recording, "truth", "left").uncertainty == 0
 
 
 def test_a_file_gives_its_hand(recording: Sequence, tmp_path: Path, own_glb: Path) -> None:

@@ -37,7 +37,7 @@ def test_evidence_counts_what_the_hand_leaves_unexplained(everyday_skin: Synthes
     target = Target(observation.camera, observation.silhouette, observation.depth)
     spread = np.full(21, 0.002)
     spread[7] = 0.05
-    bones = BonesInView(np.ones((5, 3, 2), dtype=np.bool_), np.zeros((5, 3, 2)), spread, 4.0)
+    bones = BonesInView(np.ones((5, 3, 2), dtype=np.bool_), np.zeros((5, 3, 2)), spread, float(spread.max()), 4.0)
 
     def evidence(rendered: np.ndarray) -> Evidence:
         return evidence_of(everyday_skin.poses[20], rendered, target, bones, 0.2)

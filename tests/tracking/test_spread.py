@@ -18,7 +18,6 @@ from depthtrack.tracking.posture_prior import common_postures
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.spread import (
     CLIPPED,
-    MEASURED,
     BonesInView,
     bone_radii,
     bones_in_view,
@@ -45,7 +44,7 @@ def points_of(pose: Array) -> Array:
 
 def spread_of(pose: Array, measured: Mask) -> Array:
     ends = MODEL.endpoints(pose).reshape(5, 4, 3)
-    return keypoint_spread(MODEL, BodyPoses.at(MODEL.chain, pose), ends, points_of(pose), measured)
+    return keypoint_spread(MODEL, BodyPoses.at(MODEL.chain, pose), ends, points_of(pose), measured, HAND.uncertainty)
 
 
 def compared_with(points: Array, rendered: Depth, target: Target) -> tuple[Mask, Mask, Array]:
@@ -69,8 +68,8 @@ def view_of(posture: str, skin: Synthesiser) -> BonesInView:
 def test_folded_fingers_are_hidden_behind_the_back_of_the_hand(everyday_skin: Synthesiser) -> None:
     shown, hidden = (view_of(posture, everyday_skin) for posture in ("open", "fist"))
     assert shown.finger_visibility[1:].mean() > hidden.finger_visibility[1:].mean()
-    assert shown.spread.max() < 2 * MEASURED
-    assert hidden.spread.max() > 2 * MEASURED
+    assert shown.spread.max() < 2 * HAND.uncertainty
+    assert hidden.spread.max() > 2 * HAND.uncertainty
     palm = [0, 5, 9, 13, 17]
     np.testing.assert_allclose(shown.spread[palm], hidden.spread[palm], rtol=0.5)
     assert np.all(shown.differences[shown.visible] == 0)
@@ -100,7 +99,7 @@ def test_a_finger_that_is_not_measured_spreads_alone(finger: int) -> None:
     assert np.all(less[hidden] > 2 * whole[hidden])
     assert np.all(np.diff(less[hidden]) > 0)
     others = np.setdiff1d(np.arange(21), hidden)
-    np.testing.assert_allclose(less[others], whole[others], atol=MEASURED / 2)
+    np.testing.assert_allclose(less[others], whole[others], atol=HAND.uncertainty / 2)
 
 
 def test_the_spread_is_that_of_sampled_poses() -> None:
@@ -148,7 +147,7 @@ def test_the_spread_is_that_of_the_dense_precision() -> None:
     joints = MODEL.point_jacobian(pose, KEYPOINT_BODIES, MODEL.keypoints(pose))
     bones = MODEL.point_jacobian(pose, bodies, points_of(pose).reshape(-1, 3))
     J = np.concatenate([bones[measured.ravel()], joints[[0, 1, 5, 9, 13, 17]]]).reshape(-1, 26)
-    precision = J.T @ J / MEASURED**2
+    precision = J.T @ J / HAND.uncertainty**2
     precision[6:, 6:] += common_postures().precision
     expected = np.sqrt(np.einsum("nki,ij,nkj->n", joints, np.linalg.inv(precision), joints))
     np.testing.assert_allclose(spread_of(pose, measured), expected, rtol=1e-9)
@@ -176,3 +175,14 @@ def test_points_are_compared_as_in_numpy(everyday_skin: Synthesiser) -> None:
                 elif there > 0:
                     parts.append(min(abs(float(rendered[j, i]) - float(there)), CLIPPED))
         assert found == pytest.approx(np.mean(parts) if parts else CLIPPED)
+
+
+def test_the_true_hand_spreads_less_and_is_trusted_alike(everyday_skin: Synthesiser) -> None:
+    observation, pose, true = observe(everyday_skin, 20), everyday_skin.poses[20], HAND.with_(uncertainty=0.0)
+    with closing(create_tracker(tracker_config("ik"), HAND)) as tracker:
+        tracker._tools.set_target(observation)
+        rendered = tracker._tools.scorer.render(pose)
+    usual, known = (bones_in_view(HandModel(hand), pose, rendered, observation) for hand in (HAND, true))
+    assert np.all(known.spread < usual.spread)
+    assert known.spread.min() < HAND.uncertainty / 4
+    assert known.widest == usual.widest == usual.spread.max()
