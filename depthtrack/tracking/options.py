@@ -31,7 +31,7 @@ class TrackingThresholds:
 
     confidence: float = option(
         0.025,
-        "A start with a lower confidence is lost, and a track after two such frames",
+        "A start with a lower confidence is lost, and a track with a lower geometric mean of the last two",
         source="half of the lowest confidence of a good pose among the tuning recordings of the cross-model benchmark",
         most=1,
     )

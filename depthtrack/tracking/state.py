@@ -79,13 +79,12 @@ class TrackState:
         self.lost: Estimate | None = None
         self._lost_since, self._previous = math.nan, math.nan
 
-    def is_lost(self, energy: float, agreement: float, confidence: float = math.nan, previous: float = 0.0) -> bool:
+    def is_lost(self, energy: float, agreement: float, confidence: float = math.nan) -> bool:
         """Return whether a pose with these figures is not trusted.
 
-        confidence: NaN if unknown; a low one counts only if it was as low in the frame before.
-        previous: confidence of the frame before; 0 for a start.
+        confidence: NaN if unknown.
         """
-        if max(confidence, previous) < self._thresholds.confidence:
+        if confidence < self._thresholds.confidence:
             return True
         return self.is_beyond(energy, agreement, self._thresholds.energy, self._thresholds.agreement)
 
@@ -134,9 +133,10 @@ class TrackState:
 
         seen: energy and agreement that decide this; those of the pose if None.
         """
-        previous = self._confidence if status is Status.TRACKED else 0.0
         judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
-        if self.is_jump(pose, timestamp) or self.is_lost(*judged, confidence, previous):
+        # Two doubtful frames are worth one that is certainly wrong.
+        certain = math.sqrt(confidence * self._confidence) if status is Status.TRACKED else confidence
+        if self.is_jump(pose, timestamp) or self.is_lost(*judged, certain):
             status = Status.LOST
         figures = confidence, visibility, spread, branches
         estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures)

@@ -6,6 +6,9 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.postures import POSTURES
+from depthtrack.recording.status import Status
 from depthtrack.rendering.target import Target
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.confidence import (
@@ -14,8 +17,10 @@ from depthtrack.tracking.confidence import (
     evidence_of,
     fitted_model,
 )
+from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.spread import BonesInView
+from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
 
 
@@ -66,3 +71,24 @@ def test_estimates_have_a_confidence_that_resumes(everyday_skin: Synthesiser, na
         assert 0 < one.confidence < 1
         assert np.all(np.array(one.spread) > 0)
         assert (one.confidence, one.visibility, one.spread) == (other.confidence, other.visibility, other.spread)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "status"),
+    [
+        (0.3, 0.01, Status.TRACKED),
+        (0.03, 0.0004, Status.LOST),
+        (0.03, 0.025, Status.TRACKED),
+        (0.9, 1e-9, Status.LOST),
+        (math.nan, 0.0, Status.TRACKED),
+    ],
+)
+def test_a_track_is_lost_by_the_confidence_of_two_frames(first: float, second: float, status: Status) -> None:
+    state, pose = TrackState(TrackingThresholds(), 40.0), make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
+    assert state.commit(pose, 4.0, 0.9, Status.STARTED, {}, 0.0, first).status is Status.STARTED
+    assert state.commit(pose, 4.0, 0.9, Status.TRACKED, {}, 0.03, second).status is status
+
+
+def test_a_start_of_low_confidence_is_lost() -> None:
+    state, pose = TrackState(TrackingThresholds(), 40.0), make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
+    assert state.commit(pose, 4.0, 0.9, Status.STARTED, {}, 0.0, 0.02).status is Status.LOST
