@@ -159,8 +159,8 @@ def _search_beyond(groups, j, point, visible, cells, least, slant):
     """Return the row of the visible point closest to sorted point j, or FAR for none.
 
     The cells beside its own have been searched. Further ones are searched in growing squares, until no point beyond can
-    be closer or no cell is left. The cells of a row are contiguous in memory. A load of sixteen points may include further cells, whose
-    points are valid too.
+    be closer or no cell is left. The cells of a row are contiguous in memory. A load of sixteen points may include
+    further cells, whose points are valid too.
     """
     first, table = visible.first, visible.table
     px, py, pz = groups.place[0, j], groups.place[1, j], groups.place[2, j]
