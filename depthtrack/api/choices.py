@@ -8,6 +8,7 @@ from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.geometry.camera_files import read_camera
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.depth_checks import check_depth
 from depthtrack.recording.hand_choice import AVERAGE, chosen_hand
 from depthtrack.recording.reading import ReadingOptions, TimeUnit
 from depthtrack.recording.registry import open_sequence
@@ -71,6 +72,18 @@ def open_recording(
 def as_recording(recording: Recording) -> Sequence:
     """Return the recording itself, opened if it is a path. Raises InputError."""
     return open_sequence(recording) if isinstance(recording, str | Path) else recording
+
+
+def to_track(recording: Recording) -> Sequence:
+    """Return the recording, in which a hand is to be tracked. One that is open already is not checked.
+
+    Raises:
+        InputError: if it cannot be read, or its depth cannot be right.
+    """
+    sequence = as_recording(recording)
+    if sequence is not recording:
+        check_depth(sequence)
+    return sequence
 
 
 def path_of(recording: Sequence) -> Path:

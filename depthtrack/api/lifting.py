@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from depthtrack.api.choices import Hand, Recording, as_recording, open_hand
+from depthtrack.api.choices import Hand, Recording, open_hand, to_track
 from depthtrack.api.runs import track
 from depthtrack.calibration.lifted_hand import measure_lifted_hand
 from depthtrack.hand.shape import Side
@@ -41,7 +41,7 @@ def lift(
         run = depthtrack.lift("my-hand", "keypoints.csv", out="my-run")
         print(depthtrack.joint_track(run).keypoints[:, 8])
     """
-    sequence = as_recording(recording)
+    sequence = to_track(recording)
     if hand is None:
         chosen = measure_lifted_hand(sequence, read_keypoints(Path(keypoints)), side).hand
     else:

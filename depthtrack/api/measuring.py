@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from depthtrack.api.choices import Hand, Recording, as_recording, open_hand
+from depthtrack.api.choices import Hand, Recording, open_hand, to_track
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.calibrate import calibrate as calibrate_side
 from depthtrack.calibration.pose_search import Progress, ScorerFactory
@@ -48,7 +48,7 @@ def calibrate(
         Path("hand.json").write_text(calibration.to_json())
         depthtrack.track("my-hand", calibration.hand, out="my-run")
     """
-    sequence = as_recording(recording)
+    sequence = to_track(recording)
     threads = threads or usable_cores()
     if side is None:
         return calibrate_either_side(sequence, segmentation, seed, threads, frames, progress)
@@ -77,7 +77,7 @@ def calibrate_rig(
         calibration = depthtrack.calibrate_rig("my-hand", "hand.glb")
         print(calibration.hand.scale)
     """
-    sequence, hand = as_recording(recording), open_hand(rig)
+    sequence, hand = to_track(recording), open_hand(rig)
     views = _views(sequence, segmentation, progress)
     return calibrate_rig_on_views(views, hand, _scorers(threads), seed, f"scaled on {sequence.name}", progress)
 

@@ -9,11 +9,11 @@ from depthtrack.api.choices import (
     Hand,
     Recording,
     as_config,
-    as_recording,
     measured_hand,
     on_damage_of,
     open_hand,
     path_of,
+    to_track,
 )
 from depthtrack.evaluation.evaluate import Evaluation
 from depthtrack.evaluation.evaluate import evaluate as evaluate_replay
@@ -100,7 +100,7 @@ def track(
             print(each.frame.timestamp, each.estimate.status, each.estimate.pose)
         run = depthtrack.track("my-hand", "hand.json", out="my-run")
     """
-    sequence, threads = as_recording(recording), threads or usable_cores()
+    sequence, threads = to_track(recording), threads or usable_cores()
     configuration = configure(
         path_of(sequence),
         sequence,

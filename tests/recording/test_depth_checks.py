@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import depthtrack as dt
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
@@ -167,6 +168,12 @@ def test_a_stated_unit_is_taken_in_place_of_that_of_the_camera(tmp_path: Path) -
     check_depth(open_sequence(path, reading=ReadingOptions(depth_scale=0.0002)))
     with pytest.raises(InputError, match=r"--depth-scale 0\.001.*if 0\.2 mm is right"):
         check_depth(open_sequence(path))
+
+
+@pytest.mark.parametrize("use", [dt.track, dt.calibrate])
+def test_functions_refuse_depth_as_the_commands_do(tmp_path: Path, use: Callable[[Path], object]) -> None:
+    with pytest.raises(InputError, match=r"--depth-scale 0\.001"):
+        use(written(tmp_path / "made", scene(), 0.0002))
 
 
 def test_a_run_that_explains_little_in_every_frame_is_reported(tmp_path: Path) -> None:
