@@ -75,7 +75,9 @@ def as_recording(recording: Recording) -> Sequence:
 
 
 def to_track(recording: Recording) -> Sequence:
-    """Return the recording, in which a hand is to be tracked. One that is open already is not checked.
+    """Return the recording, in which a hand is to be tracked.
+
+    One that is open already is not checked.
 
     Raises:
         InputError: if it cannot be read, or its depth cannot be right.
