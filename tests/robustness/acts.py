@@ -4,12 +4,14 @@ import contextlib
 import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
+from depthtrack.calibration.marker_solution import solve_capture
 from depthtrack.cli import main
 from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.files import write_atomic
@@ -20,12 +22,12 @@ from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.status import Status
 from depthtrack.recording.writer import SequenceWriter
 
-_CALIBRATED: dict[str, Any] = {}
+_SOLVED: dict[str, Any] = {}
 
 
 def command(arguments: list[str]) -> int:
     """Run a command of depthtrack."""
-    with _calibrated_once():
+    with _solved_once():
         return main(arguments)
 
 
@@ -78,13 +80,19 @@ def _write_run(folder: Path) -> None:
 
 
 @contextmanager
-def _calibrated_once() -> Iterator[None]:
-    """Measure a hand once: what is tried is how it is written."""
-
-    def remembered(*arguments: Any, **options: Any) -> Any:
-        if "hand" not in _CALIBRATED:
-            _CALIBRATED["hand"] = calibrate_sequence(*arguments, **options)
-        return _CALIBRATED["hand"]
-
-    with mock.patch("depthtrack.cli.calibrate.calibrate_sequence", remembered):
+def _solved_once() -> Iterator[None]:
+    """Measure a hand and label a capture once: what is tried is how the results are written."""
+    solvers: dict[str, Callable[..., Any]] = {
+        "depthtrack.cli.calibrate.calibrate_sequence": calibrate_sequence,
+        "depthtrack.calibration.marker_solution.solve_capture": solve_capture,
+    }
+    with contextlib.ExitStack() as stack:
+        for target, solve in solvers.items():
+            stack.enter_context(mock.patch(target, partial(_remembered, target, solve)))
         yield
+
+
+def _remembered(name: str, solve: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    if name not in _SOLVED:
+        _SOLVED[name] = solve(*arguments, **options)
+    return _SOLVED[name]

@@ -24,7 +24,13 @@ Contents = dict[str, bytes]
 """Files below a folder, by relative path."""
 _TIMES = {"timings.csv", "results.json", "results.csv", "report.html", "budgets.jsonl", "run.json", "done.json"}
 """Files that hold times, which differ between equal runs."""
-_INPUTS = ("recording", "run", "moving", "capture")
+_INPUTS = {
+    "recording": ("synth", "everyday", "recording", "--frames", "2", "--model", "skin"),
+    "run": ("track", "recording", "-o", "run", "--hand", "truth", "--tracker", "ik", "--threads", "1"),
+    "moving": ("synth", "everyday", "moving", "--frames", "8", "--fps", "6", "--model", "skin"),
+    "capture": ("synth", "everyday", "capture", "--markers", "13", "--frames", "8"),
+}
+"""Commands that make the inputs, by name."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,7 @@ def scenarios(short: bool) -> list[Scenario]:
         Scenario("markers link .csv", ("markers", "link", *capture, "OUT.csv"), old=True),
         Scenario("markers cut .c3d", ("markers", "cut", *capture, "OUT.c3d", "--frames", "2", "3"), old=True),
         Scenario("markers cut .trc", ("markers", "cut", *capture, "OUT.trc", "--frames", "2", "3"), old=True),
-        Scenario("markers label", ("markers", "label", *capture, "OUT", "-m", "13", "--no-pictures"), resumes=True),
+        Scenario("markers label", ("markers", "label", *capture, "OUT", "-m", "13")),
         Scenario("markers model", ("markers", "model", *capture, "OUT", "--body", "{labels}"), old=True),
         Scenario("synth --markers", ("synth", "everyday", "OUT", "--markers", "13", "--frames", "4", "--seed", "3")),
     ]
@@ -104,20 +110,12 @@ def _exported() -> dict[str, str]:
 class Campaign:
     """All failures of all scenarios, in a folder."""
 
-    def __init__(self, folder: Path, short: bool) -> None:
-        self._folder, self._short = folder, short
-        if short:
-            return
-        for arguments in (
-            ("synth", "everyday", "recording", "--frames", "2", "--model", "skin"),
-            ("track", "recording", "-o", "run", "--hand", "truth", "--tracker", "ik", "--threads", "1"),
-            ("synth", "everyday", "moving", "--frames", "8", "--fps", "6", "--model", "skin"),
-            ("synth", "everyday", "capture", "--markers", "13", "--frames", "8"),
-        ):
-            self._here(Scenario("", arguments))
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
 
     def run(self, scenario: Scenario) -> Tally:
         """Let each operation of a command fail in each way."""
+        self._make_inputs(scenario.arguments)
         scenario = replace(scenario, arguments=tuple(self._filled(scenario.arguments)))
         reference, operations = self._reference(scenario)
         tally = Tally(operations=len(operations), faults=[])
@@ -131,6 +129,14 @@ class Campaign:
                 for found in self._problems(scenario, fault, ended, before, reference):
                     tally.faults = [*(tally.faults or ()), f"{fault} at {at}, {operations[at - 1]}: {found}"]
         return tally
+
+    def _make_inputs(self, arguments: tuple[str, ...]) -> None:
+        """Make the inputs that arguments name, and those of them in turn."""
+        for part in arguments:
+            name = part.partition("/")[0]
+            if name in _INPUTS and not (self._folder / name).exists():
+                self._make_inputs(tuple(each for each in _INPUTS[name] if each != name))
+                self._here(Scenario("", _INPUTS[name]))
 
     def _reference(self, scenario: Scenario) -> tuple[Contents, list[str]]:
         """Return what the command writes if nothing fails, and its operations."""
@@ -175,6 +181,7 @@ class Campaign:
             return
         (out,) = {part for part in scenario.arguments if part.startswith("OUT")}
         if scenario.name.startswith("synth"):
+            self._make_inputs(("recording",))
             shutil.copytree(self._folder / "recording", self._folder / out)
         elif scenario.act is write_recording:
             quiet(write_recording, ["OUT", "1"], self._folder)
@@ -232,7 +239,7 @@ def run(short: bool, names: list[str], show: Callable[[str], None] = print) -> b
     """
     found = False
     with TemporaryDirectory() as folder:
-        campaign = Campaign(Path(folder), short)
+        campaign = Campaign(Path(folder))
         show(f"{'command':24}{'operations':>12}{'runs':>8}{'kills':>8}{'faults':>10}")
         for scenario in scenarios(short):
             if names and scenario.name not in names:

@@ -41,7 +41,6 @@ def solve_and_write(
     from depthtrack.calibration.marker_solution import solve_capture
     from depthtrack.cli.markers.report_text import print_report
     from depthtrack.cli.progress import percent_bar
-    from depthtrack.markers.initialisation.started import save_started
     from depthtrack.options import to_data
 
     models = command.model.load()
@@ -66,9 +65,8 @@ def solve_and_write(
         "labelling": to_data(command.labelling_options),
     }
     measured: dict[str, Any] = {"sizes": _sizes(solution), "measured_sides": solution.measured_sides(models)}
-    command.folder.write(solution.labelled, command.capture.path, configuration | measured)
+    command.folder.write(solution.labelled, command.capture.path, configuration | measured, started=solution.started)
     if solution.started is not None:
-        save_started(solution.started, command.folder.out / "start.json")
         measured["start"] = solution.started.confidence
     print_report(command.folder.out, solution.labelled, command.json, **measured)
 

@@ -1,9 +1,7 @@
-"""Write a marker folder.
+"""Write a marker folder, complete or absent; the same input gives the same bytes."""
 
-The same input gives the same bytes. `markers.json` is the last file, so that a folder with it is complete.
-"""
-
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from depthtrack.errors import InputError
-from depthtrack.files import write_atomic
+from depthtrack.files import new_folder, write_atomic
 from depthtrack.markers.capture import MarkerCapture
 from depthtrack.markers.filled_capture import FilledCapture, Filling
 from depthtrack.markers.folder.contents import (
@@ -28,7 +26,6 @@ from depthtrack.markers.folder.hand_run import write_hand_run
 from depthtrack.markers.folder.tables import check_labels, write_rigid_poses, write_values
 from depthtrack.markers.formats.registry import write_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
-from depthtrack.outputs import locked
 from depthtrack.tracking.run_configuration import versions
 
 
@@ -52,22 +49,33 @@ def write_marker_folder(
     Raises:
         InputError: if the folder holds markers already, a name cannot be that of a file, or a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder):
+    with new_marker_folder(folder) as work:
+        write_marker_files(work, labelled, source, configuration, truth, suffix, filled)
+
+
+@contextmanager
+def new_marker_folder(folder: Path) -> Iterator[Path]:
+    """Yield a hidden folder to fill, which becomes `folder` if the block succeeds.
+
+    Raises:
+        InputError: if the folder is in use, or cannot be written.
+    """
+    check_unused(folder)
+    with new_folder(folder, CONTENTS_FILE, "a marker folder", overwrite=False) as work:
+        yield work
         check_unused(folder)
-        _write(folder, labelled, source, configuration or {}, truth, suffix, filled)
 
 
-def _write(
+def write_marker_files(
     folder: Path,
     labelled: LabelledCapture,
-    source: Source | None,
-    configuration: Mapping[str, Any],
-    truth: LabelledCapture | None,
-    suffix: str,
-    filled: FilledCapture | None,
+    source: Source | None = None,
+    configuration: Mapping[str, Any] | None = None,
+    truth: LabelledCapture | None = None,
+    suffix: str = ".csv",
+    filled: FilledCapture | None = None,
 ) -> None:
-    """Write the files of a folder."""
+    """Write the files of `write_marker_folder` to a folder from `new_marker_folder`."""
     if filled is not None:
         labelled = _measured(filled)
     capture = labelled.capture
@@ -78,14 +86,14 @@ def _write(
         first_frame=capture.first_frame,
         models=tuple(model.name for model in labelled.models),
         source=source,
-        configuration=configuration,
+        configuration=configuration or {},
         filled=filled is not None,
         notes=capture.notes,
         versions=versions(),
     )
     written = labelled.labelled() if filled is None else filled.capture()
     check_labels(written.labels)
-    (folder / MODELS).mkdir(parents=True, exist_ok=True)
+    (folder / MODELS).mkdir()
     write_capture(folder / contents.labelled, _joined(written, labelled.rest()))
     residuals = [labelled.residuals(k) for k in range(len(labelled.models))]
     first = capture.first_frame
