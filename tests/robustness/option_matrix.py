@@ -37,15 +37,20 @@ _LIMIT = 120.0
 
 @dataclass(frozen=True)
 class Case:
-    """A command with one option at an end of its range, or beyond."""
+    """A command with one option at an end of its range, or beyond.
+
+    beyond: range of the option if it is beyond.
+    """
 
     arguments: tuple[str, ...]
-    is_beyond: bool
+    beyond: Range | None = None
 
     def problem(self, code: int, output: str, error: str) -> str | None:
         """Return what is wrong with the end of the command, if anything."""
         orderly = code == 0 or (code == 2 and len(error.strip().splitlines()) == 1 and "Traceback" not in error)
-        if not orderly or (self.is_beyond and code != 2):
+        # The refusal must be that of the range, and of no other argument.
+        is_refused = code == 2 and f"must be {self.beyond}, found " in error
+        if not orderly or (self.beyond is not None and not is_refused):
             return f"ended with {code}: {error[-300:]}"
         if code == 0 and "--json" in self.arguments and not _is_strict(output):
             return "printed no strict JSON"
@@ -57,7 +62,7 @@ def cases(name: str) -> Iterator[Case]:
     base = (MATRIX["commands"] | MATRIX["refused_before_work"])[name]
     runs = name in MATRIX["commands"]
     if runs:
-        yield Case(tuple(base), False)
+        yield Case(tuple(base))
     for flag, numbers, found in _options(name):
         short = flag.rpartition(".")[2].removeprefix("--")
         ends = [(found.least - max(1, abs(found.least)), True)]
@@ -70,7 +75,7 @@ def cases(name: str) -> Iterator[Case]:
         for value, is_beyond in ends:
             # Whole numbers above 2^53 have no exact float.
             text = str(value) if isinstance(value, int) else f"{value:.17g}"
-            yield Case((*base, flag, *[text] * numbers), is_beyond)
+            yield Case((*base, flag, *[text] * numbers), found if is_beyond else None)
 
 
 def _options(name: str) -> Iterator[tuple[str, int, Range]]:

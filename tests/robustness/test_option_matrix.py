@@ -1,5 +1,6 @@
 """The matrix of options covers all commands; `make robustness` runs it."""
 
+from depthtrack.ranges import Range
 from tests.robustness.option_matrix import MATRIX, Case, cases, entries
 
 
@@ -9,16 +10,17 @@ def test_every_command_is_in_the_matrix() -> None:
 
 def test_every_number_has_cases_beyond_its_range() -> None:
     found = list(cases("track"))
-    beyond = {case.arguments[-2] for case in found if case.is_beyond}
+    beyond = {case.arguments[-2] for case in found if case.beyond}
     assert {"--particles", "--seed", "--segmentation.farthest"} <= beyond
     assert len(beyond) > 150
-    assert sum(not case.is_beyond for case in found) > 150
+    assert sum(case.beyond is None for case in found) > 150
 
 
 def test_what_a_case_must_give() -> None:
-    usual, beyond = Case(("info", "S", "--json"), False), Case(("info", "S"), True)
+    usual, beyond = Case(("info", "S", "--json")), Case(("info", "S"), Range(1, 10))
     assert usual.problem(0, '{"x": 1}', "") is None
     assert usual.problem(0, '{"x": NaN}', "") == "printed no strict JSON"
     assert usual.problem(1, "", "Traceback") is not None
     assert beyond.problem(0, "", "") is not None
+    assert beyond.problem(2, "", "depthtrack info: there is no recording at S\n") is not None
     assert beyond.problem(2, "", "depthtrack info: --sample must be from 1 to 10, found 0\n") is None
