@@ -194,11 +194,12 @@ def _estimate(
     after = _distances(parameters, values, poses, points)
     misfit = max(1.0, float(np.sqrt(np.nanmedian(after**2) / 3)) / options.noise)
     covariance = misfit**2 * np.linalg.inv(information)
-    spread = np.sqrt(options.noise**2 + np.nanmedian(after**2, axis=0) / 3)
+    spread, seen = np.array(model.spread), np.isfinite(after).any(axis=0)
+    spread[seen] = np.sqrt(options.noise**2 + np.nanmedian(after[:, seen] ** 2, axis=0) / 3)
     calibrated = model.with_(
         hand=resized(model.hand, values[:COUNT]).with_(source="calibrated on a marker capture"),  # type: ignore[arg-type]
         offsets=parameters.local(values),
-        spread=np.where(np.isfinite(spread), spread, model.spread),
+        spread=spread,
         size_spread=np.minimum(np.sqrt(np.diag(covariance)[:COUNT]), 1.0),
     )
     return CalibratedMarkers(calibrated, values[:COUNT], covariance, frames, _rms(before), _rms(after))
