@@ -18,7 +18,7 @@ from depthtrack.markers.formats.registry import read_capture
 from depthtrack.markers.labelled_capture import LabelledCapture
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.models.marker_model import MarkerModel
-from depthtrack.markers.models.model_choice import choose_models
+from depthtrack.markers.models.model_choice import choose_models, with_synergies
 from depthtrack.options import to_data
 
 Models = Sequence[str | MarkerModel]
@@ -172,7 +172,7 @@ def _opened(capture: MarkerCapture | Path | str) -> tuple[MarkerCapture, Source 
 
 
 def _models(models: Models, hand: HandShape | None) -> tuple[MarkerModel, ...]:
-    return choose_models([models] if isinstance(models, str) else models, hand)
+    return with_synergies(choose_models([models] if isinstance(models, str) else models, hand), "auto")
 
 
 def _write(

@@ -16,6 +16,7 @@ from depthtrack.markers.labelled_fit import fit_poses
 from depthtrack.markers.labelling.options import LabellingOptions
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.markers.named_labels import labels_by_name
+from depthtrack.markers.sparse_poses import with_likely_postures
 
 Measuring = Literal["always", "if possible", "never"]
 """Whether hands are measured: `if possible` leaves a hand that too few frames show as its start found it."""
@@ -95,7 +96,8 @@ def solve_capture(
     final = tuple(calibrated[model.name].model if model.name in calibrated else model for model in named.models)
     show("poses", 0.7)
     if started is None:
-        return MarkerSolution(fit_poses(replace(named, models=final), labelling), calibrated)
+        named = fit_poses(replace(named, models=final), labelling)
+        return MarkerSolution(with_likely_postures(named), calibrated)
     if calibrated:
         named = label_from(capture, final, started, labelling)
-    return MarkerSolution(named, calibrated, started)
+    return MarkerSolution(with_likely_postures(named), calibrated, started)

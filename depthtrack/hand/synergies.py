@@ -134,7 +134,11 @@ class Synergies:
 
     def to_json(self) -> str:
         """Return the text of the synergies file, angles in degrees."""
-        fields = {
+        return compact_json(self.to_fields())
+
+    def to_fields(self) -> dict[str, Any]:
+        """Return the contents of the synergies file, angles in degrees."""
+        return {
             "source": self.source,
             "total_standard_deviation_deg": _degrees(np.sqrt(self.total_variance)),
             "mean_deg": _by_finger(_degrees(self.mean)),
@@ -149,7 +153,6 @@ class Synergies:
                 for k in range(len(self))
             ],
         }
-        return compact_json(fields)
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
@@ -158,10 +161,16 @@ class Synergies:
         Raises:
             InputError: if the file is missing or malformed, or its entries are inconsistent.
         """
-        return read_json(path, "the synergies", cls._from_fields, made_by="depthtrack synergies fit")
+        return read_json(path, "the synergies", cls.from_fields, made_by="depthtrack synergies fit")
 
     @classmethod
-    def _from_fields(cls, fields: dict[str, Any]) -> Self:
+    def from_fields(cls, fields: dict[str, Any]) -> Self:
+        """Return the synergies of the parsed contents of their file.
+
+        Raises:
+            KeyError, TypeError, ValueError: if an entry is missing or malformed.
+            InputError: if the entries are inconsistent.
+        """
         components = list(fields["components"])
 
         def of_each(name: str) -> Array:

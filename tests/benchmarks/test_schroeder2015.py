@@ -21,7 +21,14 @@ def rows_of(name: str, options: ExperimentOptions = QUICK) -> list[dict[str, Any
         worse = 3 if cell.get("choice") in ("all", "one", "three") or cell.get("kind") == "generic" else 1
         made = {"error_mm": worse * 8 / count, "largest_mm": 30.0, "markers": count}
         made |= {"swarm": 5.0, "exchanged": 4.0, "greedy": 6.0, "swarm_s": 1.0, "exchange_s": 0.1, "greedy_s": 2.0}
-        made |= {"overtakes_s": 0.5, "swarm_curve": [[0.1, 9.0], [1.0, 5.0]], "greedy_curve": [[0.1, 8.0], [2.0, 6.0]]}
+        made |= {
+            "overtakes_s": 0.5,
+            "small": 4.0,
+            "small_s": 0.1,
+            "whole_s": 2.0,
+            "swarm_curve": [[0.1, 9.0], [1.0, 5.0]],
+            "greedy_curve": [[0.1, 8.0], [2.0, 6.0]],
+        }
         made |= {f"{method}_ms": count / 100 for method in ("subspace", "prior", "plain")}
         rows.append(made | cell)
     return rows

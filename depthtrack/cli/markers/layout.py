@@ -1,6 +1,6 @@
 """`depthtrack markers layout`: find where few markers on a hand show the most."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -77,7 +77,7 @@ class Command:
         quality = self._quality(hand, motions, options)
         found = find_layout_of(quality, self.markers, options, self.seed)
         about = f"{self.markers} markers for {', '.join(self.motion)}"
-        layout = quality.candidates.layout(found.rows, about, self.wrist)
+        layout = replace(quality.candidates.layout(found.rows, about, self.wrist), synergies=quality.synergies)
         write_atomic(self.out, layout.to_json())
         places, terms = instructions(layout, hand), quality.terms(found.rows)
         bare = quality.candidates.layout(found.rows, about).on(hand)

@@ -26,6 +26,12 @@ class ModelOptions:
     hand: Annotated[Path | None, stated_default(metavar="HAND.json")] = None
     """Sizes of hands that wear layouts (default: the average adult's, which the capture corrects)."""
 
+    synergies: Annotated[str, tyro.conf.arg(metavar="NAME")] = "auto"
+    """Postures that are likely, for hands with fewer than two markers on a finger: a set, a file, or none.
+
+    By default those of the layout's file, which `markers layout` writes, and `leap` for six markers or fewer.
+    """
+
     def load(self) -> "tuple[MarkerModel, ...]":
         """Return the models.
 
@@ -33,6 +39,7 @@ class ModelOptions:
             InputError: if there is none, or a file cannot be read.
         """
         from depthtrack.hand.shape import HandShape
-        from depthtrack.markers.models.model_choice import choose_models
+        from depthtrack.markers.models.model_choice import choose_models, with_synergies
 
-        return choose_models(self.models, None if self.hand is None else HandShape.from_json(self.hand))
+        models = choose_models(self.models, None if self.hand is None else HandShape.from_json(self.hand))
+        return with_synergies(models, self.synergies)

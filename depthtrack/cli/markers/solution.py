@@ -60,6 +60,7 @@ def solve_and_write(
     configuration = {
         "command": name,
         "labels": labels,
+        "synergies": command.model.synergies,
         "calibrate": calibrate,
         "method": command.start.method,
         "labelling": to_data(command.labelling_options),

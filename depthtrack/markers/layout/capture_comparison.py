@@ -18,15 +18,13 @@ from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.reconstruction import ReconstructionOptions, reconstruct
 from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.markers.models.marker_model import MarkerModel
+from depthtrack.markers.sparse_poses import RECORDED
 from depthtrack.types import Array, Index
 
 _EXHAUSTIVE = 200_000
 """Choices up to which all are evaluated."""
 _EVERY = 4
 """Frames of the tested half from one that is reconstructed to the next."""
-
-RECORDED = ReconstructionOptions(residual=0.002)
-"""Reconstruction of a recorded hand, whose skin slides; chosen on a glove of 13 markers."""
 
 Half = Literal["first", "second"]
 

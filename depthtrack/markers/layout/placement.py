@@ -15,7 +15,7 @@ class Placement(NamedTuple):
     squares: (V, V) least squared distance over the key-frames, in squared lengths of the hand.
     hidden: (V,) share of the samples that too few cameras see.
     length: of the hand, metres.
-    enough: distance from which markers gain nothing by more, in lengths of the hand.
+    enough: distance that two markers should have, in lengths of the hand; 0: the farther, the better.
     """
 
     squares: Array
@@ -30,7 +30,8 @@ class Placement(NamedTuple):
 def placement_energies(layouts: Index, placement: Placement, out: Array) -> None:
     """Write the energy of distances and occlusion of layouts (N, K) to `out` (N,)."""
     for i in range(layouts.shape[0]):
-        out[i] = -placement.distance_weight * min(least_distance(layouts[i], placement), placement.enough)
+        lack = placement.enough - least_distance(layouts[i], placement)
+        out[i] = placement.distance_weight * (lack if placement.enough == 0.0 else max(lack, 0.0))
         out[i] += placement.occlusion_weight * mean_hidden(layouts[i], placement)
 
 

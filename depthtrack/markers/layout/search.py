@@ -1,4 +1,4 @@
-"""The search for a reduced marker layout: swarm on the skin, then exchanges."""
+"""The search for a reduced marker layout: swarm on the skin, greedy choice, exchanges."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -7,7 +7,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.machine import usable_cores
-from depthtrack.markers.layout.exchange import kicked
+from depthtrack.markers.layout.exchange import exchanged, greedy_layout, kicked
 from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.surface_swarm import FoundLayout, swarm_layout
@@ -40,4 +40,9 @@ def find_layout_of(
     generator = np.random.Generator(np.random.Philox(key=[seed, count]))
     with ThreadPoolExecutor(usable_cores() if threads is None else threads) as pool:
         found = swarm_layout(quality, count, generator, options.swarm, pool, progress)
-        return kicked(quality, found.rows, options.kicks, generator, pool, progress) if options.exchange else found
+        if not options.exchange:
+            return found
+        # So the result is never worse than the greedy one.
+        starts = exchanged(quality, found.rows, pool, progress), greedy_layout(quality, count, pool)
+        best = min(starts, key=lambda start: start.energy)
+        return kicked(quality, best.rows, options.kicks, generator, pool, progress)

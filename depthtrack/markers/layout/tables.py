@@ -35,7 +35,7 @@ def placement_of(candidates: Candidates, postures: Array, options: QualityOption
         distance_weight=options.condition.distance_weight
         if paper
         else 1000 * length * options.expected.distance_weight,
-        enough=np.inf if paper else options.expected.apart / length,
+        enough=0.0 if paper else options.expected.apart / length,
         occlusion_weight=options.condition.occlusion_weight if paper else 0.0,
     )
 

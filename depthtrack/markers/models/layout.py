@@ -15,6 +15,7 @@ from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.implicit import ImplicitHand
+from depthtrack.hand.synergies import Synergies
 from depthtrack.markers.models.marker_model import MAX_MARKERS, MarkerModel
 from depthtrack.markers.models.skin_marker import SkinMarker, marker_ray
 from depthtrack.resources import resource_folder
@@ -32,11 +33,13 @@ class Layout:
     """Markers on the skin of any hand.
 
     radius: of the markers, metres.
+    synergies: of the motions that it was chosen for; None if they are unknown.
     """
 
     about: str
     radius: float
     markers: tuple[SkinMarker, ...]
+    synergies: Synergies | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.radius <= 0.02:
@@ -70,6 +73,7 @@ class Layout:
             offsets=local * [hand.mirror, 1, 1] * hand.scale,
             spread=np.array([m.spread for m in self.markers]),
             hand=hand,
+            synergies=self.synergies,
         )
 
     def to_json(self) -> str:
@@ -86,7 +90,8 @@ class Layout:
         ]
         spread = round(1000 * max(marker.spread for marker in self.markers), 3)
         radius = round(1000 * self.radius, 3)
-        return compact_json({"about": self.about, "radius_mm": radius, "spread_mm": spread, "markers": rows})
+        fields = {"about": self.about, "radius_mm": radius, "spread_mm": spread, "markers": rows}
+        return compact_json(fields | ({} if self.synergies is None else {"synergies": self.synergies.to_fields()}))
 
     @classmethod
     def from_json(cls, path: Path) -> Self:
@@ -119,7 +124,8 @@ class Layout:
             )
             for row in fields["markers"]
         )
-        return cls(about, float(fields["radius_mm"]) / 1000, markers)
+        synergies = None if fields.get("synergies") is None else Synergies.from_fields(fields["synergies"])
+        return cls(about, float(fields["radius_mm"]) / 1000, markers, synergies)
 
     def _renamed(self, labels: Mapping[str, str]) -> Self:
         """Return the layout of some markers with other labels: new label to label here."""

@@ -17,6 +17,7 @@ from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, other_side
 from depthtrack.hand.size_parameters import COUNT
+from depthtrack.hand.synergies import Synergies
 from depthtrack.types import Array, Index
 
 MAX_MARKERS = 256
@@ -35,6 +36,7 @@ class MarkerModel:
     spread: (M,) metres, standard deviation of the offsets.
     hand: sizes of the hand; None for a rigid body.
     size_spread: (35,) standard deviation of these sizes, see `hand.size_parameters`; None if they are not measured.
+    synergies: of the motions that the markers were chosen for; None if they are unknown.
     open_side: whether the capture decides the side of the hand. Files do not store it.
 
     Raises:
@@ -48,6 +50,7 @@ class MarkerModel:
     spread: Array
     hand: HandShape | None = None
     size_spread: Array | None = None
+    synergies: Synergies | None = None
     open_side: bool = False
 
     def __post_init__(self) -> None:
@@ -131,6 +134,7 @@ class MarkerModel:
             ],
             **({} if self.hand is None else {"hand": self.hand.to_fields()}),
             **({} if self.size_spread is None else {"size_spread": np.round(self.size_spread, 6).tolist()}),
+            **({} if self.synergies is None else {"synergies": self.synergies.to_fields()}),
         }
 
     @classmethod
@@ -159,6 +163,7 @@ class MarkerModel:
             spread=np.array([float(row.get("spread_mm", 0.0)) for row in rows]) / 1000,
             hand=None if fields.get("hand") is None else HandShape.from_fields(fields["hand"]),
             size_spread=None if fields.get("size_spread") is None else np.array(fields["size_spread"], np.float64),
+            synergies=None if fields.get("synergies") is None else Synergies.from_fields(fields["synergies"]),
         )
 
 

@@ -7,9 +7,13 @@ from typing import get_args
 from depthtrack.errors import InputError
 from depthtrack.files import read_text
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.synergies import load_synergies
 from depthtrack.markers.models.layout import find_layout
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.strict_data import parse_json
+
+_FEW = 6
+"""Markers up to which general synergies are better than none: with more they draw towards postures of other hands."""
 
 
 def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = None) -> tuple[MarkerModel, ...]:
@@ -33,6 +37,27 @@ def choose_models(words: Sequence[str | MarkerModel], hand: HandShape | None = N
         model.with_(open_side=False) if model.open_side and model.mirrored().name in names else model
         for model in models
     )
+
+
+def with_synergies(models: Sequence[MarkerModel], name: str) -> tuple[MarkerModel, ...]:
+    """Return models whose hands have the synergies of a name.
+
+    name: `none`, an included set or a .json file. `auto` keeps those of a model, and takes `leap` for a hand of few
+        markers that has none.
+
+    Raises:
+        InputError: if there are no such synergies.
+    """
+    if name == "auto":
+        general = load_synergies("leap")
+        return tuple(
+            model.with_(synergies=general)
+            if model.synergies is None and not model.is_rigid and len(model.labels) <= _FEW
+            else model
+            for model in models
+        )
+    synergies = None if name == "none" else load_synergies(name)
+    return tuple(model if model.is_rigid else model.with_(synergies=synergies) for model in models)
 
 
 def _model(word: str, hand: HandShape | None) -> MarkerModel:

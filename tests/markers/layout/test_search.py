@@ -59,6 +59,12 @@ def test_no_exchange_improves_the_layout(quality: LayoutQuality) -> None:
         assert quality.energies(others).min() >= found.energy - 1e-9
 
 
+def test_the_search_is_never_worse_than_the_greedy_choice(quality: LayoutQuality) -> None:
+    few = LayoutOptions(swarm=SwarmOptions(particles=2, generations=1), kicks=0)
+    for count in (4, 6):
+        assert find_layout_of(quality, count, few).energy <= greedy_layout(quality, count).energy
+
+
 def test_exchanges_begin_where_the_swarm_ended(quality: LayoutQuality) -> None:
     swarm = find_layout_of(quality, 4, replace(SMALL, exchange=False))
     assert exchanged(quality, swarm.rows).energy <= swarm.energy
