@@ -22,6 +22,8 @@ from depthtrack.calibration.options import (
 from depthtrack.markers.filling.options import FillOptions
 from depthtrack.markers.initialisation.options import InitialisationOptions
 from depthtrack.markers.labelling.options import LabellingOptions
+from depthtrack.markers.layout.options import LayoutOptions
+from depthtrack.markers.layout.reconstruction import ReconstructionOptions
 from depthtrack.options import Parameter, parameters
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER
@@ -67,6 +69,10 @@ def page() -> str:
         "Fields of `InitialisationOptions` and `MarkerCalibrationOptions`, which are set in Python. `--method paper`\n"
         "sets the method of the start.\n",
         _table([*parameters(InitialisationOptions()), *parameters(MarkerCalibrationOptions())], flag=False),
+        "## Marker layouts\n",
+        "Fields of `LayoutOptions` and `ReconstructionOptions`, which are set in Python. `markers layout` sets some\n"
+        "of them ([marker-layouts.md](marker-layouts.md)).\n",
+        _table([*parameters(LayoutOptions()), *parameters(ReconstructionOptions())], flag=False),
         "## Calibration\n",
         "Fields of `ViewChoiceOptions` and `CalibrationOptions`, which are set in Python.\n",
         _table([*parameters(ViewChoiceOptions()), *parameters(CalibrationOptions())], flag=False),

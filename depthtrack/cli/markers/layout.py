@@ -173,8 +173,8 @@ def _lines(figures: dict[str, Any]) -> list[str]:
         f" {figures['expected_rms_mm']:.2f} mm, after the loss of the worst marker"
         f" {figures['expected_rms_after_loss_mm']:.2f} mm",
         f"condition number {figures['condition']:.0f}, after the loss of the worst marker"
-        f" {figures['condition_after_loss']:.3g}, least distance {figures['least_distance_mm']:.1f} mm"
-        + ("" if hidden is None else f", hidden from the cameras {100 * hidden:.1f} %"),
+        f" {figures['condition_after_loss']:.3g}, least distance {figures['least_distance_mm']:.1f} mm",
+        *([] if hidden is None else [f"hidden from the cameras in {100 * hidden:.1f} % of the samples"]),
         f"simulated error with noise of {figures['noise_mm']:g} mm: {figures['error_mm']:.2f} mm mean of the skin,"
         f" {figures['largest_mm']:.1f} mm largest",
     ]

@@ -39,7 +39,9 @@ class ReconstructionOptions:
 
     method: Method = option("prior", "Subspace and free refinement, subspace and refinement with a prior, or neither")
     components: int = option(6, "Synergies of the subspace, at most", least=1, most=20)
-    iterations: int = option(10, "Gauss-Newton steps in each of both stages", source="Schroeder et al. 2015: 5 to 10")
+    iterations: int = option(
+        10, "Gauss-Newton steps in each of both stages", source="Schroeder et al. 2015: 5 to 10", least=1, most=1000
+    )
     damping: float = option(
         1e-5,
         "Damping D of each angle or synergy; a weak one lets angles swing that the markers hardly determine",
@@ -47,10 +49,16 @@ class ReconstructionOptions:
         source="Eq. (2)",
     )
     residual: float = option(
-        0.0003, "Standard deviation of a coordinate of a marker, which the prior is weighed against", unit="m"
+        0.0003,
+        "Standard deviation of a coordinate of a marker, which the prior is weighed against",
+        unit="m",
+        least=1e-6,
     )
     beyond: float = option(
-        0.035, "Standard deviation of each angle about the postures of the synergies, for the prior", unit="rad"
+        0.035,
+        "Standard deviation of each angle about the postures of the synergies, for the prior",
+        unit="rad",
+        least=1e-3,
     )
 
     def __post_init__(self) -> None:
