@@ -89,10 +89,10 @@ def swarm() -> None:
                     row = (best.energy - greedy.energy) / abs(greedy.energy), spent
                     found.setdefault((particles, generations, kicks), []).append(row)
     print(f"greedy: {np.median(greedy_times):.3f} s median, {np.max(greedy_times):.3f} s longest")
-    for size, rows in found.items():
-        change, seconds = np.array(rows).T
+    for (particles, generations, kicks), pairs in found.items():
+        change, seconds = np.array(pairs).T
         print(
-            f"{size[0]} x {size[1]}, {size[2]} changes: better {100 * np.mean(change < -1e-9):.0f} %,"
+            f"{particles} x {generations}, {kicks} changes: better {100 * np.mean(change < -1e-9):.0f} %,"
             f" worse {100 * np.mean(change > 1e-9):.0f} %, {np.median(seconds):.3f} s median, {seconds.max():.3f} s"
         )
 
