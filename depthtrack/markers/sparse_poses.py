@@ -35,11 +35,14 @@ def with_likely_postures(labelled: LabelledCapture) -> LabelledCapture:
 
     Hands without synergies keep their poses. Frames in which a hand was lost stay so.
     """
-    poses = list(labelled.poses)
-    for k, model in enumerate(labelled.models):
-        if model.synergies is not None and is_sparse(model):
-            poses[k] = _reconstructed(model, labelled.positions(k), poses[k], model.synergies)
-    return replace(labelled, poses=tuple(poses))
+    poses = {
+        k: _reconstructed(model, labelled.positions(k), labelled.poses[k], model.synergies)
+        for k, model in enumerate(labelled.models)
+        if model.synergies is not None and is_sparse(model)
+    }
+    if not poses:
+        return labelled
+    return replace(labelled, poses=tuple(poses.get(k, each) for k, each in enumerate(labelled.poses)))
 
 
 def _reconstructed(model: MarkerModel, positions: Array, poses: Array, synergies: Synergies) -> Array:
