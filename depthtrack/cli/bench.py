@@ -8,6 +8,7 @@ import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE
 from depthtrack.cli.progress import bar
+from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import DepthtrackError
 from depthtrack.files import write_atomic
@@ -119,8 +120,7 @@ class Pipeline:
     The frames per second are those of wall-clock time. Reading runs ahead in a thread, as in `depthtrack track`.
     """
 
-    recording: Annotated[Path, tyro.conf.Positional]
-    """The recording."""
+    recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
     trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("hybrid", "ik", "pso")
     """Trackers to measure."""
     hand: Annotated[str | None, stated_default(metavar="HAND")] = None
@@ -141,7 +141,8 @@ class Pipeline:
         from depthtrack.machine import usable_cores
 
         threads = self.threads or usable_cores()
-        plan = pipeline.plan(self.recording, self.trackers, self.hand, self.frames, threads, self.deadline)
+        path, sequence = self.recording.path, self.recording.open(tracked=True)
+        plan = pipeline.plan(path, sequence, self.trackers, self.hand, self.frames, threads, self.deadline)
         print_measured(pipeline, plan, self.json, self.out)
 
 

@@ -10,6 +10,7 @@ from depthtrack.benchmarks.speed.pipeline import PipelineReport, StageRow
 from depthtrack.cli import main
 from depthtrack.errors import InputError
 from depthtrack.machine import describe_machine
+from depthtrack.recording import open_sequence
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking.configuration import IkConfig
 
@@ -36,6 +37,13 @@ def test_the_whole_holds_its_stages(recording: Path, capsys: pytest.CaptureFixtu
     assert inside <= whole["mean_ms"]
 
 
+def test_the_recording_is_read_as_by_track(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["bench", "pipeline", str(recording), "--trackers", "ik", "--threads", "1", "--frames", "2"]
+    assert main([*command, "--camera", "missing.json"]) == 2
+    assert "missing.json" in capsys.readouterr().err
+    assert main([*command, "--depth-only", "--mirror"]) == 0
+
+
 def test_the_text_has_a_line_a_stage() -> None:
     rows = [StageRow("ik", 2, "whole", 9, 8.0, 9.5, 12.0, 40.0, 105.3), StageRow("ik", 2, "fit", 9, 3.0, 3.1, 4.0, 5.0)]
     text = pipeline.as_text(PipelineReport("pipeline", describe_machine(), "waving", rows))
@@ -47,12 +55,14 @@ def test_the_text_has_a_line_a_stage() -> None:
 
 
 def test_a_deadline_concerns_the_trackers_that_have_one(recording: Path) -> None:
-    made = pipeline.plan(recording, ["ik", "pso"], "average", frames=2, threads=1, deadline=20.0)
+    opened = open_sequence(recording)
+    made = pipeline.plan(recording, opened, ["ik", "pso"], "average", frames=2, threads=1, deadline=20.0)
     assert [getattr(config, "deadline", None) for config in made.trackers] == [20.0, None]
     assert made.trackers[0] == IkConfig(deadline=20.0)
 
 
 def test_one_frame_is_too_short(tmp_path: Path) -> None:
-    write_recording(Synthesiser(Synthesis(frames=1)), tmp_path / "one")
+    path = tmp_path / "one"
+    write_recording(Synthesiser(Synthesis(frames=1)), path)
     with pytest.raises(InputError, match="at least two frames, found 1"):
-        pipeline.plan(tmp_path / "one", ["ik"], None, None, threads=1, deadline=None)
+        pipeline.plan(path, open_sequence(path), ["ik"], None, None, threads=1, deadline=None)

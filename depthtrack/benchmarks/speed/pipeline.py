@@ -18,7 +18,6 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.machine import Machine, describe_machine
 from depthtrack.recording import sequence as recordings
 from depthtrack.recording.hand_choice import chosen_hand
-from depthtrack.recording.registry import open_sequence
 from depthtrack.text_table import aligned
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, TrackerConfig
 from depthtrack.tracking.registry import tracker_config
@@ -80,18 +79,24 @@ class PipelinePlan:
 
 
 def plan(
-    path: Path, trackers: Sequence[str], hand: str | None, frames: int | None, threads: int, deadline: float | None
+    path: Path,
+    sequence: recordings.Sequence,
+    trackers: Sequence[str],
+    hand: str | None,
+    frames: int | None,
+    threads: int,
+    deadline: float | None,
 ) -> PipelinePlan:
     """Return a plan for a recording.
 
+    path: where the recording was read.
     hand: as in `recording.hand_choice.chosen_hand`; None for the recording's own, or the average one.
     frames: number of frames, None for all.
     deadline: of the trackers that have one, milliseconds.
 
     Raises:
-        InputError: if the recording cannot be read or has less than two frames, or there is no such tracker.
+        InputError: if the recording has less than two frames, or there is no such tracker.
     """
-    sequence = open_sequence(path)
     count = len(sequence) if frames is None else min(frames, len(sequence))
     if count < 2:
         raise InputError(f"{path} must have at least two frames, found {count}: give a longer recording")
