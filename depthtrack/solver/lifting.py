@@ -81,6 +81,8 @@ class Lifter:
             return None
         # Farther readings are those of the background.
         reach[np.abs(reach - np.nanmedian(reach)) > self._model.shape.scale * self.options.farthest] = np.nan
+        if not np.isfinite(reach).any():
+            return None
         sight = LinesOfSight.of(keypoints, camera, self._local, reach)
         prior = self._likely if last is None else self._with_last(last)
         fitted = [self._fit(sight, start, prior) for start in self._starts(sight, last)]

@@ -99,3 +99,15 @@ def test_a_reading_lies_half_a_finger_before_the_joint(everyday_skin: Synthesise
     behind = np.linalg.norm(made.joints[0], axis=-1) - reach
     joints = np.setdiff1d(np.arange(21), [0, 4, 8, 12, 16, 20])
     assert np.median(np.abs(behind - half_thickness(made.options.hand))[joints]) < 0.003
+
+
+def test_readings_that_no_hand_spans_are_not_lifted(lifter: Lifter, everyday_skin: Synthesiser) -> None:
+    """In a wrong unit of depth, each reading may be far from the median of all."""
+    camera, keypoints = everyday_skin.sensor.camera, keypoints_of(everyday_skin, 0)
+    known = np.arange(21) < 20
+    keypoints = replace(keypoints, confidence=np.where(known, keypoints.confidence, 0.0))
+    middle = np.median(keypoints.pixels[known, 0])
+    depth = np.tile(np.where(np.arange(camera.width) < middle, 100.0, 500.0), (camera.height, 1)).astype(np.float32)
+    reach = measured_reach(keypoints, camera, depth, LiftOptions().window)[known]
+    assert np.abs(reach - np.nanmedian(reach)).min() > 1
+    assert lifter.lift(keypoints, camera, depth) is None
