@@ -42,7 +42,7 @@ class PalmOptions:
         0.063, "Largest inscribed radius of a palm or fist; the radius of a head is 75 mm", unit="m"
     )
     centre_share: float = option(
-        0.9, "Share of the largest inscribed radius from which a node counts for the palm's centre"
+        0.9, "Share of the largest inscribed radius from which a node counts for the palm's centre", most=0.99
     )
     limb_area: float = option(10e-4, "Smallest area between hand_reach and exit_reach of a limb", unit="m^2")
     finger_area: float = option(25e-4, "Largest area of a finger between these distances", unit="m^2")
