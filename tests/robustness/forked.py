@@ -35,9 +35,9 @@ class Ended:
 
     @property
     def is_orderly(self) -> bool:
-        """Whether the code is 0, or 2 with one sentence."""
-        one_line = len(self.error.splitlines()) == 1 and "Traceback" not in self.error
-        return self.code == 0 or (self.code == 2 and one_line)
+        """Whether the code is 0, or 2 with one sentence after any notes."""
+        lines = [line for line in self.error.strip().splitlines() if not line.startswith("note: ")]
+        return self.code == 0 or (self.code == 2 and len(lines) == 1 and "Traceback" not in self.error)
 
 
 def run_forked(

@@ -26,7 +26,7 @@ from depthtrack.cli.markers import COMMANDS as MARKER_COMMANDS
 from depthtrack.cli.stated_default import ShownDefault
 from depthtrack.ranges import Range
 from tests.robustness.acts import command, quiet
-from tests.robustness.forked import run_forked
+from tests.robustness.forked import Ended, run_forked
 from tests.robustness.test_outputs import arguments_of, types_in
 
 MATRIX: dict[str, Any] = json.loads((Path(__file__).parent / "options.json").read_text(encoding="utf-8"))
@@ -45,14 +45,13 @@ class Case:
     arguments: tuple[str, ...]
     beyond: Range | None = None
 
-    def problem(self, code: int, output: str, error: str) -> str | None:
+    def problem(self, ended: Ended) -> str | None:
         """Return what is wrong with the end of the command, if anything."""
-        orderly = code == 0 or (code == 2 and len(error.strip().splitlines()) == 1 and "Traceback" not in error)
         # The refusal must be that of the range, and of no other argument.
-        is_refused = code == 2 and f"must be {self.beyond}, found " in error
-        if not orderly or (self.beyond is not None and not is_refused):
-            return f"ended with {code}: {error[-300:]}"
-        if code == 0 and "--json" in self.arguments and not _is_strict(output):
+        is_refused = ended.code == 2 and f"must be {self.beyond}, found " in ended.error
+        if not ended.is_orderly or (self.beyond is not None and not is_refused):
+            return f"ended with {ended.code}: {ended.error[-300:]}"
+        if ended.code == 0 and "--json" in self.arguments and not _is_strict(ended.output):
             return "printed no strict JSON"
         return None
 
@@ -137,7 +136,7 @@ def _problem(case: Case, place: Path) -> str | None:
     """Run a case, and return a line about what is wrong, if anything."""
     _clear(place)
     ended = run_forked(list(case.arguments), place, limit=_LIMIT)
-    problem = case.problem(ended.code, ended.output, ended.error)
+    problem = case.problem(ended)
     return None if problem is None else f"    {' '.join(case.arguments)}: {problem}"
 
 
