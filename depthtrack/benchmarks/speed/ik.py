@@ -170,7 +170,8 @@ def run(plan: IkPlan, progress: Callable[[Iterator[IkRow]], Iterable[IkRow]] = i
 
 def measure(motion: ObservedMotion, setting: Setting, seconds: float) -> IkRow:
     """Return the row of a setting: four frames of the motion, each tracked after two others."""
-    frames = [round(at * motion.recording.rate) for at in FRAME_TIMES]
+    # At whole seconds a tracker searches for other hands: these frames are usual ones.
+    frames = [round(at * motion.recording.rate) + 2 for at in FRAME_TIMES]
     share = seconds / len(frames) / 2
     with closing(create_tracker(setting.config, motion.hand, synergies=setting.synergies(motion))) as tracker:
         timed = [_time_frame(tracker, motion, index, share) for index in frames]
