@@ -167,3 +167,13 @@ def _of_halves(combine: Emit) -> Any:
 
 lowest_of_halves = _of_halves(lambda builder, a, b: builder.select(builder.fcmp_ordered("<", a, b), a, b))
 highest_of_halves = _of_halves(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b))
+
+
+@intrinsic
+def fused(typing_context: Any, a: types.Type, b: types.Type, c: types.Type) -> Any:
+    """Return a * b + c of float64 numbers, rounded once."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.fma(*arguments)
+
+    return types.float64(types.float64, types.float64, types.float64), generate

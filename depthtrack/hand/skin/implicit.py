@@ -14,6 +14,7 @@ are shaped for appearance within these bounds. A changed number moves the surfac
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -23,6 +24,16 @@ from depthtrack.hand.kinematics import body_of
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.implicit_field import (
+    Cone,
+    ConeTable,
+    Field,
+    Web,
+    WebTable,
+    finger_distance,
+    hand_distance,
+    palm_distance,
+)
 from depthtrack.types import Array
 
 _FLEXION = np.radians([(0, 12, 18), (22, 34, 20), (22, 36, 20), (22, 36, 20), (22, 34, 20)])
@@ -48,57 +59,6 @@ def rest_pose(shape: HandShape) -> Array:
 
 
 @dataclass(frozen=True)
-class Cone:
-    """A tapered capsule from `start` to `end` (3,), with the radius at each end."""
-
-    start: Array
-    end: Array
-    radius_start: float
-    radius_end: float
-
-    def distance(self, points: Array) -> Array:
-        """Return the signed distance (N,) of points (N, 3), perpendicular to the axis."""
-        axis = self.end - self.start
-        t = np.clip((points - self.start) @ (axis / (axis @ axis + 1e-18)), 0, 1)
-        across = points - self.start - t[:, None] * axis
-        return np.sqrt(np.einsum("ij,ij->i", across, across)) - (
-            self.radius_start + t * (self.radius_end - self.radius_start)
-        )
-
-
-@dataclass(frozen=True)
-class Web:
-    """A web: parallel strands between two edges, thinner towards the far end.
-
-    `one`, `other` (2, 3): near and far end of each edge.
-    `radius_near`, `radius_far`: half the thickness at these ends.
-    """
-
-    one: Array
-    other: Array
-    radius_near: float
-    radius_far: float
-
-    def distance(self, points: Array) -> Array:
-        """Return the signed distance (N,) of points (N, 3) to the nearest strand."""
-        near, far = (self.one + self.other) / 2
-        along = far - near
-        t = np.clip((points - near) @ (along / (along @ along + 1e-18)), 0, 1)[:, None]
-        start, end = (edge[0] + t * (edge[1] - edge[0]) for edge in (self.one, self.other))
-        strand = end - start
-        s = np.einsum("ij,ij->i", points - start, strand) / np.maximum(np.einsum("ij,ij->i", strand, strand), 1e-18)
-        across = points - start - np.clip(s, 0, 1)[:, None] * strand
-        radius = self.radius_near + t[:, 0] * (self.radius_far - self.radius_near)
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", across, across)) - radius)
-
-
-def smooth_min(a: Array, b: Array, k: float) -> Array:
-    """Return the union of two solids with a fillet of width `k` (m), which adds at most k / 4."""
-    h = np.maximum(k - np.abs(a - b), 0) / k
-    return np.minimum(a, b) - h * h * k / 4
-
-
-@dataclass(frozen=True)
 class ImplicitHand:
     """The solid hand at rest; `bones` (16, 4, 4) are the rest transforms T_palm_body."""
 
@@ -119,36 +79,33 @@ class ImplicitHand:
             shape, bones, fingers, tuple(_palm(shape)), tuple(_muscles(shape, bones)), tuple(_webs(shape, bones))
         )
 
+    @cached_property
+    def _field(self) -> Field:
+        unit, wrist = self.shape.palm_length, float(self.shape.wrist[1])
+        return Field(
+            ConeTable.of(self.palm),
+            ConeTable.of([self.muscles]),
+            WebTable.of(self.webs),
+            ConeTable.of(self.fingers),
+            0.1 * unit,
+            0.12 * unit,
+            0.07 * unit,
+            0.25 * self.shape.radii[:, 3],
+            np.array([0.12, 0.05, 0.05, 0.05, 0.05]) * unit,
+            np.array([wrist, 0.02 * unit, 0.14 * unit]),
+        )
+
     def distance(self, points: Array) -> Array:
         """Return the signed distance (N,) of points (N, 3) to the skin."""
-        unit = self.shape.palm_length
-        body = self.palm_distance(points)
-        for muscle in self.muscles:
-            body = smooth_min(body, muscle.distance(points), 0.12 * unit)
-        for web in self.webs:
-            body = smooth_min(body, web.distance(points), 0.07 * unit)
-        body = -smooth_min(-body, points[:, 1] - self.shape.wrist[1] + 0.02 * unit, 0.14 * unit)
-        # Each finger is blended with the hand alone, so that adjacent fingers stay apart.
-        fingers = [
-            smooth_min(body, self.finger_distance(points, finger), (0.12 if finger == 0 else 0.05) * unit)
-            for finger in range(5)
-        ]
-        return np.minimum.reduce(fingers)
+        return np.asarray(hand_distance(self._field, np.ascontiguousarray(points)))
 
     def finger_distance(self, points: Array, finger: int) -> Array:
         """Return the signed distance (N,) of points (N, 3) to one finger alone."""
-        first, *others = (cone.distance(points) for cone in self.fingers[finger])
-        for other in others:
-            first = smooth_min(first, other, 0.25 * self.shape.radii[finger, 3])
-        return first
+        return np.asarray(finger_distance(self._field, np.ascontiguousarray(points), finger))
 
     def palm_distance(self, points: Array) -> Array:
         """Return the signed distance (N,) of points (N, 3) to the palm without muscles and webs."""
-        # The cones of one ray meet without a fillet, which would swell where they join.
-        first, *others = (np.minimum.reduce([cone.distance(points) for cone in ray]) for ray in self.palm)
-        for other in others:
-            first = smooth_min(first, other, 0.1 * self.shape.palm_length)
-        return np.asarray(first)
+        return np.asarray(palm_distance(self._field, np.ascontiguousarray(points)))
 
     def bounds(self) -> tuple[Array, Array]:
         """Return the two corners (3,) of a bounding box of the hand."""
