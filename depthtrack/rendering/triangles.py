@@ -55,26 +55,35 @@ def _rasterise(
     fx, fy, cx, cy = intrinsics
     near = NEAR
     height, width = depth.shape
+    pixels = np.empty((vertices.shape[0], 2))
+    for k in range(vertices.shape[0]):
+        z = max(vertices[k, 2], near)
+        pixels[k, 0], pixels[k, 1] = fx * vertices[k, 0] / z + cx, fy * vertices[k, 1] / z + cy
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         za, zb, zc = vertices[a, 2], vertices[b, 2], vertices[c, 2]
         if min(za, zb, zc) < near:
             continue
-        ua, va = fx * vertices[a, 0] / za + cx, fy * vertices[a, 1] / za + cy
-        ub, vb = fx * vertices[b, 0] / zb + cx, fy * vertices[b, 1] / zb + cy
-        uc, vc = fx * vertices[c, 0] / zc + cx, fy * vertices[c, 1] / zc + cy
+        ua, va = pixels[a, 0], pixels[a, 1]
+        ub, vb = pixels[b, 0], pixels[b, 1]
+        uc, vc = pixels[c, 0], pixels[c, 1]
         area = (ub - ua) * (vc - va) - (uc - ua) * (vb - va)
         if area == 0.0:
             continue
+        sign_of_area = 1.0 if area > 0.0 else -1.0
         u0, u1 = max(0, math.ceil(min(ua, ub, uc))), min(width - 1, math.floor(max(ua, ub, uc)))
         v0, v1 = max(0, math.ceil(min(va, vb, vc))), min(height - 1, math.floor(max(va, vb, vc)))
         for v in range(v0, v1 + 1):
             for u in range(u0, u1 + 1):
                 # Barycentric coordinates in the image; inverse depth is linear there.
-                wa = ((ub - u) * (vc - v) - (uc - u) * (vb - v)) / area
-                wb = ((uc - u) * (va - v) - (ua - u) * (vc - v)) / area
+                part_a = (ub - u) * (vc - v) - (uc - u) * (vb - v)
+                part_b = (uc - u) * (va - v) - (ua - u) * (vc - v)
+                # A division takes as long as the rest: most pixels around small triangles do without.
+                if part_a * sign_of_area < 0.0 or part_b * sign_of_area < 0.0:
+                    continue
+                wa, wb = part_a / area, part_b / area
                 wc = 1.0 - wa - wb
-                if wa < 0.0 or wb < 0.0 or wc < 0.0:
+                if wc < 0.0:
                     continue
                 pa, pb, pc = wa / za, wb / zb, wc / zc
                 z = 1.0 / (pa + pb + pc)
