@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from depthtrack.calibration.acceptance import check_resembles_hand
-from depthtrack.calibration.joint_optimisation import JointFit, fit_jointly, size_covariance
+from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.residuals import CalibrationView
@@ -28,6 +28,8 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.stretches import TrackedView, track_stretches
 from depthtrack.types import Array
 
+_POSE_ITERATIONS = 8
+"""Iterations of the poses alone, for the hands before and after calibration."""
 _USUAL_LENGTHS = (110, 240)
 """Length of the hand of children at school and of adults, mm, with a margin for its error."""
 
@@ -112,7 +114,7 @@ def calibrate(
     report = progress or (lambda stage, share: None)
     options = options or CalibrationOptions()
     stretches = replace(options.stretches, tracker=replace(options.stretches.tracker, seed=seed))
-    values, rounds = np.zeros(COUNT), options.rounds
+    values, rounds, joint = np.zeros(COUNT), options.rounds, options.joint
     for number in range(rounds):
         if number > 0 or not views:
             show = _part(report, number / rounds, 0.6 / rounds)
@@ -122,16 +124,19 @@ def calibrate(
         report("fingers and palm", (number + 0.6) / rounds)
         chosen = best_views(views, options.accepted.good_views)
         observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
-        fitted = fit_jointly(observed, poses, values, side, options.iterations, options=options.joint)
+        fitted = fit_jointly(observed, poses, values, side, options.iterations, options=joint, threads=threads)
         found = nearest_solid(fitted.values, side)
         change, values = np.abs(found - values)[: WIDTHS.start].max(), found
         if change < options.converged:
             break
     report("confidence", 0.95)
-    last, joint = options.exact_iterations, options.joint
-    fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint)
+    last = options.exact_iterations
+    fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint, threads=threads)
     values = with_usual_proportions(fitted.values)
-    before, after = (_refined(observed, fitted.poses, sizes, side, options) for sizes in (np.zeros(COUNT), values))
+    before, after = (
+        fit_jointly(observed, fitted.poses, sizes, side, _POSE_ITERATIONS, slice(0, 0), options=joint, threads=threads)
+        for sizes in (np.zeros(COUNT), values)
+    )
     report("done", 1.0)
     return Calibration(
         hand_of(values, side, f"calibrated on {sequence.name}"),
@@ -170,13 +175,6 @@ def _check_views(views: Views[TrackedView], sequence: Sequence, options: Calibra
             "best with open fingers towards the camera"
         )
     check_resembles_hand([each.agreement for each in views], options.accepted.hand_like)
-
-
-def _refined(
-    views: Views[CalibrationView], poses: Array, values: Array, side: Side, options: CalibrationOptions
-) -> JointFit:
-    """Return the fit of the poses alone, for a hand of fixed sizes."""
-    return fit_jointly(views, poses, values, side, 8, slice(0, 0), options=options.joint)
 
 
 def with_usual_proportions(values: Array) -> Array:

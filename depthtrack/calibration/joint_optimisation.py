@@ -7,7 +7,9 @@ Tan et al., "Fits like a glove", CVPR 2016.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -47,6 +49,7 @@ def fit_jointly(
     free: slice = slice(0, COUNT),
     exact: bool = False,
     options: JointFitOptions | None = None,
+    threads: int = 1,
 ) -> JointFit:
     """Return the sizes and poses that fit all views best.
 
@@ -55,6 +58,7 @@ def fit_jointly(
     free: the sizes that may change.
     exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale. The
         sizes to start from must give a solid hand, and steps that do not are shortened.
+    threads: among which the views are divided. Sizes and poses do not depend on their number.
     """
     options = options or JointFitOptions()
     soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale
@@ -62,19 +66,20 @@ def fit_jointly(
     prior = np.linalg.inv(size_covariance(options))
     held = np.ones(COUNT, dtype=np.bool_)
     held[free] = False
-    for k in range(iterations):
-        skin = PosedSkin(hand_of(values, side), exact)
-        kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
-        evidence = [linearise(view, skin, pose, kernel_scale) for view, pose in zip(views, poses, strict=True)]
-        eliminated = [_eliminate(*each, options) for each in zip(views, evidence, poses, strict=True)]
-        information = np.sum([e.information for e in eliminated], axis=0)
-        gradient = np.sum([e.gradient for e in eliminated], axis=0)
-        change = solve_free(information + prior, -(gradient + prior @ values), held)
-        change *= min(1.0, options.largest_change / max(np.abs(change).max(), 1e-12))
-        before, values = values, solid_step(values, change, side) if exact else values + change
-        change = values - before
-        tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
-        poses = within_limits(retract(poses, tangents))
+    with ThreadPoolExecutor(threads, thread_name_prefix="views") as pool:
+        for k in range(iterations):
+            skin = PosedSkin(hand_of(values, side), exact)
+            kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
+            evidence = list(pool.map(partial(linearise, skin=skin, kernel_scale=kernel_scale), views, poses))
+            eliminated = [_eliminate(*each, options) for each in zip(views, evidence, poses, strict=True)]
+            information = np.sum([e.information for e in eliminated], axis=0)
+            gradient = np.sum([e.gradient for e in eliminated], axis=0)
+            change = solve_free(information + prior, -(gradient + prior @ values), held)
+            change *= min(1.0, options.largest_change / max(np.abs(change).max(), 1e-12))
+            before, values = values, solid_step(values, change, side) if exact else values + change
+            change = values - before
+            tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
+            poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])
     return JointFit(values, np.linalg.inv(information + prior), poses, distances)
 

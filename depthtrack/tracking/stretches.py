@@ -10,6 +10,7 @@ import numpy as np
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.options import option
+from depthtrack.recording.read_ahead import read_ahead
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
@@ -18,6 +19,9 @@ from depthtrack.tracking.configuration import HybridConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.types import Array
+
+_AHEAD = 2
+"""Frames that are read while another one is tracked."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def track_stretches(
     energies, views = np.full(len(indices), np.nan), list[TrackedView]()
     with closing(create_tracker(options.tracker, hand, threads)) as tracker:
         pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence, segmentation), hand)
-        for number, each in enumerate(track_frames(sequence.frames(indices), pipeline)):
+        for number, each in enumerate(track_frames(read_ahead(sequence.frames(indices), _AHEAD), pipeline)):
             estimate = each.estimate
             energies[number] = estimate.energy
             due = number % every == every - 1

@@ -190,8 +190,8 @@ def test_sizes_without_observations_keep_the_prior() -> None:
 
 def test_the_true_hand_in_its_true_pose_has_no_residuals(made: Synthesiser) -> None:
     observation = observe(made, 40)
-    true = linearise(CalibrationView(observation), PosedSkin(TRUE_HAND), made.poses[40], 0.006)
-    average = linearise(CalibrationView(observation), PosedSkin(HandShape()), made.poses[40], 0.006)
+    true = linearise(CalibrationView(observation), made.poses[40], PosedSkin(TRUE_HAND), 0.006)
+    average = linearise(CalibrationView(observation), made.poses[40], PosedSkin(HandShape()), 0.006)
     assert true.distance < 1e-4 < average.distance
     assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
 

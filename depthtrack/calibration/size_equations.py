@@ -1,0 +1,148 @@
+"""Add up the normal equations of a view by pose and sizes in kernels.
+
+A residual depends on the palm, on one finger and on the sizes of both: on 20 of 61 parameters at most. Only these are
+added up.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from depthtrack.compilation import compiled
+from depthtrack.hand.compiled_kinematics import BodyPoses
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import TANGENT_SIZE
+from depthtrack.hand.shape import HandShape
+from depthtrack.hand.size_parameters import COUNT, KNUCKLES, LENGTHS, PALM, THUMB_BASE, WIDTHS
+from depthtrack.solver.robust import compiled_geman_mcclure
+from depthtrack.types import Array, Index
+
+PARAMETERS = TANGENT_SIZE + COUNT
+_LENGTHS, _WIDTHS, _PALM = (TANGENT_SIZE + part.start for part in (LENGTHS, WIDTHS, PALM))
+_KNUCKLES, _THUMB_BASE = (TANGENT_SIZE + part.start for part in (KNUCKLES, THUMB_BASE))
+_MOST = 24
+"""Bound on the parameters that one residual depends on."""
+
+
+class SizedHand(NamedTuple):
+    """A posed hand, and how its sizes move it.
+
+    bodies: in the camera frame.
+    lengths: (5, 3) of the phalanges, m.
+    grown: (5, 3) places of the base joints by the palm's sizes alone, m, palm frame of a hand of scale 1.
+    scale, mirror: of the hand.
+    """
+
+    bodies: BodyPoses
+    lengths: Array
+    grown: Array
+    scale: float
+    mirror: float
+
+    @staticmethod
+    def at(model: HandModel, pose: Array) -> "SizedHand":
+        """Return a hand in a pose (27,)."""
+        shape, average = model.shape, HandShape()
+        breadth, length = shape.palm_breadth / average.palm_breadth, shape.palm_length / average.palm_length
+        grown = average.bases * [breadth, length, 1.0]
+        return SizedHand(BodyPoses.at(model.chain, pose), model.lengths, grown, shape.scale, float(shape.mirror))
+
+
+class Residuals(NamedTuple):
+    """Residuals of skin points along directions.
+
+    bodies: (N,).
+    x: (N, 3) metres, camera frame.
+    directions: (N, 3).
+    errors: (N,) m, signed.
+    distances: (N,) m, from which the robust weights follow.
+    """
+
+    bodies: Index
+    x: Array
+    directions: Array
+    errors: Array
+    distances: Array
+
+
+@compiled(nogil=True)
+def write_gradient(hand: SizedHand, b: int, x: Array, n: Array, columns: Index, a: Array) -> int:
+    """Write the derivative of a residual by its parameters; return their number.
+
+    b: body of the point.
+    x, n: (3,) point, m, and direction of the residual, camera frame.
+    columns, a: the parameters that move the point, in increasing order, and the derivatives.
+
+    It is the product of `n` with `HandModel.point_jacobian` and `size_parameters.motion_of`.
+    """
+    T, axes, origins = hand.bodies.T, hand.bodies.axes, hand.bodies.origins
+    px, py, pz = x[0] - T[0, 0, 3], x[1] - T[0, 1, 3], x[2] - T[0, 2, 3]
+    for i in range(6):
+        columns[i] = i
+    a[0], a[1], a[2] = n[0], n[1], n[2]
+    a[3], a[4], a[5] = py * n[2] - pz * n[1], pz * n[0] - px * n[2], px * n[1] - py * n[0]
+    count, finger, phalanx = 6, (b - 1) // 3, (b - 1) % 3
+    if b > 0:
+        for angle in range(4 * finger, 4 * finger + 2 + phalanx):
+            u, o = axes[angle], origins[angle]
+            rx, ry, rz = x[0] - o[0], x[1] - o[1], x[2] - o[2]
+            columns[count] = 6 + angle
+            a[count] = n[0] * (u[1] * rz - u[2] * ry) + n[1] * (u[2] * rx - u[0] * rz) + n[2] * (u[0] * ry - u[1] * rx)
+            count += 1
+    columns[count], a[count] = TANGENT_SIZE, n[0] * px + n[1] * py + n[2] * pz
+    count += 1
+    qx, qy, qz = x[0] - T[b, 0, 3], x[1] - T[b, 1, 3], x[2] - T[b, 2, 3]
+    if b == 0:
+        for j in range(3):
+            local = T[0, 0, j] * qx + T[0, 1, j] * qy + T[0, 2, j] * qz
+            columns[count], a[count] = _PALM + j, local * _along(T, 0, j, n)
+            count += 1
+        return count
+    for k in range(phalanx + 1):
+        body = b - phalanx + k
+        extent = hand.lengths[finger, k] if k < phalanx else T[b, 0, 1] * qx + T[b, 1, 1] * qy + T[b, 2, 1] * qz
+        columns[count], a[count] = _LENGTHS + 3 * finger + k, extent * _along(T, body, 1, n)
+        count += 1
+    across = T[b, 0, 0] * qx + T[b, 1, 0] * qy + T[b, 2, 0] * qz
+    deep = T[b, 0, 2] * qx + T[b, 1, 2] * qy + T[b, 2, 2] * qz
+    columns[count], a[count] = _WIDTHS + finger, across * _along(T, b, 0, n) + deep * _along(T, b, 2, n)
+    sideways, forward = hand.scale * hand.mirror * _along(T, 0, 0, n), hand.scale * _along(T, 0, 1, n)
+    columns[count + 1], a[count + 1] = _PALM, hand.grown[finger, 0] * sideways
+    columns[count + 2], a[count + 2] = _PALM + 1, hand.grown[finger, 1] * forward
+    count += 3
+    first = _THUMB_BASE if finger == 0 else _KNUCKLES + 2 * (finger - 1)
+    columns[count], a[count] = first, sideways
+    columns[count + 1], a[count + 1] = first + 1, forward
+    count += 2
+    if finger == 0:
+        columns[count], a[count] = first + 2, hand.scale * _along(T, 0, 2, n)
+        count += 1
+    return count
+
+
+@compiled(nogil=True)
+def _along(T: Array, body: int, axis: int, n: Array) -> float:
+    """Return the component of n (3,) along an axis of a body."""
+    return float(T[body, 0, axis] * n[0] + T[body, 1, axis] * n[1] + T[body, 2, axis] * n[2])
+
+
+@compiled(nogil=True)
+def add_normal_equations(hand: SizedHand, residuals: Residuals, kernel_scale: float, H: Array, g: Array) -> None:
+    """Add the weighted sums of a a^T to H (61, 61) and of a e to g (61,).
+
+    a: gradients; e: residuals.
+    kernel_scale: m, scale of the Geman-McClure kernel.
+    """
+    columns, a = np.empty(_MOST, np.int64), np.empty(_MOST)
+    for k in range(residuals.bodies.shape[0]):
+        count = write_gradient(hand, residuals.bodies[k], residuals.x[k], residuals.directions[k], columns, a)
+        weight = compiled_geman_mcclure(residuals.distances[k] ** 2, kernel_scale)
+        for i in range(count):
+            share = weight * a[i]
+            row = columns[i]
+            g[row] += share * residuals.errors[k]
+            for j in range(i, count):
+                H[row, columns[j]] += share * a[j]
+    for i in range(H.shape[0]):
+        for j in range(i):
+            H[i, j] = H[j, i]

@@ -1,0 +1,60 @@
+"""The compiled normal equations of a view, against plain numpy."""
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from depthtrack.calibration.size_equations import (
+    PARAMETERS,
+    Residuals,
+    SizedHand,
+    add_normal_equations,
+    write_gradient,
+)
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.shape import Side
+from depthtrack.hand.size_parameters import COUNT, hand_of, motion_of, prior_covariance
+from depthtrack.solver.robust import geman_mcclure
+
+
+def _posed(side: Side) -> tuple[HandModel, np.ndarray, Residuals]:
+    """Return a hand of uncommon sizes in a pose, and residuals on all its bodies."""
+    random = np.random.default_rng(5)
+    values = 0.5 * random.standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
+    pose = make_pose([0.02, 0, 0.5], [0.5, 0.5, -0.4, 0.6], POSTURES["relaxed"])
+    model, bodies = HandModel(hand_of(values, side)), np.repeat(np.arange(16), 3)
+    x = model.transform_points(pose, bodies, 0.01 * random.standard_normal((48, 3)))
+    errors = 0.01 * random.standard_normal(48)
+    return model, pose, Residuals(bodies, x, random.standard_normal((48, 3)), errors, np.abs(errors))
+
+
+def _gradients(model: HandModel, pose: np.ndarray, residuals: Residuals) -> np.ndarray:
+    """Return the gradients (N, 61) in numpy."""
+    by_pose = model.point_jacobian(pose, residuals.bodies, residuals.x)
+    by_sizes = motion_of(model, pose, residuals.bodies, residuals.x)
+    return np.einsum("ni,nij->nj", residuals.directions, np.concatenate([by_pose, by_sizes], axis=-1))
+
+
+@pytest.mark.parametrize("side", get_args(Side))
+def test_gradients_are_those_of_numpy(side: Side) -> None:
+    model, pose, residuals = _posed(side)
+    hand, columns, a = SizedHand.at(model, pose), np.empty(24, np.int64), np.empty(24)
+    found = np.zeros((len(residuals.x), PARAMETERS))
+    for row, body, x, direction in zip(found, residuals.bodies, residuals.x, residuals.directions, strict=True):
+        count = write_gradient(hand, body, x, direction, columns, a)
+        assert (np.diff(columns[:count]) > 0).all()
+        row[columns[:count]] = a[:count]
+    np.testing.assert_allclose(found, _gradients(model, pose, residuals), atol=1e-14)
+
+
+def test_normal_equations_are_weighted_sums_of_gradients() -> None:
+    model, pose, residuals = _posed("left")
+    H, g = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    for _ in range(2):
+        add_normal_equations(SizedHand.at(model, pose), residuals, 0.01, H, g)
+    a, weights = _gradients(model, pose, residuals), geman_mcclure(residuals.distances**2, 0.01)
+    np.testing.assert_allclose(H, 2 * (a * weights[:, None]).T @ a, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(g, 2 * a.T @ (weights * residuals.errors), rtol=1e-11, atol=1e-12)
