@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def failures_in_frames_end_tests() -> Iterator[None]:
     """Raise unexpected failures inside a frame, which runs record and pass over, so that no test hides one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("depthtrack.tracking.pipeline.failure_text", lambda error: None)
+        patch.setattr("depthtrack.tracking.guided_segmentation.failure_text", lambda error: None)
         yield
 
 

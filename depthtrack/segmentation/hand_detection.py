@@ -1,5 +1,7 @@
 """Detection of the hand among palm candidates, anywhere or near its last position."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from depthtrack.segmentation.forearm import find_arm
@@ -12,6 +14,17 @@ from depthtrack.segmentation.wrist_filter import anatomical_guess
 from depthtrack.types import Array
 
 
+class DetectedHand(NamedTuple):
+    """A palm candidate with its cost as a start.
+
+    centre: (3,) on the visible surface, metres, camera frame.
+    cost: metres of distance.
+    """
+
+    centre: Array
+    cost: float
+
+
 class HandDetector:
     """Chooses the palm of the hand by its cost, in metres of distance.
 
@@ -21,8 +34,8 @@ class HandDetector:
     def __init__(self, options: SegmentationOptions, hand: HandSize) -> None:
         self._options, self.hand = options, hand
 
-    def detect(self, grid: Grid, candidates: Grid, lost: Array | None = None) -> Array | None:
-        """Return the palm's centre (3,) of the nearest hand on a grid, or None.
+    def detect(self, grid: Grid, candidates: Grid, lost: Array | None = None) -> list[DetectedHand]:
+        """Return the palm candidates of the nearest slice of depth that has any, by increasing cost.
 
         candidates: the grid with only the nodes that may be hand.
         lost: (3,) last position of the hand, if it is recent, metres, camera frame.
@@ -31,7 +44,7 @@ class HandDetector:
         depths = np.sort(candidates.depth[candidates.depth > 0])
         area = np.cumsum(depths**2) / (grid.focal[0] * grid.focal[1])
         if area.size == 0 or area[-1] < least_area:
-            return None
+            return []
         # Up to here, all visible surfaces together are smaller than a hand.
         start = float(depths[np.searchsorted(area, least_area)])
         while start < depths[-1]:
@@ -39,9 +52,10 @@ class HandDetector:
             near, hands = grid.within(part), candidates.within(part)
             palms = list(find_palms(near, hands, self._options.palm))
             if palms:
-                return min(palms, key=lambda palm: self.start_cost(near, hands, palm, lost)).centre
+                found = [DetectedHand(palm.centre, self.start_cost(near, hands, palm, lost)) for palm in palms]
+                return sorted(found, key=lambda hand: hand.cost)
             start += options.slice_step
-        return None
+        return []
 
     def start_cost(self, grid: Grid, candidates: Grid, palm: Palm, lost: Array | None) -> float:
         """Return the distance of a palm, plus its wrist's cost, less bonuses, metres."""

@@ -3,7 +3,8 @@
 Source: Oikonomidis et al. 2011, Sec. 2.1.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.forearm import Arm, find_arm, find_vanishing_arm
 from depthtrack.segmentation.foreshortened_wrist import find_foreshortened_wrist, points_at_camera
 from depthtrack.segmentation.grid import Grid
-from depthtrack.segmentation.hand_detection import HandDetector
+from depthtrack.segmentation.hand_detection import DetectedHand, HandDetector
 from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.masks import HandMasks
 from depthtrack.segmentation.options import SegmentationOptions
@@ -100,21 +101,47 @@ class HandLocator:
         found = None if self._last is None else self._follow(frame, self._last)
         if found is None:
             self._reset_arm()
-            start = self._detect(frame)
-            found = None if start is None else self._follow(frame, start)
-        if found is not None:
-            self._last_time = frame.timestamp
-        return found
+            detected = self._detect(frame)
+            found = self._follow(frame, detected[0].centre) if detected else None
+        if found is None:
+            return None
+        self._last_time = frame.timestamp
+        surface, located = found
+        self._adapt_colours(surface, located.masks)
+        return located
 
-    def _detect(self, frame: Frame) -> Array | None:
-        """Return the centre (3,) of a palm anywhere in the frame, metres, camera frame."""
+    def alternatives(self, frame: Frame) -> Iterator[tuple[LocatedHand, float]]:
+        """Yield the hands that a start may try, and their costs beside the first one, metres.
+
+        They are those at the palm candidates, and those whose palm and wrist are farther from the forearm. The state
+        stays.
+        """
+        options = self._options.detection
+        trial = HandLocator(self._skin, self._options)
+        trial._set_hand(self.hand)
+        detected = trial._detect(frame)[: options.alternatives]
+        for number, hand in enumerate(detected):
+            more = hand.cost - detected[0].cost
+            if more > options.alternative_cost:
+                return
+            for shift in (0.0, *options.alternative_shifts) if number == 0 else (0.0,):
+                trial._reset_arm()
+                found = trial._follow(frame, hand.centre, shift)
+                if found is not None:
+                    yield found[1], more
+
+    def _detect(self, frame: Frame) -> list[DetectedHand]:
+        """Return the palms anywhere in the frame, the most likely first."""
         search, grid = self._options.search, self._options.grid
         stride = max(1, round(frame.camera.width / grid.start_columns))
         surface = build_grid(frame, frame.camera.rect, (search.nearest, search.farthest), stride, self._skin, grid)
         return self._detector.detect(surface.grid, surface.candidates, self._last)
 
-    def _follow(self, frame: Frame, last: Array) -> LocatedHand | None:
-        """Return the hand near its last position (3,), metres, camera frame."""
+    def _follow(self, frame: Frame, last: Array, shift: float = 0.0) -> tuple[SurfaceGrid, LocatedHand] | None:
+        """Return the surface and the hand near its last position (3,), metres, camera frame.
+
+        shift: distance by which palm and wrist are moved away from the forearm, metres; then an arm must be visible.
+        """
         options, window, z = self._options, self._options.search.depth_window, float(last[2])
         region = frame.camera.rect_around(last, window)
         depth_range = (max(z - window, options.search.nearest), z + window)
@@ -125,13 +152,18 @@ class HandLocator:
             return None
         self._last = palm.centre
         arm, centre, wrist = self._find_arm(surface, palm)
+        if shift != 0:
+            if arm is None or wrist is None:
+                return None
+            step = shift * arm.direction
+            centre, wrist = centre - step, replace(wrist, point=wrist.point - step)
         arm_mask = None if arm is None or wrist is None else arm_nodes(surface.grid, palm, arm, wrist)
         labels = label_hand(surface, palm, arm_mask, wrist, options)
         if not (labels == HAND).any():
             return None
         masks = hand_masks(surface, labels, wrist, options)
-        self._adapt_colours(surface, masks)
-        return LocatedHand(masks, centre, palm.radius, None if arm is None else arm.direction, wrist)
+        direction = None if arm is None else arm.direction
+        return surface, LocatedHand(masks, centre, palm.radius, direction, wrist)
 
     def _find_arm(self, surface: SurfaceGrid, palm: Palm) -> tuple[Arm | None, Array, WristPlane | None]:
         """Return the forearm, the corrected centre of the palm (3,), and the wrist."""

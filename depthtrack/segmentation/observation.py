@@ -1,6 +1,7 @@
 """The observation of a frame: silhouette, depth and point cloud of the hand."""
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,6 +30,8 @@ class Observation(Target):
     cloud_options: options of the point cloud.
     keypoints: of the hand in the region, from elsewhere; None if there are none.
     arrived: time of `time.perf_counter` at which the frame arrived, seconds; NaN if unknown.
+    alternatives: makes other observations of the same frame, which a doubtful start tries; None if a prior was used.
+    cost: of such an observation beside the first one, as a distance, metres.
     """
 
     frame_index: int
@@ -41,6 +44,8 @@ class Observation(Target):
     cloud_options: PointCloudOptions | None = None
     keypoints: ImageKeypoints | None = None
     arrived: float = math.nan
+    alternatives: Callable[[], Iterator["Observation"]] | None = None
+    cost: float = 0.0
 
     def whole_mask(self, shape: tuple[int, ...]) -> Mask:
         """Return the silhouette in the whole frame of `shape` (height, width)."""

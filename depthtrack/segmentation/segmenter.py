@@ -1,5 +1,6 @@
 """The segmenter: from a frame to the observation of its hand."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -69,6 +70,18 @@ class Segmenter:
         if located is None:
             located = self._locator.locate(frame)
         return None if located is None else self._observation(frame, located)
+
+    def alternatives(self, frame: Frame, first: Observation) -> Iterator[Observation]:
+        """Yield other observations of a frame without a prior, which a doubtful start may try.
+
+        first: what `segment` returned. The state stays.
+        """
+        for located, cost in self._locator.alternatives(frame):
+            other = self._observation(frame, located)
+            if other is not None and not (
+                other.region == first.region and np.array_equal(other.silhouette, first.silhouette)
+            ):
+                yield replace(other, cost=cost, arrived=first.arrived)
 
     def set_lost(self, lost: bool, timestamp: float) -> None:
         """State whether the tracker lost the hand in the frame of `timestamp` (s).

@@ -260,7 +260,9 @@ class Oikonomidis2011Config:
     search: GlobalSearchOptions = option(GlobalSearchOptions(follow_arm=False), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(refine=False), "Swarms of a search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(longest_gap=math.inf), "Trust in a pose; not part of the paper", advanced=True
+        TrackingThresholds(longest_gap=math.inf, start_confidence=0),
+        "Trust in a pose; not part of the paper",
+        advanced=True,
     )
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
@@ -284,7 +286,9 @@ class Schroeder2014Config:
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(longest_gap=math.inf), "Trust in a pose; not part of the paper", advanced=True
+        TrackingThresholds(longest_gap=math.inf, start_confidence=0),
+        "Trust in a pose; not part of the paper",
+        advanced=True,
     )
     scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)

@@ -57,12 +57,24 @@ class TrackingThresholds:
         unit="s",
         most=math.inf,
     )
-
     fastest: float = option(
         4.0,
         "Speed of a palm, beside half a hand's length, beyond which a pose is of another hand: the track is lost",
         unit="m/s",
         most=math.inf,
+    )
+    start_confidence: float = option(
+        0.4,
+        "A start with a lower confidence tries other places of the hand; 0: never",
+        source="single frames of the tuning seeds 0 to 5 of the cross-model benchmark",
+        most=1,
+    )
+    place_cost: float = option(
+        2.5,
+        "Energy of a metre of cost of such a place, see `detection`",
+        unit="clamp",
+        source="as `start_confidence`",
+        most=1000,
     )
 
     def __post_init__(self) -> None:

@@ -11,20 +11,15 @@ from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
-from depthtrack.geometry.rotations import rotation_matrix
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
-from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
 from depthtrack.segmentation.observation import Observation
-from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.segmentation.wrist import WristPlane
+from depthtrack.tracking.guided_segmentation import around_start, failure_of, segment
 from depthtrack.tracking.keypoint_guide import KeypointGuide
 from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
@@ -85,6 +80,7 @@ class Pipeline:
         if estimate is None:
             estimate = replace(ABSENT, timestamp=frame.timestamp)
             self._tracker.restore([estimate])
+        observation = around_start(frame, observation, estimate, self._segmenter, self._model)
         self._segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         if estimate.pose is not None:
             self._start_pose = None
@@ -140,54 +136,9 @@ def replay_frames(
     for frame, estimate in frames:
         observation, milliseconds, failure = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
+        observation = around_start(frame, observation, estimate, segmenter, model)
         segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         yield TrackedFrame(frame, observation, estimate, milliseconds, failure)
-
-
-def segment(
-    frame: Frame,
-    segmenter: Segmenter,
-    model: HandModel,
-    guide: Guide,
-    keypoints: KeypointGuide,
-    clock: Callable[[], float],
-) -> tuple[Observation | None, float, str | None]:
-    """Return the observation of a frame, the time in milliseconds, and an unexpected failure.
-
-    It is near the prediction, else near the keypoints of the frame.
-    """
-    begun, observation, failure = clock(), None, None
-    try:
-        pose = guide.predicted_pose(frame.timestamp)
-        observation = segmenter.segment(frame, roi_prior(model, keypoints.pose(frame) if pose is None else pose))
-    except Exception as error:
-        failure = failure_of(error)
-    if observation is not None:
-        observation = replace(observation, arrived=begun)
-    return observation, 1e3 * (clock() - begun), failure
-
-
-def failure_of(error: Exception) -> str:
-    """Return one line on an unexpected error inside a frame.
-
-    Raises:
-        Exception: the error itself, if no frame is its cause, such as a file that cannot be read.
-    """
-    if (text := failure_text(error)) is None:
-        raise error
-    return text
-
-
-def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
-    """Return the ROI prior of a hand in `pose` (27,); None without a pose.
-
-    Only the reach is the hand's own. With the palm sizes of a calibrated hand the IK tracker lost 22 of 1600 frames of
-    a real recording, with average sizes 3.
-    """
-    if pose is None:
-        return None
-    wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return RoiPrior(pose[POSITION].copy(), wrist, replace(AVERAGE_HAND, reach=HandSize.of(model.shape).reach))
 
 
 def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:

@@ -1,7 +1,8 @@
 """Tracker made of stages: lists of stages over candidates, and the state between frames."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +37,24 @@ class Stages:
     refine: Sequence[Stage]
 
 
+class _Proposal(NamedTuple):
+    """Best candidate of a frame, and what its estimate states.
+
+    place: cost of the place of the hand, see `Observation.cost`, metres.
+    The other fields are those of `Estimate`, and the arguments of `TrackState.commit`.
+    """
+
+    candidate: Candidate
+    status: Status
+    branches: tuple[Branch, ...]
+    seen: Candidate
+    evidence: Evidence
+    confidence: float
+    visibility: tuple[float, ...]
+    spread: tuple[float, ...]
+    place: float
+
+
 class StageTracker:
     """Tracker with lists of stages: see `tracker.Tracker`.
 
@@ -56,7 +75,7 @@ class StageTracker:
         deadline: milliseconds after a frame arrives at which its searches end; None for none.
         """
         self.name, self._stages, self._tools, self._seed, self._deadline = name, stages, tools, seed, deadline
-        self._state = TrackState(thresholds, tools.scoring.objective.clamp)
+        self._thresholds, self._state = thresholds, TrackState(thresholds, tools.scoring.objective.clamp)
         listed = (stage.name for stage in (*stages.follow, *stages.start, *stages.refine))
         self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed, "confidence")))
         self._confidence = fitted_model()
@@ -96,11 +115,55 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
-        It is absent if the stages find no candidate.
+        It is absent if the stages find no candidate. A doubtful start tries other places of the hand.
 
         pose: (27,) given by the user.
         """
-        clock, deadline = StageClock(self.stages), Deadline.after(self._deadline, observation.arrived)
+        clock = StageClock(self.stages)
+        begins = pose is None and self._state.begins(observation.timestamp)
+        best = self._propose(observation, lists, clock, pose)
+        if best is None:
+            estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
+            self._state.update(estimate)
+            return estimate
+        if begins and self._deadline is None and best.confidence < self._thresholds.start_confidence:
+            best = min([best, *self._elsewhere(observation, lists, clock)], key=self._cost)
+        self.evidence = best.evidence
+        return self._state.commit(
+            *best.candidate,
+            best.status,
+            clock.milliseconds,
+            observation.timestamp,
+            best.confidence,
+            best.visibility,
+            best.spread,
+            best.branches,
+            best.seen,
+        )
+
+    def _elsewhere(
+        self, observation: Observation, lists: dict[Status, Sequence[Stage]], clock: StageClock
+    ) -> Iterator[_Proposal]:
+        """Yield the best candidate at each other place of the hand."""
+        for other in observation.alternatives() if observation.alternatives is not None else ():
+            found = self._propose(other, lists, clock)
+            if found is not None:
+                yield found
+
+    def _cost(self, proposal: _Proposal) -> float:
+        """Return the energy of a candidate, and of its place."""
+        place = self._thresholds.place_cost * self._tools.scoring.objective.clamp * proposal.place
+        return proposal.candidate.energy + place
+
+    def _propose(
+        self,
+        observation: Observation,
+        lists: dict[Status, Sequence[Stage]],
+        clock: StageClock,
+        pose: Array | None = None,
+    ) -> _Proposal | None:
+        """Return the best candidate of some lists of stages, or None without any."""
+        deadline = Deadline.after(self._deadline, observation.arrived)
         self._tools.set_target(observation)
         clock.lap("target")
         found: list[tuple[Candidate, Status, tuple[Branch, ...]]] = []
@@ -116,9 +179,7 @@ class StageTracker:
                 found.append((candidates[0], Status.STARTED if frame.restarted else status, frame.branches))
         self._state.search = interrupted
         if not found:
-            estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
-            self._state.update(estimate)
-            return estimate
+            return None
         best, status, branches = min(found, key=lambda pair: pair[0].energy)
         tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
         seen = seen_part(best, rendered, target, tools.scoring.objective)
@@ -126,8 +187,8 @@ class StageTracker:
         unhidden = rendered
         if target.occluder is not None:
             unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
-        self.evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
-        confidence = self._confidence(self.evidence)
+        evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
+        confidence = self._confidence(evidence)
         clock.lap("confidence")
-        figures = confidence, tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
-        return self._state.commit(*best, status, clock.milliseconds, observation.timestamp, *figures, branches, seen)
+        figures = tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
+        return _Proposal(best, status, branches, seen, evidence, confidence, *figures, observation.cost)

@@ -184,6 +184,13 @@ class TrackState:
         self.last_trusted, self.time = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 
+    def begins(self, timestamp: float) -> bool:
+        """Return whether a track begins at `timestamp` (s).
+
+        A search is due then, and no pose was trusted lately.
+        """
+        return self.pose is None and self.last_trusted is None and self.is_search_due(timestamp)
+
     def is_search_due(self, timestamp: float) -> bool:
         """Return whether a hand without a pose is searched for everywhere at `timestamp` (s).
 

@@ -16,7 +16,7 @@ from depthtrack.segmentation.pixel_labels import ARM, ATTACHED, BACKGROUND, HAND
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesiser
-from depthtrack.tracking.pipeline import roi_prior
+from depthtrack.tracking.guided_segmentation import roi_prior
 
 CAMERA = Camera(80, 60, 75.0, 75.0, 39.5, 29.5, 0.001)
 SKIN, BLUE = (200, 150, 120), (30, 60, 160)

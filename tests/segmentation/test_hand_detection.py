@@ -17,14 +17,14 @@ DETECTOR = HandDetector(OPTIONS, AVERAGE_HAND)
 def test_the_hand_is_detected_at_its_palm() -> None:
     grid, palm = club(0.0)
     found = DETECTOR.detect(grid, grid)
-    assert found is not None
-    np.testing.assert_allclose(found, palm.centre, atol=0.02)
+    np.testing.assert_allclose(found[0].centre, palm.centre, atol=0.02)
+    assert [hand.cost for hand in found] == sorted(hand.cost for hand in found)
 
 
 def test_no_hand_is_detected_without_candidates() -> None:
     grid, _ = club(0.0)
     nothing = grid.within(np.zeros(grid.depth.shape, np.bool_))
-    assert DETECTOR.detect(grid, nothing) is None
+    assert DETECTOR.detect(grid, nothing) == []
     assert DETECTOR.nearest_palm(grid, nothing, np.array([0.0, 0.0, 0.5])) is None
 
 

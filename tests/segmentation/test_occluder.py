@@ -13,7 +13,7 @@ from depthtrack.segmentation.options import OccluderOptions, SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
-from depthtrack.tracking.pipeline import roi_prior
+from depthtrack.tracking.guided_segmentation import roi_prior
 from depthtrack.types import Mask
 
 HOLDING = Synthesis("everyday", frames=3, model="skin", sensor="kinect1", background="room", held_object="sphere")

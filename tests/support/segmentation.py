@@ -16,4 +16,6 @@ def changed_options(**values: Any) -> SegmentationOptions:
             changed[each.path] = 0.97 * each.default
         elif isinstance(each.default, int):
             changed[each.path] = each.default - 1 if each.default > 1 else each.default + 1
+        elif each.path.endswith("alternative_shifts"):
+            changed[each.path] = tuple(0.97 * value for value in each.default)
     return with_options(SegmentationOptions(), changed | values)

@@ -17,8 +17,8 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking import pipeline as module
-from depthtrack.tracking.pipeline import Pipeline, estimates_of, track_frames, write_run
+from depthtrack.tracking import guided_segmentation as module
+from depthtrack.tracking.pipeline import Pipeline, estimates_of, replay_frames, track_frames, write_run
 from depthtrack.tracking.tracker import Estimate
 from tests.support.recordings import CAMERA, depth_at, pose_at
 
@@ -74,6 +74,9 @@ class Whole:
         times = {"frame_index": frame.index, "timestamp": frame.timestamp}
         fields: dict[str, Any] = {**place, **times, "centre": np.array([0.0, 0, 0.7]), "palm_radius": 0.03}
         return Observation(**fields, arm_direction=None, wrist=None)
+
+    def alternatives(self, frame: Frame, first: Observation) -> tuple[Observation, ...]:
+        return ()
 
     def set_lost(self, lost: bool, timestamp: float) -> None:
         return None
@@ -139,7 +142,7 @@ def test_replay_passes_over_failed_segmentation() -> None:
     estimates = [Estimate(None, np.nan, 0.0, Status.ABSENT)] * FRAMES
     pairs = zip(frames(), estimates, strict=True)
     segmenter = cast(Segmenter, Whole(SEGMENTING))
-    replayed = list(module.replay_frames(pairs, Following({}), segmenter, HandShape()))
+    replayed = list(replay_frames(pairs, Following({}), segmenter, HandShape()))
     assert [each.frame.index for each in replayed if each.failure is not None] == sorted(SEGMENTING)
 
 

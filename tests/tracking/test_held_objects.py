@@ -16,7 +16,7 @@ from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.candidate import evaluate, seen_part
-from depthtrack.tracking.pipeline import roi_prior
+from depthtrack.tracking.guided_segmentation import roi_prior
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 HOLDING = Synthesis("everyday", frames=60, model="skin", sensor="kinect1", viewpoint=4, held_object="sphere")

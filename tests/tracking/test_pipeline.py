@@ -8,7 +8,7 @@ import pytest
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.hand_size import AVERAGE_HAND
-from depthtrack.tracking.pipeline import roi_prior
+from depthtrack.tracking.guided_segmentation import roi_prior
 
 
 def test_without_a_pose_there_is_no_prior() -> None:

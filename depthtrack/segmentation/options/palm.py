@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from depthtrack.options import check_ranges, option
 
 _CHOSEN = "chosen by hand on 425 single frames, 90 of them real: the hand costs least in 423; no script is kept"
+_TUNED = "single frames of the tuning seeds 0 to 5 of the cross-model benchmark"
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,13 @@ class DetectionOptions:
     )
     farthest_wrist: float = option(0.21, "Distance beyond which this cost does not grow", unit="m", source=_CHOSEN)
     no_arm_cost: float = option(0.1, "Cost of a candidate without a visible arm", unit="m", source=_CHOSEN)
+    alternatives: int = option(4, "Palm candidates that a doubtful start tries, at most", most=100)
+    alternative_cost: float = option(
+        0.12, "Cost beside that of the first candidate up to which they are tried", unit="m", source=_TUNED
+    )
+    alternative_shifts: tuple[float, ...] = option(
+        (0.04, 0.08), "Distances away from the forearm at which the first palm is tried too", unit="m", source=_TUNED
+    )
 
     def __post_init__(self) -> None:
         check_ranges(self)

@@ -12,6 +12,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import Run, RunWriter
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
+from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.pipeline import Pipeline, estimates_of, track_frames, write_run
@@ -134,6 +135,9 @@ class _Segmenter:
 
     def segment(self, frame: Frame, place: object):  # type: ignore[no-untyped-def]
         return None if frame.index % 8 == 5 else observe(self.made, frame.index)
+
+    def alternatives(self, frame: Frame, first: Observation) -> tuple[Observation, ...]:
+        return ()
 
     def set_lost(self, lost: bool, timestamp: float) -> None: ...
 
