@@ -10,6 +10,7 @@ from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.evaluation.metrics import without_offsets
+from depthtrack.evaluation.metrics.offsets import corrected_keypoints, joint_offsets
 from depthtrack.evaluation.sweep.rows import Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
@@ -17,6 +18,7 @@ from depthtrack.recording.sequence import Sequence
 from depthtrack.rendering.visibility import points_in_view
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
+from depthtrack.tracking.guided_segmentation import segment_start
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.stages.branches import PALM_AND_BACK, turned
@@ -70,18 +72,23 @@ def visible_joints(sequence: Sequence, index: int, joints: Array) -> Mask:
 
 
 def _starts(sequence: Sequence, found: Calibration, joints: Array) -> Row:
-    """Return the number of single-frame starts, and of those on the right branch."""
+    """Return the number of single-frame starts, and of those on the right branch.
+
+    The offsets removed are those of poses fitted to the true joints. Wrong starts do not change them.
+    """
     model, truth, segmenter = HandModel(found.hand), sequence.ground_truth, Segmenter.for_sequence(sequence)
     assert truth is not None
     poses, indices = list[Array](), list[int]()
     with closing(create_tracker(tracker_config("hybrid"), found.hand)) as tracker:
         for index in range(0, len(sequence), START_EVERY):
             segmenter.reset()
-            observation = segmenter.segment(sequence[index])
+            observation = segment_start(sequence[index], segmenter)
             pose = None if observation is None else tracker.start(observation).pose
             poses.append(np.full(27, np.nan) if pose is None else pose)
             indices.append(index)
-    errors = _errors(model, np.array(poses), joints[indices]).mean(axis=1)
+    offsets = joint_offsets(model, fit_poses(model, joints).poses, joints)
+    points = corrected_keypoints(model, np.array(poses), offsets)
+    errors = np.linalg.norm(points - joints[indices], axis=2).mean(axis=1)
     right = errors < WRONG
     flexions = (
         truth.poses[indices][:, ANGLES].reshape(-1, 5, 4)[:, :, 1:].mean(axis=(1, 2)) if truth.poses is not None else 0

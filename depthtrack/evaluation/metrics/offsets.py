@@ -11,16 +11,43 @@ def without_offsets(model: HandModel, poses: Array, joints: Array) -> Array:
 
     poses: (T, 27); NaN if unknown.
     joints: (T, 21, 3) metres, camera frame; NaN if unknown.
+    """
+    return corrected_keypoints(model, poses, joint_offsets(model, poses, joints))
+
+
+def joint_offsets(model: HandModel, poses: Array, joints: Array) -> Array:
+    """Return the constant offsets (21, 3) of poses, metres.
+
+    Each is in the frame of the bone that moves the joint.
+
+    poses, joints: as in `without_offsets`.
 
     Models of different make place joints differently within the same flesh. The offset of a joint is its median
-    difference over all frames, in the frame of the bone that moves it.
+    difference over all frames; zero without any.
+    """
+    keypoints, R = _keypoints_and_bones(model, poses)
+    local = np.einsum("tjab,tja->tjb", R, keypoints - joints)
+    usable = np.isfinite(local).all(axis=(1, 2))
+    return np.asarray(np.median(local[usable], axis=0)) if usable.any() else np.zeros((21, 3))
+
+
+def corrected_keypoints(model: HandModel, poses: Array, offsets: Array) -> Array:
+    """Return the keypoints (T, 21, 3), metres, of poses without given offsets.
+
+    poses: (T, 27); NaN if unknown.
+    offsets: (21, 3) of `joint_offsets`.
+    """
+    keypoints, R = _keypoints_and_bones(model, poses)
+    return np.asarray(keypoints - np.einsum("tjab,jb->tja", R, offsets))
+
+
+def _keypoints_and_bones(model: HandModel, poses: Array) -> tuple[Array, Array]:
+    """Return the keypoints (T, 21, 3) and the orientations of their bones (T, 21, 3, 3).
+
+    Those of unknown poses are NaN.
     """
     keypoints, R = np.full((len(poses), 21, 3), np.nan), np.full((len(poses), 21, 3, 3), np.nan)
     known = np.isfinite(poses).all(axis=1)
     keypoints[known] = model.keypoints(poses[known])
     R[known] = model.transforms(poses[known])[:, KEYPOINT_BODIES, :3, :3]
-    local = np.einsum("tjab,tja->tjb", R, keypoints - joints)
-    usable = np.isfinite(local).all(axis=(1, 2))
-    if not usable.any():
-        return keypoints
-    return np.asarray(keypoints - np.einsum("tjab,jb->tja", R, np.median(local[usable], axis=0)))
+    return keypoints, R
