@@ -67,7 +67,9 @@ class Synergies:
         X = np.asarray(postures, dtype=np.float64)
         if X.ndim != 2 or X.shape[1] != ANGLE_COUNT or not np.isfinite(X).all():
             raise InputError(f"synergies need postures of {ANGLE_COUNT} finite angles each, found shape {X.shape}")
-        if len(X) < 2 or np.var(X, axis=0).sum() < _SPREAD:
+        if len(X) < 2:
+            raise InputError(f"synergies need two postures or more that differ, found {len(X)}")
+        if np.var(X, axis=0).sum() < _SPREAD:
             raise InputError(f"synergies need postures that differ, found {len(X)} equal ones")
         mean = X.mean(axis=0)
         # The triangular factor has the same singular values and right singular vectors, and at most 20 rows.

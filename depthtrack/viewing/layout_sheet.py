@@ -26,6 +26,8 @@ _INK: Rgb = (20, 20, 20)
 _GREY: Rgb = (105, 105, 105)
 _MARKER: Rgb = (200, 30, 30)
 _MARGIN, _GAP = 60, 20
+_COLUMNS = ((1, 21, 38), (2, 18, 31), (2, 15, 24))
+"""Columns, size of the text and height of a line of the list of places, pixels; the first that fits is used."""
 _DISTANCE, _SPAN = 1.0, 0.25
 """Distance and side of the picture at the hand, metres, for a hand of scale 1."""
 _SUPERSAMPLING = 3
@@ -52,13 +54,9 @@ def layout_sheet(model: MarkerModel, title: str, places: Sequence[str], figures:
     rows = [_line(title, width, 34, _INK, 64)]
     columns = [stacked([name, view], gap=0) for name, view in zip(names, views, strict=True)]
     rows.append(_white_gap(beside(columns, gap=_GAP)))
-    rows += [
-        _line(text, width, 21, _INK, 38)
-        for number, place in enumerate(places, start=1)
-        for text in _wrapped(f"{number}   {place}", width, 21)
-    ]
-    rows += [_line("", width, 20, _GREY, 16), *(_line(text, width, 20, _GREY, 32) for text in figures)]
-    content = np.concatenate(rows, axis=0)
+    below = [_line("", width, 20, _GREY, 16), *(_line(text, width, 20, _GREY, 32) for text in figures)]
+    room = PAGE[1] - 2 * _MARGIN - sum(len(row) for row in (*rows, *below))
+    content = np.concatenate([*rows, _list(places, width, room), *below], axis=0)
     page = blank(PAGE[0], max(PAGE[1], len(content) + 2 * _MARGIN), _PAPER)
     page[_MARGIN : _MARGIN + len(content), _MARGIN : _MARGIN + content.shape[1]] = content
     return page
@@ -104,6 +102,27 @@ def _line(text: str, width: int, size: int, colour: Rgb, height: int = 36) -> Im
     bar = blank(width, height, _PAPER)
     put_text(bar, text, (0, height // 2), size, colour)
     return bar
+
+
+def _list(places: Sequence[str], width: int, room: int) -> Image:
+    """Return the numbered places, in two columns and small if they need more than `room` pixels."""
+    image = blank(width, 1, _PAPER)
+    for columns, size, height in _COLUMNS:
+        wide = (width - (columns - 1) * _GAP) // columns
+        blocks = [_wrapped(f"{number}   {place}", wide, size) for number, place in enumerate(places, start=1)]
+        parts: list[list[str]] = [[] for _ in range(columns)]
+        part, each = 0, -(-sum(map(len, blocks)) // columns)
+        for block in blocks:
+            part += len(parts[part]) >= each
+            parts[part] += block
+        image = blank(width, height * max(map(len, parts)), _PAPER)
+        for k, lines in enumerate(parts):
+            for n, text in enumerate(lines):
+                bar = _line(text, wide, size, _INK, height)
+                image[n * height : (n + 1) * height, k * (wide + _GAP) :][:, :wide] = bar
+        if len(image) <= room:
+            break
+    return image
 
 
 def _wrapped(text: str, width: int, size: int) -> list[str]:

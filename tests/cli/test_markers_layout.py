@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from depthtrack.cli import main
+from depthtrack.hand.pose import ANGLE_NAMES
 from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.markers.models.model_choice import choose_models
@@ -45,6 +46,9 @@ def test_a_layout_is_written_with_its_page(
         (["--motion", "grasp", "--markers", "4", "-o", "a.json", "--cameras", "1"], "from 2 to 64"),
         (["--motion", "grasp", "--markers", "4", "-o", "a.json", "--radius", "0"], "from 0.5 to 20"),
         (["--motion", "grasp", "--markers", "0", "-o", "a.json"], "from 1 to 64"),
+        (["--motion", "two.csv", "--markers", "4", "-o", "a.json"], "a motion of 5 postures or more, found 2"),
+        (["--motion", "two.csv", "two.csv", "--markers", "4", "-o", "a.json"], "5 postures or more"),
+        (["--motion", "one.csv", "--markers", "4", "-o", "a.json"], "two postures or more that differ, found 1"),
     ],
 )
 def test_mistakes_are_stated(
@@ -54,7 +58,11 @@ def test_mistakes_are_stated(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    postures = [",".join(ANGLE_NAMES), *(",".join([f"0.{k}"] * len(ANGLE_NAMES)) for k in (1, 2))]
+    (tmp_path / "two.csv").write_text("\n".join(postures) + "\n")
+    (tmp_path / "one.csv").write_text("\n".join(postures[:2]) + "\n")
+    before = set(tmp_path.iterdir())
     monkeypatch.chdir(tmp_path)
     assert main(["markers", "layout", *arguments]) == 2
     assert message in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    assert set(tmp_path.iterdir()) == before

@@ -78,7 +78,6 @@ class Command:
         found = find_layout_of(quality, self.markers, options, self.seed)
         about = f"{self.markers} markers for {', '.join(self.motion)}"
         layout = replace(quality.candidates.layout(found.rows, about, self.wrist), synergies=quality.synergies)
-        write_atomic(self.out, layout.to_json())
         places, terms = instructions(layout, hand), quality.terms(found.rows)
         bare = quality.candidates.layout(found.rows, about).on(hand)
         errors = expected_errors(bare, motions, quality.options.components, self.wrist, self.noise / 1000)
@@ -88,6 +87,7 @@ class Command:
         }
         page = self.out.with_suffix(".png")
         sentences = [f"{place.label}: {place.text}" for place in places]
+        write_atomic(self.out, layout.to_json())
         save_picture(layout_sheet(layout.on(hand), about, sentences, _lines(figures)), page)
         if self.json:
             print(json_text({"layout": str(self.out), "page": str(page), "markers": sentences} | figures, indent=2))
@@ -164,6 +164,12 @@ def read_motion(name: str) -> "Array":
     return np.ascontiguousarray(postures[:: max(1, -(-len(postures) // MOST_POSTURES))])
 
 
+def _condition(number: float) -> str:
+    from depthtrack.markers.layout.condition import LARGEST
+
+    return "infinite" if number >= 0.999 * LARGEST else f"{number:,.0f}"
+
+
 def _lines(figures: dict[str, Any]) -> list[str]:
     hidden = figures["hidden_share"]
     return [
@@ -172,8 +178,8 @@ def _lines(figures: dict[str, Any]) -> list[str]:
         f"objective '{figures['objective']}' {figures['energy']:.3f}: expected root mean square error"
         f" {figures['expected_rms_mm']:.2f} mm, after the loss of the worst marker"
         f" {figures['expected_rms_after_loss_mm']:.2f} mm",
-        f"condition number {figures['condition']:.0f}, after the loss of the worst marker"
-        f" {figures['condition_after_loss']:.3g}, least distance {figures['least_distance_mm']:.1f} mm",
+        f"condition number {_condition(figures['condition'])}, after the loss of the worst marker"
+        f" {_condition(figures['condition_after_loss'])}, least distance {figures['least_distance_mm']:.1f} mm",
         *([] if hidden is None else [f"hidden from the cameras in {100 * hidden:.1f} % of the samples"]),
         f"simulated error with noise of {figures['noise_mm']:g} mm: {figures['error_mm']:.2f} mm mean of the skin,"
         f" {figures['largest_mm']:.1f} mm largest",

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from depthtrack.errors import InputError
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.hand.synergies import Synergies
@@ -12,6 +13,8 @@ from depthtrack.markers.layout.reconstruction import ReconstructionOptions, reco
 from depthtrack.markers.models.marker_model import MarkerModel
 from depthtrack.types import Array
 
+_FEWEST = 5
+"""Postures of a motion from which on its last fifth is one posture or more."""
 _HELD_OUT = 200
 _FRAMES = 32
 """Frames whose vertices are in memory at a time."""
@@ -48,8 +51,14 @@ def expected_errors(
         most `_HELD_OUT` frames, is reconstructed.
     anchored: whether the wrist is measured too.
     noise: standard deviation of each coordinate, metres.
+
+    Raises:
+        InputError: if each motion has fewer than `_FEWEST` postures, or the first four fifths are equal.
     """
     assert model.hand is not None
+    longest = max(map(len, motions), default=0)
+    if longest < _FEWEST:
+        raise InputError(f"the simulated error needs a motion of {_FEWEST} postures or more, found {longest}")
     split = [max(1, 4 * len(postures) // 5) for postures in motions]
     known = np.concatenate([postures[:first] for postures, first in zip(motions, split, strict=True)])
     synergies, options = Synergies.fit(known), ReconstructionOptions(components=components)

@@ -42,6 +42,12 @@ def test_the_page_has_both_views_and_all_places(candidates: Candidates) -> None:
     assert red[:, PAGE[0] // 2 :].sum() > 200
 
 
+def test_places_of_26_markers_fit_on_the_page(candidates: Candidates) -> None:
+    model = candidates.layout([5, 700], "two markers", anchored=True).on(candidates.hand)
+    place = "back of the hand, over the metacarpal of the little finger: 18 mm from the wrist towards the knuckle"
+    assert layout_sheet(model, "26 markers", [place] * 27, ["figures"] * 5).shape == (PAGE[1], PAGE[0], 3)
+
+
 def test_cameras_above_see_the_back_and_cameras_below_do_not(candidates: Candidates, postures: Array) -> None:
     above = camera_directions(3)
     flat = 0 * postures[:1]
