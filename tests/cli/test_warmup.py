@@ -12,10 +12,17 @@ def test_the_kernels_are_compiled_and_their_folder_is_printed(
 ) -> None:
     monkeypatch.setattr(warmup, "SCENES", ({"model": "primitives"},))
     monkeypatch.setattr(warmup, "TRACKERS", (("ik", {"resolution": 64}),))
+    layouts: list[bool] = []
+    monkeypatch.setattr(warmup, "compile_layouts", lambda: layouts.append(True))
     assert main(["warmup"]) == 0
     folder = compilation.cache_folder()
     assert folder is not None
     assert str(folder) in capsys.readouterr().out
+    assert layouts == [True]
+
+
+def test_the_kernels_of_layouts_are_used() -> None:
+    warmup.compile_layouts()
 
 
 def test_each_tracker_of_the_list_exists() -> None:
