@@ -94,5 +94,8 @@ class LayoutOptions:
         f"Particle swarm; the paper has 1000 particles and 100 generations ({_PAPER}, Sec. 5.2)",
         advanced=True,
     )
+    greedy_particle: bool = option(
+        True, "One particle of the swarm begins at the greedy choice; off: all begin at random places, as in the paper"
+    )
     exchange: bool = option(True, "Exchange single markers after the swarm until no exchange improves the layout")
     kicks: int = option(10, "Times that three markers of the best layout are moved at random, and exchanged again")

@@ -7,7 +7,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.machine import usable_cores
-from depthtrack.markers.layout.exchange import exchanged, greedy_layout, kicked
+from depthtrack.markers.layout.exchange import greedy_layout, kicked
 from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.surface_swarm import FoundLayout, swarm_layout
@@ -39,10 +39,7 @@ def find_layout_of(
         )
     generator = np.random.Generator(np.random.Philox(key=[seed, count]))
     with ThreadPoolExecutor(usable_cores() if threads is None else threads) as pool:
-        found = swarm_layout(quality, count, generator, options.swarm, pool, progress)
-        if not options.exchange:
-            return found
-        # So the result is never worse than the greedy one.
-        starts = exchanged(quality, found.rows, pool, progress), greedy_layout(quality, count, pool)
-        best = min(starts, key=lambda start: start.energy)
-        return kicked(quality, best.rows, options.kicks, generator, pool, progress)
+        # With this particle, the result is never worse than the greedy choice.
+        start = greedy_layout(quality, count, pool).rows if options.greedy_particle else None
+        found = swarm_layout(quality, count, generator, options.swarm, pool, progress, start)
+        return kicked(quality, found.rows, options.kicks, generator, pool, progress) if options.exchange else found

@@ -89,9 +89,15 @@ def swarm_layout(
     options: SwarmOptions,
     pool: ThreadPoolExecutor | None = None,
     progress: Callable[[float], None] = lambda energy: None,
+    start: Index | None = None,
 ) -> FoundLayout:
-    """Return the layout of `count` markers that a swarm on the skin finds."""
+    """Return the layout of `count` markers that a swarm on the skin finds.
+
+    start: (count,) layout at which one particle begins; the others begin at random places.
+    """
     swarm = SurfaceSwarm(quality, count, pool)
-    first = swarm.positions(quality.candidates.random_rows((options.particles, count), generator))
-    found = minimise(swarm.score, first, swarm, generator, options, progress)
+    first = quality.candidates.random_rows((options.particles, count), generator)
+    if start is not None:
+        first[0] = start
+    found = minimise(swarm.score, swarm.positions(first), swarm, generator, options, progress)
     return FoundLayout(swarm.rows(found.position[None])[0], found.energy)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from depthtrack.benchmarks.papers.schroeder2015_greedy import WholeEvaluation, next_better
 from depthtrack.errors import InputError
 from depthtrack.markers.layout.exchange import exchanged, greedy_layout
 from depthtrack.markers.layout.nearest import Tree, nearest_rows
@@ -15,8 +16,13 @@ from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.markers.layout.surface_swarm import SurfaceSwarm
 from depthtrack.solver.options import SwarmOptions
+from depthtrack.types import Index
 
 SMALL = LayoutOptions(swarm=SwarmOptions(particles=60, generations=15), kicks=1)
+
+
+def energy_of(quality: LayoutQuality, rows: Index) -> float:
+    return float(quality.energies(rows[None])[0])
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.sampled_from([1, 2, 7, 9, 100, 400]))
@@ -62,7 +68,28 @@ def test_no_exchange_improves_the_layout(quality: LayoutQuality) -> None:
 def test_the_search_is_never_worse_than_the_greedy_choice(quality: LayoutQuality) -> None:
     few = LayoutOptions(swarm=SwarmOptions(particles=2, generations=1), kicks=0)
     for count in (4, 6):
-        assert find_layout_of(quality, count, few).energy <= greedy_layout(quality, count).energy
+        assert find_layout_of(quality, count, few).energy <= energy_of(quality, greedy_layout(quality, count).rows)
+
+
+def test_a_swarm_with_a_greedy_particle_is_never_worse_than_the_greedy_choice(quality: LayoutQuality) -> None:
+    few = LayoutOptions(swarm=SwarmOptions(particles=3, generations=2), exchange=False)
+    alone = find_layout_of(quality, 4, replace(few, greedy_particle=False))
+    greedy = energy_of(quality, greedy_layout(quality, 4).rows)
+    assert find_layout_of(quality, 4, few).energy <= greedy < alone.energy
+
+
+def test_sums_and_bounds_leave_the_greedy_choice_unchanged(quality: LayoutQuality) -> None:
+    whole = WholeEvaluation.like(quality)
+    np.testing.assert_array_equal(greedy_layout(whole, 4).rows, greedy_layout(quality, 4).rows)
+    assert whole.evaluated[0] > 7 * len(quality.candidates)
+
+
+def test_no_next_vertex_is_better(quality: LayoutQuality) -> None:
+    whole = WholeEvaluation.like(quality)
+    found = next_better(whole, quality.candidates.random_rows(3, np.random.default_rng(0)))
+    assert found.energy == pytest.approx(quality.energies(found.rows[None])[0], rel=1e-12)
+    for k in range(3):
+        assert quality.grown(np.delete(found.rows, k)).min() >= found.energy - 1e-9
 
 
 def test_exchanges_begin_where_the_swarm_ended(quality: LayoutQuality) -> None:
