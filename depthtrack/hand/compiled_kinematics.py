@@ -118,9 +118,11 @@ def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
     bodies = BodyPoses(np.empty((BODY_COUNT, 3, 4)), np.empty((20, 3)), np.empty((20, 3)))
     for n in range(poses.shape[0]):
         forward_kinematics(chain, poses[n], bodies)
-        out[n, :, :3] = bodies.T
-        out[n, :, 3, :3] = 0.0
-        out[n, :, 3, 3] = 1.0
+        for b in range(BODY_COUNT):
+            for j in range(4):
+                for i in range(3):
+                    out[n, b, i, j] = bodies.T[b, i, j]
+                out[n, b, 3, j] = 1.0 if j == 3 else 0.0
 
 
 @compiled(nogil=True)
@@ -173,6 +175,8 @@ def endpoints(chain: Chain, bodies: BodyPoses, out: Array) -> None:
     """Write the phalanx endpoints (5, 4, 3), metres, camera frame; see `HandModel.endpoints`."""
     for finger in range(5):
         for phalanx in range(3):
-            out[finger, phalanx] = bodies.T[1 + 3 * finger + phalanx, :, 3]
+            for i in range(3):
+                out[finger, phalanx, i] = bodies.T[1 + 3 * finger + phalanx, i, 3]
         last = bodies.T[3 + 3 * finger]
-        out[finger, 3] = last[:, 3] + last[:, 1] * chain.lengths[finger, 2]
+        for i in range(3):
+            out[finger, 3, i] = last[i, 3] + last[i, 1] * chain.lengths[finger, 2]

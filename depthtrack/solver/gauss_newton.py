@@ -118,8 +118,12 @@ def solve_each(
     coordinates, slope, angles = np.empty(count), np.zeros(count), np.empty(20)
     for n in range(poses.shape[0]):
         points, pose = problem.points, poses[n]
-        points.target[:], points.weight[:] = targets[n], weights[n]
-        problem.equations.centre[:] = pose[:3]
+        for k in range(weights.shape[1]):
+            points.weight[k] = weights[n, k]
+            for i in range(3):
+                points.target[k, i] = targets[n, k, i]
+        for i in range(3):
+            problem.equations.centre[i] = pose[i]
         for j in range(20):
             angles[j] = pose[7 + j] - problem.space.mean[j]
         for i in range(count):

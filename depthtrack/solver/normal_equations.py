@@ -49,8 +49,12 @@ def clear(equations: NormalEquations, bodies: BodyPoses) -> None:
     """Remove all residuals, and refer those to come to the bodies where they are now."""
     equations.sums[:] = 0.0
     equations.e[:] = 0.0
-    equations.T[:] = bodies.T
-    equations.centre[:] = bodies.T[0, :, 3]
+    for b in range(BODY_COUNT):
+        for i in range(3):
+            for j in range(4):
+                equations.T[b, i, j] = bodies.T[b, i, j]
+    for i in range(3):
+        equations.centre[i] = bodies.T[0, i, 3]
 
 
 @compiled(nogil=True)

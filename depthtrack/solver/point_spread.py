@@ -28,7 +28,9 @@ def point_spread(
     body, points: (N,) bodies of the points, and their places (N, 3), metres, camera frame.
     """
     J, A, spread = np.zeros((3, 26)), np.zeros((26, 26)), np.full(body.shape[0], np.nan)
-    A[6:, 6:] = precision
+    for i in range(20):
+        for j in range(20):
+            A[6 + i, 6 + j] = precision[i, j]
     columns = np.arange(10)
     for n in range(measured.shape[0]):
         point_jacobian(bodies, measured[n], at[n], J)

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from depthtrack.rendering.raster import hand_constants as constants
 from depthtrack.rendering.raster.quadrics import span, write_cones, write_general, write_spheres
 from depthtrack.simd.functions import first, vfloor
@@ -23,8 +25,8 @@ def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array
     table: (COEFFICIENT_ROWS * SLOTS,) float32, written.
     """
     R = _palm_rotation(pose[3], pose[4], pose[5], pose[6])
-    x, y, z = _rotated(R, hand, 0, 3), _rotated(R, hand, 1, 3), _rotated(R, hand, 2, 3)
-    p = _rotated(R, hand, constants.BASE_POSITION, 1)
+    x, y, z = _rotated(R, hand, 8 * 0, 8 * 3), _rotated(R, hand, 8 * 1, 8 * 3), _rotated(R, hand, 8 * 2, 8 * 3)
+    p = _rotated(R, hand, 8 * constants.BASE_POSITION, 8 * 1)
     p = (p[0] + pose[0], p[1] + pose[1], p[2] + pose[2])
     for finger in range(5):
         for k in range(4):
@@ -34,8 +36,9 @@ def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array
     s1, c1 = _sine_cosine(_load(scratch, 8))
     s2, c2 = _sine_cosine(_load(scratch, 16))
     s3, c3 = _sine_cosine(_load(scratch, 24))
-    # Spheres sit at the joints, cones between them.
-    bounds = write_spheres(table, 0, hand, camera, p)
+    # Spheres sit at the joints, cones between them. Each literal number of a phalanx would be compiled anew.
+    n = np.int64(0)
+    bounds = write_spheres(table, n, hand, camera, p)
     y, z = _turn(s1, c1, y, z)
     thumb = _load(hand, 8 * constants.IS_THUMB) > 0.5
     write_general(
@@ -48,11 +51,11 @@ def set_up(pose: Array, hand: Array, camera: Array, scratch: Array, table: Array
         _with_thumb(thumb, R[2], R[5], R[8], z),
         _with_thumb(thumb, pose[0], pose[1], pose[2], p),
     )
-    p, bounds = _phalanx(table, 0, constants.LENGTH, hand, camera, bounds, p, y)
+    p, bounds = _phalanx(table, n, constants.LENGTH + n, hand, camera, bounds, p, y)
     y, z = _turn(s2, c2, y, z)
-    p, bounds = _phalanx(table, 1, constants.LENGTH + 1, hand, camera, bounds, p, y)
+    p, bounds = _phalanx(table, n + 1, constants.LENGTH + 1, hand, camera, bounds, p, y)
     y, z = _turn(s3, c3, y, z)
-    _phalanx(table, 2, constants.TIP_LENGTH, hand, camera, bounds, p, y)
+    _phalanx(table, n + 2, constants.TIP_LENGTH + n, hand, camera, bounds, p, y)
 
 
 @kernel_part
@@ -67,9 +70,9 @@ def _palm_rotation(qw, qx, qy, qz):
 
 
 @kernel_part
-def _rotated(R, hand, row, stride):
-    """Return R times the constant vectors at rows `row`, `row + stride`, `row + 2 stride`."""
-    b0, b1, b2 = _load(hand, 8 * row), _load(hand, 8 * (row + stride)), _load(hand, 8 * (row + 2 * stride))
+def _rotated(R, hand, at, stride):
+    """Return R times the constant vectors at the elements `at`, `at + stride`, `at + 2 stride`."""
+    b0, b1, b2 = _load(hand, at), _load(hand, at + stride), _load(hand, at + 2 * stride)
     return (
         R[0] * b0 + R[1] * b1 + R[2] * b2,
         R[3] * b0 + R[4] * b1 + R[5] * b2,

@@ -33,8 +33,12 @@ STEEP = 1e20
 
 
 @kernel_part
-def _put(table: Array32, row: int, slot: int, value) -> None:
-    store(table, row * SLOTS + slot, narrow(value))
+def _put(table: Array32, at: int, value) -> None:
+    """Write eight lanes to a row from a slot on.
+
+    at: row * SLOTS + slot. Given apart, each constant row would be compiled anew.
+    """
+    store(table, at, narrow(value))
 
 
 @kernel_part
@@ -80,22 +84,22 @@ def _write(table, slot, camera, bounds, q, G, C):
     i = 1.0 / select(vabs(C) > 1e-12, C, 1e-12)
     beta, beta_u, beta_v = (dx * q[0] + dy * q[1] + q[2]) * i, q[0] * i * ex, q[1] * i * ey
     gx, gy, gz = xx * dx + xy * dy + xz, xy * dx + yy * dy + yz, xz * dx + yz * dy + zz
-    _put(table, BETA, slot, beta)
-    _put(table, BETA_U, slot, beta_u)
-    _put(table, BETA_V, slot, beta_v)
+    _put(table, BETA * SLOTS + slot, beta)
+    _put(table, BETA_U * SLOTS + slot, beta_u)
+    _put(table, BETA_V * SLOTS + slot, beta_v)
     d_vv = beta_v * beta_v - yy * i * (ey * ey)
-    _put(table, D, slot, 0.25 * (beta * beta - (gx * dx + gy * dy + gz) * i))
-    _put(table, D_U, slot, 0.5 * (beta * beta_u - gx * i * ex))
-    _put(table, D_V, slot, 0.5 * (beta * beta_v - gy * i * ey))
-    _put(table, D_UU, slot, 0.25 * (beta_u * beta_u - xx * i * (ex * ex)))
-    _put(table, D_UV, slot, 0.5 * (beta_u * beta_v - xy * i * (ex * ey)))
-    _put(table, D_VV, slot, 0.25 * d_vv)
-    _put(table, HALF, slot, -2.0 / d_vv)
-    _put(table, SIGMA, slot, select(C > 0.0, _fill(1.0), -1.0))
-    _put(table, LEFT, slot, left)
-    _put(table, RIGHT, slot, right)
-    _put(table, TOP, slot, top)
-    _put(table, BOTTOM, slot, bottom)
+    _put(table, D * SLOTS + slot, 0.25 * (beta * beta - (gx * dx + gy * dy + gz) * i))
+    _put(table, D_U * SLOTS + slot, 0.5 * (beta * beta_u - gx * i * ex))
+    _put(table, D_V * SLOTS + slot, 0.5 * (beta * beta_v - gy * i * ey))
+    _put(table, D_UU * SLOTS + slot, 0.25 * (beta_u * beta_u - xx * i * (ex * ex)))
+    _put(table, D_UV * SLOTS + slot, 0.5 * (beta_u * beta_v - xy * i * (ex * ey)))
+    _put(table, D_VV * SLOTS + slot, 0.25 * d_vv)
+    _put(table, HALF * SLOTS + slot, -2.0 / d_vv)
+    _put(table, SIGMA * SLOTS + slot, select(C > 0.0, _fill(1.0), -1.0))
+    _put(table, LEFT * SLOTS + slot, left)
+    _put(table, RIGHT * SLOTS + slot, right)
+    _put(table, TOP * SLOTS + slot, top)
+    _put(table, BOTTOM * SLOTS + slot, bottom)
     return u, v
 
 
@@ -110,14 +114,14 @@ def _write_segment(table, slot, camera, pixel, a, low, length, z, end_z, radius)
     e_v, high = a[1] * camera[5], low + length
     w_high = 1.0 / vmax(vmin(z, end_z) - radius, NEAR)
     w_low = 1.0 / vmax(vmax(z, end_z) + radius, NEAR)
-    _put(table, AXIS, slot, STEEP * (dx * a[0] + dy * a[1] + a[2]))
-    _put(table, AXIS_U, slot, STEEP * (a[0] * camera[4]))
-    _put(table, AXIS_V, slot, STEEP * e_v)
-    _put(table, AXIS_LOW, slot, STEEP * low)
-    _put(table, AXIS_HIGH, slot, STEEP * high)
-    _put(table, AXIS_NEAR, slot, STEEP * vmin(low * w_low, low * w_high))
-    _put(table, AXIS_FAR, slot, STEEP * vmax(high * w_low, high * w_high))
-    _put(table, ROWS_PER_AXIS, slot, (1 / STEEP) / select(vabs(e_v) > 1e-12, e_v, 1e-12))
+    _put(table, AXIS * SLOTS + slot, STEEP * (dx * a[0] + dy * a[1] + a[2]))
+    _put(table, AXIS_U * SLOTS + slot, STEEP * (a[0] * camera[4]))
+    _put(table, AXIS_V * SLOTS + slot, STEEP * e_v)
+    _put(table, AXIS_LOW * SLOTS + slot, STEEP * low)
+    _put(table, AXIS_HIGH * SLOTS + slot, STEEP * high)
+    _put(table, AXIS_NEAR * SLOTS + slot, STEEP * vmin(low * w_low, low * w_high))
+    _put(table, AXIS_FAR * SLOTS + slot, STEEP * vmax(high * w_low, high * w_high))
+    _put(table, ROWS_PER_AXIS * SLOTS + slot, (1 / STEEP) / select(vabs(e_v) > 1e-12, e_v, 1e-12))
 
 
 @kernel_part
