@@ -108,6 +108,29 @@ def first(typing_context: Any, a: types.Type) -> Any:
 
 
 @intrinsic
+def bits_of(typing_context: Any, mask: types.Type) -> Any:
+    """A mask as the bits of an integer, the first lane the lowest."""
+    if element_of(mask) != types.boolean:
+        return None
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        bits = builder.bitcast(arguments[0], ir.IntType(mask.lanes))
+        return builder.zext(bits, ir.IntType(64))
+
+    return types.int64(mask), generate
+
+
+@intrinsic
+def count_bits(typing_context: Any, bits: types.Type) -> Any:
+    """The number of set bits of an int64."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Any) -> ir.Value:
+        return builder.ctpop(arguments[0])
+
+    return (types.int64(bits), generate) if bits == types.int64 else None
+
+
+@intrinsic
 def eight(typing_context: Any, a: types.Type, b: Any, c: Any, d: Any, e: Any, f: Any, g: Any, h: Any) -> Any:
     """A vector of eight float64 scalars."""
     vector = Vector(types.float64, 8)

@@ -57,7 +57,8 @@ class KernelArrays:
     def allocate_images(self, shape: tuple[int, int], threads: int) -> None:
         """Allocate the images (h, w) of the target, tiled, and the workspace of each thread."""
         self.workspaces = [Workspace.of(shape) for _ in range(threads)]
-        self.observed, self.silhouette, self.hidden_from = (tiles.new_tiled_image(shape) for _ in range(3))
+        self.observed, self.hidden_from = (tiles.new_tiled_image(shape) for _ in range(2))
+        self.labels = np.zeros(len(self.observed) // tiles.TILE_PIXELS, np.int64)
 
     def score_tickets(self, thread: int, spin_limit: int) -> None:
         """Score poses of the batch in this thread until `queue.pop` returns -1."""
@@ -69,7 +70,7 @@ class KernelArrays:
             self.hand,
             self.camera,
             self.observed,
-            self.silhouette,
+            self.labels,
             self.has_occluder,
             self.hidden_from,
             self.empty,

@@ -16,6 +16,8 @@ from depthtrack.rendering.raster.tiles import TILE_HEIGHT, TILE_PIXELS, TILE_WID
 from depthtrack.rendering.raster.work_queue.queue import complete, pop
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.simd.functions import (
+    bits_of,
+    count_bits,
     estimated_reciprocal,
     estimated_reciprocal_sqrt,
     max_or,
@@ -108,7 +110,7 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits):
+def _compare(has_occluder, observed, labels, hidden_from, buffer, tile_rows, low, high, limits):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
     Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. A pixel
@@ -117,8 +119,8 @@ def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows,
     limits: d_m, d_M, metres; `Objective.before_cost`.
     """
     match_depth, clamp_depth, before_cost = limits
-    clamped, on_silhouette, matched = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(0.0))
-    nothing, one = _fill(np.float32(0.0)), _fill(np.float32(1.0))
+    on_silhouette, matched, hits_before = 0, 0, 0
+    clamped, nothing, one = _fill(np.float32(0.0)), _fill(np.float32(0.0)), _fill(np.float32(1.0))
     for tile_column in range(low.shape[0]):
         top, bottom = low[tile_column], high[tile_column]
         low[tile_column], high[tile_column] = tile_rows, -1
@@ -134,19 +136,19 @@ def _compare(has_occluder, observed, silhouette, hidden_from, buffer, tile_rows,
             difference = vabs(o - z)
             # Outside the image (o = NaN) both minima are the clamp, and nothing matches.
             in_column = in_column + select(drawn, vmin(difference, clamp_depth) - vmin(o, clamp_depth), 0.0)
-            # A missing reading (o = 0) matches every drawn pixel.
-            allowed = select(o > 0.0, _fill(match_depth), np.float32(3e38))
-            hit = select(both(drawn, difference < allowed), one, 0.0)
-            matched = matched + hit
-            on_silhouette = on_silhouette + hit * _load(silhouette, index)
+            # Pixels are counted as bits. A missing reading matches every drawn pixel.
+            label = labels[index // TILE_PIXELS]
+            hit = bits_of(drawn) & (bits_of(difference < match_depth) | label >> TILE_PIXELS)
+            matched += count_bits(hit)
+            on_silhouette += count_bits(hit & label)
             if has_occluder:
                 behind = _load(hidden_from, index)
-                before = select(both(behind > 0.0, w > behind), _fill(before_cost), 0.0)
-                in_column = in_column + before * clamp_depth
-                matched = matched + before * (one - _load(silhouette, index))
+                before = both(behind > 0.0, w > behind)
+                in_column = in_column + select(before, _fill(before_cost * clamp_depth), 0.0)
+                hits_before += count_bits(bits_of(before) & ~label)
             store(buffer, index, nothing)
         clamped = clamped + in_column
-    return vsum(clamped), vsum(on_silhouette), vsum(matched)
+    return vsum(clamped), on_silhouette, matched + before_cost * hits_before
 
 
 @compiled(nogil=True, _nrt=False)
@@ -158,7 +160,7 @@ def score_poses(
     hand: Array,
     camera: Array,
     observed: Array32,
-    silhouette: Array32,
+    labels: Index,
     has_occluder: Mask,
     hidden_from: Array32,
     empty: Array,
@@ -179,7 +181,7 @@ def score_poses(
     tickets, thread, spin_limit: see `queue.pop`, which also states when this returns.
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
-    silhouette: 0 or 1, tiled.
+    labels: see `tiles.write_labels`.
     has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
     hidden_from: inverse depth, 1/m, that a surface before or inside an occluder exceeds, tiled; 0 without one.
     empty: (3,) sums of Eq. (2) for an empty image.
@@ -199,11 +201,11 @@ def score_poses(
         # Constant arguments compile to two loops: the one without an occluder does not read `hidden_from`.
         if has_occluder[0]:
             clamped, on_silhouette, matched = _compare(
-                True, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
+                True, observed, labels, hidden_from, buffer, tile_rows, low, high, limits
             )
         else:
             clamped, on_silhouette, matched = _compare(
-                False, observed, silhouette, hidden_from, buffer, tile_rows, low, high, limits
+                False, observed, labels, hidden_from, buffer, tile_rows, low, high, limits
             )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette

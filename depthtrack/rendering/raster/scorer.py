@@ -64,7 +64,7 @@ class RasterScorer(ScorerBase):
             self._workers.wait_until_idle()
             arrays.allocate_images(shape, self._threads)
         tiles.write_tiled(target.depth, np.nan, arrays.observed)
-        tiles.write_tiled(target.silhouette, 0, arrays.silhouette)
+        tiles.write_labels(target.silhouette, target.depth, arrays.labels)
         arrays.has_occluder[0] = target.occluder is not None
         if target.occluder is not None:
             tiles.write_tiled(target.hidden_from(self._objective.hidden_depth), 0, arrays.hidden_from)

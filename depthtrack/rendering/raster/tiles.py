@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from depthtrack.compilation import compiled
-from depthtrack.types import Array32, Depth
+from depthtrack.types import Array32, Depth, Index, Mask
 
 TILE_WIDTH, TILE_HEIGHT = 8, 2
 """Pixels."""
@@ -62,6 +62,23 @@ def write_tiles(image: NDArray[np.generic], beyond: np.float32, tiled: Array32) 
         for left in range(0, width, TILE_WIDTH):
             for i in range(TILE_WIDTH):
                 tiled[left * rows + v * TILE_WIDTH + i] = beyond
+
+
+@compiled(nogil=True)
+def write_labels(silhouette: Mask, depth: Depth, labels: Index) -> None:
+    """Write two bits per pixel of the images (h, w) to `labels`, an element a tile.
+
+    Bit n of a label is set if pixel n of the tile is on the silhouette, bit TILE_PIXELS + n if its depth is missing.
+    """
+    height, width = silhouette.shape
+    rows = -(-height // TILE_HEIGHT)
+    for n in range(labels.shape[0]):
+        labels[n] = 0
+    for v in range(height):
+        for u in range(width):
+            bit = v % TILE_HEIGHT * TILE_WIDTH + u % TILE_WIDTH
+            label = np.int64(silhouette[v, u]) << bit | np.int64(depth[v, u] == 0) << (TILE_PIXELS + bit)
+            labels[u // TILE_WIDTH * rows + v // TILE_HEIGHT] |= label
 
 
 @compiled(nogil=True)
