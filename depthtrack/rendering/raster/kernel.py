@@ -41,6 +41,7 @@ _fill = filler(F32X16)
 _LANE_COLUMN: Array32 = np.arange(TILE_PIXELS, dtype=np.float32) % TILE_WIDTH
 _LANE_ROW: Array32 = np.arange(TILE_PIXELS, dtype=np.float32) // TILE_WIDTH
 _W_NEAR = np.float32(1 / NEAR)
+_TWO, _HEIGHT = np.float32(2.0), np.float32(TILE_HEIGHT)
 _ACTIVE = constants.ACTIVE
 _LARGE_BOX = 64
 """Tiles of a bounding box above which tighter spans save time."""
@@ -62,6 +63,8 @@ def _draw(slot, is_segment, crosses_near, table, buffer, tile_rows, first, last,
     axis_v = _fill(table[q.AXIS_V * q.SLOTS + slot])
     axis_low, axis_high = _fill(table[q.AXIS_LOW * q.SLOTS + slot]), _fill(table[q.AXIS_HIGH * q.SLOTS + slot])
     sigma = table[q.SIGMA * q.SLOTS + slot]
+    line_step, e_step, d_vv_step = beta_v * _HEIGHT, axis_v * _HEIGHT, d_vv * _HEIGHT
+    quarter_change = d_vv_step * (_TWO * _HEIGHT)
     is_special = crosses_near or sigma < 0.0
     for tile_column in range(left, right + 1):
         top, bottom = box_top, box_bottom
@@ -74,24 +77,27 @@ def _draw(slot, is_segment, crosses_near, table, buffer, tile_rows, first, last,
         x = _load(_LANE_COLUMN, 0) + np.float32((tile_column - left) * TILE_WIDTH)
         column_beta, column_d, column_d_v = x * beta_u + beta, x * (x * d_uu + d_u) + d, x * d_uv + d_v
         column_axis = x * axis_u + axis
+        # Polynomials of the row advance by their differences, which are additions beside the products below.
         y = _load(_LANE_ROW, 0) + np.float32((top - box_top) * TILE_HEIGHT)
+        quarter, line, e = y * (y * d_vv + column_d_v) + column_d, y * beta_v + column_beta, y * axis_v + column_axis
+        quarter_step = (y * _TWO + _HEIGHT) * d_vv_step + column_d_v * _HEIGHT
         start = (tile_column * tile_rows + top) * TILE_PIXELS
         for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             # A Newton step: with r near 1 / sqrt(D / 4), sqrt(D) is D / 4 r (3 - D / 4 r^2). NaN where D <= 0.
-            quarter = y * (y * d_vv + column_d_v) + column_d
             r = estimated_reciprocal_sqrt(quarter)
             half = quarter * r
-            correction, line = np.float32(3.0) - half * r, y * beta_v + column_beta
+            correction = np.float32(3.0) - half * r
             if is_special:
                 w = half * sigma * correction + line
                 w = select(w < _W_NEAR, w, 0.0)
             else:
                 w = half * correction + line
             if is_segment:
-                e = y * axis_v + column_axis
                 w = vmin(w, vmin(e - w * axis_low, w * axis_high - e))
+                e = e + e_step
             store(buffer, index, max_or(w, _load(buffer, index)))
-            y = y + np.float32(TILE_HEIGHT)
+            quarter = quarter + quarter_step
+            quarter_step, line = quarter_step + quarter_change, line + line_step
 
 
 @kernel_part
