@@ -191,10 +191,35 @@ class _Code(caching.CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes: ClassVar = [_Locator]
 
 
+class _Files(caching.IndexDataCacheFile):  # type: ignore[misc]
+    """Files of one kernel, to which several processes may write.
+
+    numba numbers the files of the signatures, so that two processes may give one name to two of them.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Save the compiled code of a signature, under a name that no other signature has."""
+        name = self._data_name_pattern.replace("{number:d}", hashlib.sha256(repr(key).encode()).hexdigest()[:12])
+        self._save_data(name, data)
+        self._save_index({**self._load_index(), key: name})
+
+
 class KernelCache(caching.FunctionCache):  # type: ignore[misc]
     """Cache of one kernel that is never a reason to fail."""
 
     _impl_class = _Code
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        locator = self._impl.locator
+        self._cache_file = _Files(locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp())
+
+    def keeps(self, sig: Any, target_context: Any) -> bool:
+        """Return whether the compiled code of a signature is kept."""
+        try:
+            return self._index_key(sig, target_context.codegen()) in self._cache_file._load_index()
+        except Exception:  # as in load_overload
+            return False
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled code of a signature, or None if there is none that can be read."""

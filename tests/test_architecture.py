@@ -16,6 +16,7 @@ LAYERS = (
     ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine",),
     ("compilation",),
+    ("precompilation",),
     ("geometry",),
     ("simd",),
     ("hand",),

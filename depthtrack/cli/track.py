@@ -124,6 +124,7 @@ class TrackCommand:
         return options.chosen(sequence, choice)
 
     def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
+        from depthtrack.cli.warmup import compile_for_first_use
         from depthtrack.tracking.run import check_run, configure
 
         configuration = configure(
@@ -139,6 +140,7 @@ class TrackCommand:
         )
         # To measure the hand takes long, so everything else is checked before.
         check_run(configuration, sequence, self.out, self.resume)
+        compile_for_first_use()
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
     def _report(self, sequence: "Recording", rate: str) -> None:

@@ -1,39 +1,58 @@
-"""`depthtrack warmup` tracks with each tracker, and states where the kernels are kept."""
+"""`depthtrack warmup` compiles what is absent, and states where the kernels are kept."""
 
 import pytest
 
-from depthtrack import compilation
+from depthtrack import compilation, precompilation
 from depthtrack.cli import main, warmup
-from depthtrack.tracking.registry import tracker_config
+from depthtrack.precompilation import Kernel
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the kernels that were given to processes; all kernels count as absent."""
+    names: list[str] = []
+
+    def record(kernels: list[Kernel], done: object) -> int:
+        names.extend(kernel.name for kernel in kernels)
+        return 3
+
+    monkeypatch.setattr(precompilation, "absent_kernels", list)
+    monkeypatch.setattr(precompilation, "compile_kernels", record)
+    return names
 
 
 def test_the_kernels_are_compiled_and_their_folder_is_printed(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    compiled: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(warmup, "SCENES", ({"model": "primitives"},))
-    monkeypatch.setattr(warmup, "TRACKERS", (("ik", {"resolution": 64}),))
-    layouts: list[bool] = []
-    monkeypatch.setattr(warmup, "compile_layouts", lambda: layouts.append(True))
     assert main(["warmup"]) == 0
-    folder = compilation.cache_folder()
-    assert folder is not None
-    assert str(folder) in capsys.readouterr().out
-    assert layouts == [True]
-
-
-def test_the_kernels_of_layouts_are_used() -> None:
-    warmup.compile_layouts()
-
-
-def test_each_tracker_of_the_list_exists() -> None:
-    for name, options in warmup.TRACKERS:
-        tracker_config(name, **options)
+    assert {"score_poses", "solve", "_incidence"} <= set(compiled)
+    output = capsys.readouterr().out
+    assert str(compilation.cache_folder()) in output
+    assert "in 3 processes" in output
 
 
 def test_a_machine_without_a_writable_folder_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, compiled: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(compilation, "cache_folder", lambda: None)
-    monkeypatch.setattr(warmup, "compile_kernels", lambda: pytest.fail("compiled in vain"))
     assert main(["warmup"]) == 2
+    assert not compiled
     assert "set NUMBA_CACHE_DIR" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("cores", "has_folder", "is_compiled"), [(4, True, True), (1, True, False), (4, False, False)])
+def test_the_first_use_compiles_in_processes_where_that_helps(
+    monkeypatch: pytest.MonkeyPatch, compiled: list[str], cores: int, has_folder: bool, is_compiled: bool
+) -> None:
+    monkeypatch.setattr("depthtrack.machine.usable_cores", lambda: cores)
+    if not has_folder:
+        monkeypatch.setattr(compilation, "cache_folder", lambda: None)
+    warmup.compile_for_first_use()
+    assert bool(compiled) == is_compiled
+    assert "_incidence" not in compiled  # of synthetic sensors
+
+
+def test_a_few_absent_kernels_start_no_process(monkeypatch: pytest.MonkeyPatch, compiled: list[str]) -> None:
+    monkeypatch.setattr(precompilation, "absent_kernels", lambda kernels: [k for k in kernels if k.seconds < 0.2])
+    warmup.compile_for_first_use()
+    assert not compiled

@@ -1,0 +1,180 @@
+"""Compilation of kernels ahead of their first use, in several processes.
+
+`kernels.json` lists the kernels that trackers and searches for layouts call, with the types of their arguments. Those
+that take longest come first. Each process compiles one after the other into the folder of `compilation`. A kernel that
+is not listed, or whose process fails, is compiled at its first use.
+"""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from importlib import import_module
+from os import environ, pathsep
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, NamedTuple
+
+from numba import types
+
+from depthtrack.compilation import cache_folder
+from depthtrack.machine import usable_cores
+
+LIST = Path(__file__).with_name("kernels.json")
+_ROOT = Path(__file__).parents[1]
+_ARRAY = re.compile(r"(\w+)\[(\d)([ACF])\]( readonly)?")
+
+
+class Kernel(NamedTuple):
+    """A compiled function and the types of its arguments.
+
+    arguments: a text for a scalar or an array, a list for a tuple, a dictionary with one key for a named tuple.
+    seconds: time to compile it, for the order alone.
+    """
+
+    module: str
+    name: str
+    arguments: list[Any]
+    seconds: float
+
+    @property
+    def dispatcher(self) -> Any:
+        """The function as numba sees it."""
+        return getattr(import_module(self.module), self.name)
+
+    @property
+    def signature(self) -> tuple[types.Type, ...]:
+        """Numba types of the arguments."""
+        return tuple(map(type_of, self.arguments))
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the folder for compiled code has it."""
+        dispatcher = self.dispatcher
+        return bool(dispatcher._cache.keeps(self.signature, dispatcher.targetctx))
+
+
+def listed_kernels() -> list[Kernel]:
+    """Return the kernels of the list, those that take longest first."""
+    return [Kernel(**entry) for entry in json.loads(LIST.read_text(encoding="utf-8"))]
+
+
+def type_of(text: Any) -> types.Type:
+    """Return the numba type that a description of `kernels.json` names.
+
+    Raises:
+        ValueError: if it describes none.
+    """
+    if isinstance(text, list):
+        return types.BaseTuple.from_types([type_of(each) for each in text])
+    if isinstance(text, dict):
+        ((name, members),) = text.items()
+        module, _, attribute = name.rpartition(".")
+        named = getattr(import_module(module), attribute)
+        return types.BaseTuple.from_types([type_of(each) for each in members], named)
+    if match := _ARRAY.fullmatch(text):
+        return types.Array(type_of(match[1]), int(match[2]), match[3], readonly=match[4] is not None)
+    scalar = getattr(types, text, None)
+    if not isinstance(scalar, types.Number | types.Boolean):
+        raise ValueError(f"no type is named {text!r}")
+    return scalar
+
+
+def text_of(found: types.Type) -> Any:
+    """Return the description of a numba type, from which `type_of` makes it.
+
+    Raises:
+        ValueError: if `kernels.json` has no description of such types.
+    """
+    if isinstance(found, types.BaseNamedTuple):
+        members = found.types if isinstance(found, types.NamedTuple) else [found.dtype] * found.count
+        name = f"{found.instance_class.__module__}.{found.instance_class.__qualname__}"
+        return {name: [text_of(each) for each in members]}
+    if isinstance(found, types.BaseTuple):
+        return [text_of(each) for each in found]
+    if isinstance(found, types.Array):
+        return f"{text_of(found.dtype)}[{found.ndim}{found.layout}]" + ("" if found.mutable else " readonly")
+    if not isinstance(found, types.Number | types.Boolean):
+        raise ValueError(f"a kernel takes {found}: extend precompilation.text_of")
+    return "boolean" if found == types.boolean else str(found)
+
+
+def absent_kernels(kernels: Sequence[Kernel]) -> list[Kernel]:
+    """Return the kernels that the folder for compiled code lacks; none without a folder."""
+    return [] if cache_folder() is None else [kernel for kernel in kernels if not kernel.is_kept]
+
+
+def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None] = lambda kernel: None) -> int:
+    """Compile kernels into the folder for compiled code; return the number of processes.
+
+    compiled: receives each kernel that is compiled.
+
+    At most one process per core compiles. They end with this call, also if it is interrupted.
+    """
+    count = min(usable_cores(), len(kernels))
+    children = [_start() for _ in range(count)]
+    free: SimpleQueue[subprocess.Popen[str]] = SimpleQueue()
+    for child in children:
+        free.put(child)
+
+    def compile_one(kernel: Kernel) -> Kernel:
+        child = free.get()
+        if not _request(child, kernel) and not is_over:
+            child = _start()  # the other one has failed: its kernel is compiled at its first use
+            children.append(child)
+        free.put(child)
+        return kernel
+
+    is_over, pool = False, ThreadPoolExecutor(max(count, 1))
+    try:
+        for future in as_completed([pool.submit(compile_one, kernel) for kernel in kernels]):
+            compiled(future.result())
+    finally:
+        is_over = True
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in children:
+            child.kill()
+        for child in children:
+            child.wait()
+    return count
+
+
+def _request(child: "subprocess.Popen[str]", kernel: Kernel) -> bool:
+    """Return whether a process has answered the request to compile a kernel."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    try:
+        child.stdin.write(json.dumps(kernel._asdict()) + "\n")
+        child.stdin.flush()
+    except OSError:
+        return False
+    return bool(child.stdout.readline())
+
+
+def _start() -> "subprocess.Popen[str]":
+    """Start a process that compiles the kernels that it reads."""
+    path = pathsep.join([str(_ROOT), *filter(None, [environ.get("PYTHONPATH")])])
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "depthtrack.precompilation"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**environ, "PYTHONPATH": path},
+        text=True,
+    )
+
+
+def _serve() -> None:
+    """Compile the kernels that the input describes, a line each, and answer each with a line."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
+    for line in sys.stdin:
+        kernel = Kernel(**json.loads(line))
+        kernel.dispatcher.compile(kernel.signature)
+        print(kernel.name, flush=True)
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,85 @@
+"""The list of kernels is right, and processes compile them into one folder without harm."""
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+from depthtrack import precompilation
+from depthtrack.compilation import _Files
+from depthtrack.precompilation import Kernel, compile_kernels, listed_kernels, text_of, type_of
+
+ROOT = Path(__file__).parents[1]
+SMALL = """
+from depthtrack.precompilation import absent_kernels, compile_kernels, listed_kernels
+kernels = [kernel for kernel in listed_kernels() if kernel.name in {"is_complete", "submit", "limit_gradients"}]
+assert absent_kernels(kernels) == kernels
+shown = []
+processes = compile_kernels(kernels, lambda kernel: shown.append(kernel.name))
+assert sorted(shown) == sorted(kernel.name for kernel in kernels), shown
+assert processes >= 1
+assert not absent_kernels(kernels)
+kernels[0].dispatcher.compile(kernels[0].signature)
+assert sum(kernels[0].dispatcher.stats.cache_hits.values()) == 1
+"""
+
+
+@pytest.mark.parametrize("kernel", listed_kernels(), ids=lambda kernel: kernel.name)
+def test_each_listed_kernel_takes_these_arguments(kernel: Kernel) -> None:
+    assert isinstance(kernel.dispatcher, Dispatcher), "run  python tools/generate_kernels.py"
+    inspect.signature(kernel.dispatcher.py_func).bind(*kernel.signature)
+    assert [text_of(each) for each in kernel.signature] == kernel.arguments
+
+
+def test_an_unknown_type_is_rejected() -> None:
+    for text in ("print", "float64[9", "Array"):
+        with pytest.raises(ValueError, match="no type"):
+            type_of(text)
+
+
+def test_processes_compile_what_is_absent(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", SMALL], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_processes_that_fail_leave_their_kernels_to_the_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    def start() -> "subprocess.Popen[str]":
+        return subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    monkeypatch.setattr(precompilation, "_start", start)
+    shown: list[Kernel] = []
+    compile_kernels(listed_kernels()[:3], shown.append)
+    assert len(shown) == 3
+
+
+def test_signatures_that_two_processes_save_at_once_stay_apart(tmp_path: Path) -> None:
+    one, other = (_Files(str(tmp_path), "kernel", "stamp") for _ in range(2))
+    other._load_index = dict  # it has read the index before `one` wrote it
+    one.save("first", "code of the first")
+    other.save("second", "code of the second")
+    assert other._load_data("kernel." + one_name(tmp_path, "first")) == "code of the first"
+    reader = _Files(str(tmp_path), "kernel", "stamp")
+    assert reader.load("second") == "code of the second"
+    assert reader.load("first") in (None, "code of the first")
+
+
+def one_name(folder: Path, key: str) -> str:
+    """Return the end of the name of the file that holds the code of a key."""
+    (name,) = (path.name for path in folder.glob("*.nbc") if key.encode() in path.read_bytes())
+    return name.removeprefix("kernel.")
+
+
+@pytest.mark.slow
+def test_all_kernels_that_are_called_are_listed() -> None:
+    command = [sys.executable, str(ROOT / "tools" / "generate_kernels.py"), "--print"]
+    # What a process compiles for others is loaded by none: only the second one states what Python calls.
+    _, called = (json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout) for _ in range(2))
+    listed = {(kernel.module, kernel.name, json.dumps(kernel.arguments)) for kernel in listed_kernels()}
+    absent = {(module, name, text) for module, name, text, _, is_called in called if is_called} - listed
+    assert not absent, "run  python tools/generate_kernels.py"
