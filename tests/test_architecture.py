@@ -14,7 +14,7 @@ LAYERS = (
     ("closing", "errors", "number_text", "types"),
     ("ranges", "strict_data"),
     ("files", "options", "outputs", "resources", "text_table", "selection"),
-    ("machine",),
+    ("machine", "memory"),
     ("compilation",),
     ("precompilation",),
     ("geometry",),

@@ -130,9 +130,11 @@ def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, argumen
     module = import_module(entry.module)
     if not hasattr(module, "COMMANDS"):
         from depthtrack.cli.argument_checks import check_arguments
+        from depthtrack.memory import keep_freed_memory
 
         command = _parse(module, prog, arguments)
         check_arguments(command)
+        keep_freed_memory()
         command.run()
     elif not arguments or arguments[0] in _HELP:
         print(_overview(f"{prog}: {entry.summary}", prog, module.COMMANDS))
