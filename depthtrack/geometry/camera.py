@@ -78,7 +78,9 @@ class Camera:
 
     def metres(self, stored: NDArray[np.uint16]) -> Depth:
         """Return the depth (h, w) in metres of an image of stored units (h, w); 0 stays 0."""
-        return stored.astype(np.float32) * np.float32(self.depth_scale)
+        metres = stored.astype(np.float32)
+        metres *= np.float32(self.depth_scale)
+        return metres
 
     @property
     def rect(self) -> Rect:
