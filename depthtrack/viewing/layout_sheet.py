@@ -51,7 +51,7 @@ def layout_sheet(model: MarkerModel, title: str, places: Sequence[str], figures:
     views = [_view(model, skin, quaternion, side) for quaternion in (back, turned)]
     names = [_line("back", side, 22, _GREY), _line("side of the thumb", side, 22, _GREY)]
     width = PAGE[0] - 2 * _MARGIN
-    rows = [_line(title, width, 34, _INK, 64)]
+    rows = [_line(text, width, 34, _INK, 64) for text in _wrapped(title, width, 34)]
     columns = [stacked([name, view], gap=0) for name, view in zip(names, views, strict=True)]
     rows.append(_white_gap(beside(columns, gap=_GAP)))
     below = [_line("", width, 20, _GREY, 16), *(_line(text, width, 20, _GREY, 32) for text in figures)]

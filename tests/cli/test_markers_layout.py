@@ -46,6 +46,7 @@ def test_a_layout_is_written_with_its_page(
         (["--motion", "grasp", "--markers", "4", "-o", "a.json", "--cameras", "1"], "from 2 to 64"),
         (["--motion", "grasp", "--markers", "4", "-o", "a.json", "--radius", "0"], "from 0.5 to 20"),
         (["--motion", "grasp", "--markers", "0", "-o", "a.json"], "from 1 to 64"),
+        (["--motion", "--markers", "4", "-o", "a.json"], "a layout needs motions to show"),
         (["--motion", "two.csv", "--markers", "4", "-o", "a.json"], "a motion of 5 postures or more, found 2"),
         (["--motion", "two.csv", "two.csv", "--markers", "4", "-o", "a.json"], "5 postures or more"),
         (["--motion", "one.csv", "--markers", "4", "-o", "a.json"], "two postures or more that differ, found 1"),

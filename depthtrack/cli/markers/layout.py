@@ -71,12 +71,14 @@ class Command:
         from depthtrack.viewing.contact_sheet import save_picture
         from depthtrack.viewing.layout_sheet import layout_sheet
 
+        if not self.motion:
+            raise InputError("a layout needs motions to show, as --motion grasp other-grasps")
         hand = HandShape() if self.hand is None else load_hand(self.hand)
         motions = [read_motion(name) for name in self.motion]
         options = self._options()
         quality = self._quality(hand, motions, options)
         found = find_layout_of(quality, self.markers, options, self.seed)
-        about = f"{self.markers} markers for {', '.join(self.motion)}"
+        about = f"{self.markers} markers for {', '.join(Path(name).name for name in self.motion)}"
         layout = replace(quality.candidates.layout(found.rows, about, self.wrist), synergies=quality.synergies)
         places, terms = instructions(layout, hand), quality.terms(found.rows)
         bare = quality.candidates.layout(found.rows, about).on(hand)
