@@ -7,6 +7,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 from depthtrack.benchmarks.papers.experiment import Experiment, PaperComparison
 from depthtrack.evaluation.sweep.rows import Row
@@ -26,6 +27,8 @@ _STYLE: dict[Any, Any] = {
 }
 _INCHES = (7.2, 4.2)
 """Width and height of the plot."""
+_LONGEST = 48
+"""Characters of a description beyond which its text is smaller, so that it ends before the next column."""
 _LINE = 0.2
 """Height of a line of text below the axes, inches."""
 
@@ -46,10 +49,23 @@ def draw_png(experiment: Experiment, rows: Sequence[Row], comparisons: Sequence[
         for number, cells in enumerate(below, start=1):
             y = (_LINE * (len(below) - number) + 0.12) / height
             for x, text in zip((0.09, 0.56, 0.86), cells, strict=True):
-                figure.text(x, y, text, color="0.4" if number in (1, len(below)) else "0.1")
+                size = _STYLE["font.size"] * min(1.0, _LONGEST / max(len(text), 1)) if number < len(below) else None
+                figure.text(x, y, text, color="0.4" if number in (1, len(below)) else "0.1", fontsize=size)
         picture = BytesIO()
         figure.savefig(picture, format="png")
     return picture.getvalue()
+
+
+def plain_log_scale(axes: Axes) -> None:
+    """Draw y logarithmically, with numbers at powers of ten.
+
+    Below three decades, 2 and 5 times them have numbers too.
+    """
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 1000 * low else (1,)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def mark(axes: Axes, x: float, text: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
+from depthtrack.benchmarks.papers.plot import plain_log_scale
 from depthtrack.benchmarks.papers.schroeder2015 import (
     METHOD,
     SCHROEDER_2015,
@@ -84,9 +85,7 @@ def compare(rows: Sequence[Row]) -> list[PaperComparison]:
         for base, name in BASES.items():
             theirs = curve(rows, system, base)
             lower = 100 * float(np.mean([chosen[n] < theirs[n] for n in chosen]))
-            found.append(
-                PaperComparison(f"{words}: below Wheatland, {name}", "better layouts", lower, "% of the counts")
-            )
+            found.append(PaperComparison(f"{words}: below Wheatland, {name}", "better layouts", lower, "%"))
         if 6 in chosen:
             found.append(PaperComparison(f"{words}: 6 markers", "not given", chosen[6], "mm"))
             found += [
@@ -102,7 +101,8 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
         for k, (choice, label) in enumerate(names.items()):
             errors = curve(rows, system, choice)
             axes.plot(list(errors), list(errors.values()), style, marker="o", color=f"C{k}", label=f"{label}, {words}")
-    axes.set(xlabel="markers", ylabel="error of the vertices (mm)", yscale="log")
+    axes.set(xlabel="markers", ylabel="error of the vertices (mm)")
+    plain_log_scale(axes)
     axes.legend(fontsize=8)
 
 

@@ -24,7 +24,7 @@ from depthtrack.markers.layout.manual import MANUAL_BONES, manual_layout
 MARKERS, QUICK_MARKERS = tuple(range(3, 13)), (4, 6, 8)
 SPECIFIC = ("grasps", "grasps-2")
 SYSTEMS = {"paper": "free refinement", "ours": "prior"}
-KINDS = {"specific": "specific layouts", "generic": "generic layouts", "manual": "manual layouts (Hoyet et al.)"}
+KINDS = {"specific": "specific layouts", "generic": "generic layouts", "manual": "manual layouts (Hoyet)"}
 PAPER = {"specific": 6, "generic": 9}
 """Markers with which the error falls below 2 mm."""
 BELOW_MM = 2.0

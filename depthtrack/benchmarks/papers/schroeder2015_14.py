@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from depthtrack.benchmarks.papers.experiment import Experiment, ExperimentOptions, PaperComparison
+from depthtrack.benchmarks.papers.plot import plain_log_scale
 from depthtrack.benchmarks.papers.schroeder2015 import SCHROEDER_2015, motion_poses, quality_of
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.markers.layout.exchange import added
@@ -60,7 +61,8 @@ def draw(axes: Axes, rows: Sequence[Row]) -> None:
     for method in METHODS:
         axes.plot([row["markers"] for row in rows], [row[f"{method}_ms"] for row in rows], marker="o", label=method)
     axes.plot(26, PAPER_MS, "D", color="black", label="paper, upper bound, 8 cores")
-    axes.set(xlabel="markers", ylabel="CPU time of a frame (ms)", yscale="log")
+    axes.set(xlabel="markers", ylabel="CPU time of a frame (ms)")
+    plain_log_scale(axes)
     axes.legend()
 
 
