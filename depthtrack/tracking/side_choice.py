@@ -13,7 +13,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.options import option
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, track_stretches
+from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, track_hands
 from depthtrack.types import Array
 
 
@@ -84,15 +84,8 @@ def track_sides(
     progress: called with the number of tracked frames, and of all frames to track.
     """
 
-    def part(number: int) -> Callable[[int, int], None] | None:
-        if progress is None:
-            return None
-        return lambda done, total: progress(number * total + done, len(hands) * total)
-
-    return {
-        side: track_stretches(sequence, hand, segmentation, threads, frames, options, part(number))
-        for number, (side, hand) in enumerate(hands.items())
-    }
+    found = track_hands(sequence, hands.values(), segmentation, threads, frames, options, progress)
+    return dict(zip(hands, found, strict=True))
 
 
 def mean_energies(tracked: Mapping[Side, TrackedStretches]) -> tuple[dict[Side, float], int]:

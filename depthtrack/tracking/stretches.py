@@ -1,9 +1,11 @@
 """Stretches of a recording that a hand is tracked in, to compare hands or to measure one."""
 
 import math
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +13,12 @@ import numpy as np
 from depthtrack.hand.shape import HandShape
 from depthtrack.options import option
 from depthtrack.recording.read_ahead import read_ahead
-from depthtrack.recording.sequence import Sequence
+from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import HybridConfig, TrackerConfig
-from depthtrack.tracking.pipeline import Pipeline, track_frames
+from depthtrack.tracking.pipeline import Pipeline
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.types import Array
 
@@ -74,18 +76,56 @@ def track_stretches(
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
     """
+    return track_hands(sequence, [hand], segmentation, threads, frames, options, progress)[0]
+
+
+def track_hands(
+    sequence: Sequence,
+    hands: Iterable[HandShape],
+    segmentation: SegmentationOptions | None = None,
+    threads: int = 1,
+    frames: int | None = None,
+    options: StretchOptions | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[TrackedStretches]:
+    """Track several hands in the same stretches of a recording, side by side.
+
+    Each frame is read once. What is found for a hand depends neither on the others nor on the number of threads.
+
+    The other arguments are those of `track_stretches`.
+    """
     options = options or StretchOptions()
     indices = options.frames(min(len(sequence), frames or len(sequence)))
-    every = max(1, math.ceil(len(indices) / options.views))
-    energies, views = np.full(len(indices), np.nan), list[TrackedView]()
-    with closing(create_tracker(options.tracker, hand, threads)) as tracker:
-        pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence, segmentation), hand)
-        for number, each in enumerate(track_frames(read_ahead(sequence.frames(indices), _AHEAD), pipeline)):
-            estimate = each.estimate
-            energies[number] = estimate.energy
-            due = number % every == every - 1
-            if due and estimate.status.is_trusted and estimate.pose is not None and each.observation is not None:
-                views.append(TrackedView(each.observation, estimate.pose, estimate.energy, estimate.agreement))
+    with ExitStack() as stack:
+        tracked = list[_Tracked]()
+        for hand in hands:
+            tracker = stack.enter_context(closing(create_tracker(options.tracker, hand, threads)))
+            pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence, segmentation), hand)
+            tracked.append(_Tracked(pipeline, len(indices), max(1, math.ceil(len(indices) / options.views))))
+        pool = stack.enter_context(ThreadPoolExecutor(min(threads, len(tracked)), "hands"))
+        for number, frame in enumerate(read_ahead(sequence.frames(indices), _AHEAD)):
+            list(pool.map(partial(_Tracked.step, frame=frame, number=number), tracked))
             if progress is not None:
                 progress(number + 1, len(indices))
-    return TrackedStretches(energies, tuple(views))
+    return [TrackedStretches(each.energies, tuple(each.views)) for each in tracked]
+
+
+class _Tracked:
+    """Results of one hand so far.
+
+    count: number of frames.
+    every: every n-th frame may become a view.
+    """
+
+    def __init__(self, pipeline: Pipeline, count: int, every: int) -> None:
+        self._pipeline, self._every = pipeline, every
+        self.energies, self.views = np.full(count, np.nan), list[TrackedView]()
+
+    def step(self, frame: Frame, number: int) -> None:
+        """Track the hand in the next frame."""
+        tracked = self._pipeline.step(frame)
+        estimate, observation = tracked.estimate, tracked.observation
+        self.energies[number] = estimate.energy
+        due = number % self._every == self._every - 1
+        if due and estimate.status.is_trusted and estimate.pose is not None and observation is not None:
+            self.views.append(TrackedView(observation, estimate.pose, estimate.energy, estimate.agreement))

@@ -15,7 +15,7 @@ from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
-from depthtrack.tracking.stretches import StretchOptions, TrackedStretches
+from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, track_hands, track_stretches
 
 OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
 
@@ -31,6 +31,17 @@ def recorded(folder: Path, side: Side) -> Path:
 def test_frames_are_spread_over_the_recording() -> None:
     assert StretchOptions(stretches=3, stretch_frames=2).frames(11) == [0, 1, 4, 5, 9, 10]
     assert StretchOptions(stretches=3, stretch_frames=20).frames(5) == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.slow
+def test_hands_side_by_side_are_tracked_as_each_alone(tmp_path: Path) -> None:
+    sequence, hands = open_sequence(recorded(tmp_path / "recording", "left")), [HandShape(), HandShape(side="left")]
+    both = track_hands(sequence, hands, threads=2, options=OPTIONS.stretches)
+    for hand, found in zip(hands, both, strict=True):
+        alone = track_stretches(sequence, hand, options=OPTIONS.stretches)
+        np.testing.assert_array_equal(found.energies, alone.energies)
+        assert [view.pose.tolist() for view in found.views] == [view.pose.tolist() for view in alone.views]
+        assert len(alone.views) > 0
 
 
 @pytest.mark.slow
