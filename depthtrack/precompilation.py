@@ -1,8 +1,8 @@
 """Compilation of kernels ahead of their first use, in several processes.
 
-`kernels.json` lists the kernels that trackers and searches for layouts call, with the types of their arguments. Those
-that take longest come first. Each process compiles one after the other into the folder of `compilation`. A kernel that
-is not listed, or whose process fails, is compiled at its first use.
+`kernels.json` lists the kernels that trackers, searches for layouts and calibration call, with the types of their
+arguments. Those that take longest come first. Each process compiles one after the other into the folder of
+`compilation`. A kernel that is not listed, or whose process fails, is compiled at its first use.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Write depthtrack/kernels.json: the kernels that trackers and layouts call.
+"""Write depthtrack/kernels.json: the kernels that trackers, layouts and calibration call.
 
 python tools/generate_kernels.py            # compile kernels and write the list
 python tools/generate_kernels.py --print    # print the kernels that are called
@@ -22,14 +22,22 @@ from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
 import depthtrack
+from depthtrack.calibration.joint_optimisation import fit_jointly
+from depthtrack.calibration.residuals import CalibrationView
+from depthtrack.geometry.camera import Camera
+from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.size_parameters import COUNT
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.markers.layout.candidates import Candidates
 from depthtrack.markers.layout.expected_error import expected_errors
 from depthtrack.markers.layout.options import OBJECTIVES, LayoutOptions, QualityOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.search import find_layout_of
 from depthtrack.precompilation import LIST, Kernel, text_of
+from depthtrack.rendering.triangles import rasterise
+from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.options import SwarmOptions
 
 SCENES: tuple[dict[str, Any], ...] = (
@@ -93,8 +101,18 @@ def search_layouts() -> None:
     expected_errors(candidates.layout(found.rows, "warmup").on(hand), [postures], 3, True, 0.0)
 
 
+def calibrate() -> None:
+    """Fit sizes and pose of a hand to one rendered view of it."""
+    camera, skin = Camera(120, 120, 240, 240, 60, 60), Skin.of(HandShape())
+    pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
+    vertices = skin.at(pose)
+    depth = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies).depth.astype(np.float32)
+    seen = Observation(camera, depth > 0, depth, 0, 0.0, camera.rect, pose[:3].copy(), palm_radius=0.04)
+    fit_jointly([CalibrationView(seen)], pose[None], np.zeros(COUNT), "right", iterations=1)
+
+
 def calls() -> dict[Call, tuple[float, bool]]:
-    """Return the kernels that trackers use.
+    """Return the kernels that trackers, layouts and calibration use.
 
     Of each: seconds of compilation in this process, and whether it was loaded for a call by Python.
     """
@@ -102,6 +120,7 @@ def calls() -> dict[Call, tuple[float, bool]]:
     event.register("numba:compile", compilations)
     track()
     search_layouts()
+    calibrate()
     modules = [module for name, module in sys.modules.items() if name.startswith("depthtrack.")]
     kernels = {each for module in modules for each in vars(module).values() if isinstance(each, Dispatcher)}
     loaded = {call_of(each.py_func, types) for each in kernels for types in each.stats.cache_hits}

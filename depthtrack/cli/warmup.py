@@ -60,4 +60,4 @@ def compile_for_first_use() -> None:
     from depthtrack.machine import usable_cores
 
     if usable_cores() > 1 and cache_folder() is not None:
-        compile_absent(_FEW, without=("depthtrack.synthesis", "depthtrack.markers"))
+        compile_absent(_FEW, without=("depthtrack.calibration", "depthtrack.synthesis", "depthtrack.markers"))
