@@ -110,9 +110,7 @@ def minimise(
         if options.randomise_every and generation % options.randomise_every == 0:
             domain.randomise(position, own_best[best], generator, options)
         energy = score(position)
-        better = energy < own_energy
-        own_best[better], own_energy[better] = position[better], energy[better]
-        best = int(np.argmin(own_energy))
+        best = keep_better(position, energy, own_best, own_energy)
         progress(float(own_energy[best]))
     return Optimum(own_best, own_energy, best)
 
@@ -144,6 +142,26 @@ def advance(
             pull = cognitive * draws[0, n, d] * (own_best[n, d] - x) + social * draws[1, n, d] * (best[d] - x)
             velocity[n, d] = inertia * (velocity[n, d] + pull)
             position[n, d] = min(max(x + velocity[n, d], lower[d]), upper[d])
+
+
+@compiled()
+def keep_better(position: Array, energy: Array, own_best: Array, own_energy: Array) -> int:
+    """Keep the positions whose energies are lower than their particles' best, in place.
+
+    position, own_best: (N, D).
+    energy, own_energy: (N,).
+
+    Returns the row of the swarm's best, the first of equal ones.
+    """
+    best = 0
+    for n in range(position.shape[0]):
+        if energy[n] < own_energy[n]:
+            own_energy[n] = energy[n]
+            for d in range(position.shape[1]):
+                own_best[n, d] = position[n, d]
+        if own_energy[n] < own_energy[best]:
+            best = n
+    return best
 
 
 def randomise(

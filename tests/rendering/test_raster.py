@@ -119,6 +119,7 @@ def test_the_best_pose_is_the_observed_one() -> None:
     assert terms.energy.argmin() == 4
     assert terms.depth[4] < 0.01  # what remains is the float32 of the rendered depth
     assert terms.silhouette[4] == 0
+    np.testing.assert_array_equal(scorer.evaluate(poses).agreement, terms.agreement)
 
 
 def test_scores_do_not_depend_on_previous_scores() -> None:

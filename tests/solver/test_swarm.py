@@ -11,7 +11,7 @@ from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, retract, tangent_between
 from depthtrack.solver.options import SwarmOptions, constriction
-from depthtrack.solver.swarm import Box, advance, minimise, randomise
+from depthtrack.solver.swarm import Box, advance, keep_better, minimise, randomise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid
 
@@ -125,3 +125,16 @@ def test_a_zero_quaternion_keeps_the_reference() -> None:
 def test_invalid_options_are_rejected(change: dict[str, float]) -> None:
     with pytest.raises(InputError):
         SwarmOptions(**change)  # type: ignore[arg-type]
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_keeping_the_better_positions_equals_the_plain_rule(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    position, own_best = rng.normal(size=(2, 9, 4))
+    energy, own_energy = rng.integers(0, 4, (2, 9)).astype(np.float64)  # with equal ones
+    expected_best, expected_energy = own_best.copy(), own_energy.copy()
+    better = energy < own_energy
+    expected_best[better], expected_energy[better] = position[better], energy[better]
+    assert keep_better(position, energy, own_best, own_energy) == np.argmin(expected_energy)
+    np.testing.assert_array_equal(own_best, expected_best)
+    np.testing.assert_array_equal(own_energy, expected_energy)

@@ -51,8 +51,9 @@ class KernelArrays:
         self.allocate_poses(256)
 
     def allocate_poses(self, count: int) -> None:
-        """Allocate a batch of `count` poses (B, 27), with their sums (B, 3) and energies (B,)."""
-        self.poses, self.sums, self.energies = np.empty((count, POSE_SIZE)), np.empty((count, 3)), np.empty(count)
+        """Allocate a batch of `count` poses (B, 27), with sums (B, 3), energies and agreements (B,)."""
+        self.poses, self.sums = np.empty((count, POSE_SIZE)), np.empty((count, 3))
+        self.energies, self.agreements = np.empty((2, count))
 
     def allocate_images(self, shape: tuple[int, int], threads: int) -> None:
         """Allocate the images (h, w) of the target, tiled, and the workspace of each thread."""
@@ -78,4 +79,5 @@ class KernelArrays:
             *self.workspaces[thread].arrays,
             self.sums,
             self.energies,
+            self.agreements,
         )

@@ -180,6 +180,7 @@ def score_poses(
     high: Index,
     sums: Array,
     energies: Array,
+    agreements: Array,
 ) -> None:
     """Score the poses of a batch that `tickets` assigns to this thread.
 
@@ -193,6 +194,7 @@ def score_poses(
     empty: (3,) sums of Eq. (2) for an empty image.
     objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.before_cost`.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
+    agreements: (B,) 1 minus the silhouette term of Eq. (2), written.
 
     Other threads call this with the same batch, each with its own workspace. It holds `scratch` and `table` (see
     `posing.set_up`); `buffer`, tiled, all 0; `first` and `last`, one element a tile column and one more.
@@ -216,13 +218,13 @@ def score_poses(
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
         sums[n, 2] = empty[2] + matched - on_silhouette
-        energies[n] = _energy(poses[n], sums[n], objective)
+        energies[n], agreements[n] = _energy(poses[n], sums[n], objective)
         complete(tickets, thread)
 
 
 @kernel_part
 def _energy(pose, sums, objective):
-    """Return the energy of Eq. (1) from the sums of Eq. (2), like `objective.Terms.of_sums`."""
+    """Return energy and agreement from the sums of Eq. (2), like `objective.Terms.of_sums`."""
     depth = sums[0] / objective[2] / (sums[2] + objective[3])
     total = sums[1] + sums[2]
     silhouette = 1.0 - 2.0 * sums[1] / total if total > 0.0 else 1.0
@@ -230,7 +232,7 @@ def _energy(pose, sums, objective):
     for finger in range(1, 4):
         phi = pose[7 + 4 * finger] - pose[11 + 4 * finger]
         crossing -= min(phi, 0.0)
-    return depth + objective[4] * silhouette + objective[5] * crossing
+    return depth + objective[4] * silhouette + objective[5] * crossing, 1.0 - silhouette
 
 
 @compiled(nogil=True, _nrt=False)

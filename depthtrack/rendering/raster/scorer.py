@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Terms, silhouette_disagreement
+from depthtrack.rendering.objective import Terms
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raster import kernel, tiles
 from depthtrack.rendering.raster.arrays import KernelArrays
@@ -75,15 +75,15 @@ class RasterScorer(ScorerBase):
         self._target = target
 
     def score(self, poses: ArrayLike) -> Array:
-        return self._sums_and_energies(as_batch(poses))[1]
+        return self.evaluate(poses).energy
 
     def evaluate(self, poses: ArrayLike) -> Scores:
-        sums, energies = self._sums_and_energies(as_batch(poses))
-        return Scores(energies, 1 - silhouette_disagreement(sums[:, 1], sums[:, 2]))
+        count = self._score(as_batch(poses))
+        return Scores(self._arrays.energies[:count].copy(), self._arrays.agreements[:count].copy())
 
     def terms(self, poses: ArrayLike) -> Terms:
         batch = as_batch(poses)
-        clamped, matched_silhouette, union = self._sums_and_energies(batch)[0].T
+        clamped, matched_silhouette, union = self._arrays.sums[: self._score(batch)].T.copy()
         return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 
     def render(self, pose: ArrayLike) -> Depth:
@@ -99,7 +99,8 @@ class RasterScorer(ScorerBase):
         self._stop()
         self._workers.join()
 
-    def _sums_and_energies(self, poses: Array) -> tuple[Array, Array]:
+    def _score(self, poses: Array) -> int:
+        """Write sums, energies and agreements of poses (B, 27) to the arrays; return B."""
         height, width = self.target.camera.shape
         arrays, count = self._arrays, len(poses)
         self._workers.finish_batch()
@@ -108,4 +109,4 @@ class RasterScorer(ScorerBase):
             arrays.allocate_poses(count)
         arrays.poses[:count] = poses
         self._workers.run(count, wake=count > 1 and count * (height * width + _SETUP_PIXELS) >= _WAKE_PIXELS)
-        return arrays.sums[:count].copy(), arrays.energies[:count].copy()
+        return count
