@@ -1,10 +1,11 @@
-"""Choose when and where doubtful starts try other places of the hand, on the tuning seeds of the cross-model benchmark.
+"""Choose when and where doubtful starts try other places of the hand.
 
 Usage: tune_starts.py FOLDER --rig RIG.glb [...] [--seeds N] [--every N] [--only OPTION ...]
 
-Each value is tried alone, the other options have their defaults. Printed are the shares of single-frame starts within
-20 mm, of all frames and of open and half-open hands, and the mean CPU time of a start. The hand has the joints of the
-rig, so that no calibration takes part. The folder holds the counts, from which an interrupted choice continues.
+The recordings are those of the tuning seeds of the cross-model benchmark. Each value is tried alone, the other options
+have their defaults. Printed are the numbers of single-frame starts within 20 mm, and the mean CPU time of a start.
+Open and half-open hands are counted apart. The hand has the joints of the rig, so that no calibration takes part.
+The folder holds the counts, from which an interrupted choice continues.
 """
 
 import argparse
@@ -71,7 +72,10 @@ def main() -> None:
 
 
 def count_starts(cell: Cell) -> Row:
-    """Return the numbers of starts, right ones, open hands, right ones of them, and seconds, of each value."""
+    """Return the counts of each value.
+
+    They are starts, right ones, open hands, right ones of them, and seconds.
+    """
     with made_recording(**{entry: cell[entry] for entry in cell if entry not in SETTING}) as sequence:
         rig = load_hand(Path(cell["rig"]), cell["side"])
         hand = replace(rig, scale=rig.scale * cell["scale"], rig=None)
