@@ -5,7 +5,6 @@ arguments. Those that take longest come first. Each process compiles one after t
 `compilation`. A kernel that is not listed, or whose process fails, is compiled at its first use.
 """
 
-import json
 import re
 import signal
 import subprocess
@@ -22,6 +21,7 @@ from numba import types
 
 from depthtrack.compilation import cache_folder
 from depthtrack.machine import usable_cores
+from depthtrack.strict_data import json_text, parse_json
 
 LIST = Path(__file__).with_name("kernels.json")
 _ROOT = Path(__file__).parents[1]
@@ -59,7 +59,7 @@ class Kernel(NamedTuple):
 
 def listed_kernels() -> list[Kernel]:
     """Return the kernels of the list, those that take longest first."""
-    return [Kernel(**entry) for entry in json.loads(LIST.read_text(encoding="utf-8"))]
+    return [Kernel(**entry) for entry in parse_json(LIST.read_text(encoding="utf-8"))]
 
 
 def type_of(text: Any) -> types.Type:
@@ -147,7 +147,7 @@ def _request(child: "subprocess.Popen[str]", kernel: Kernel) -> bool:
     assert child.stdin is not None
     assert child.stdout is not None
     try:
-        child.stdin.write(json.dumps(kernel._asdict()) + "\n")
+        child.stdin.write(json_text(kernel._asdict()) + "\n")
         child.stdin.flush()
     except OSError:
         return False
@@ -171,7 +171,7 @@ def _serve() -> None:
     """Compile the kernels that the input describes, a line each, and answer each with a line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
     for line in sys.stdin:
-        kernel = Kernel(**json.loads(line))
+        kernel = Kernel(**parse_json(line))
         kernel.dispatcher.compile(kernel.signature)
         print(kernel.name, flush=True)
 
