@@ -7,6 +7,7 @@ LIBRARIES = {
     "numpy": "numpy",
     "scipy": "scipy",
     "numba": "numba",
+    "deflate": "deflate",
     "cv2": "opencv-python-headless",
     "OpenGL": "PyOpenGL",
     "trimesh": "trimesh",

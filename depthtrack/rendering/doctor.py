@@ -17,7 +17,18 @@ from depthtrack.rendering.selfcheck import SelfCheck
 from depthtrack.strict_data import exact_json_text, parse_json
 
 _LIBRARIES = (
-    *("numpy", "scipy", "numba", "llvmlite", "opencv-python-headless", "PyOpenGL", "trimesh", "matplotlib", "tyro"),
+    *(
+        "numpy",
+        "scipy",
+        "numba",
+        "llvmlite",
+        "deflate",
+        "opencv-python-headless",
+        "PyOpenGL",
+        "trimesh",
+        "matplotlib",
+        "tyro",
+    ),
     *("rerun-sdk", "pygltflib"),  # extras
 )
 
