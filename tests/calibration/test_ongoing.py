@@ -101,6 +101,9 @@ class Scene:
     def segment(self, frame: Frame, prior: object = None) -> Observation:
         return replace(self.observation, timestamp=frame.timestamp, frame_index=frame.index)
 
+    def alternatives(self, frame: Frame, first: Observation) -> tuple[Observation, ...]:
+        return ()
+
     def set_lost(self, lost: bool, timestamp: float) -> None: ...
 
     def frames(self, seconds: float) -> Iterator[Frame]:
