@@ -60,18 +60,23 @@ def segment_start(frame: Frame, segmenter: Segmenter) -> Observation | None:
 
 def around_start(
     frame: Frame, observation: Observation | None, estimate: Estimate, segmenter: Segmenter, model: HandModel
-) -> Observation | None:
-    """Return the observation of a frame after its estimate, without its alternatives.
+) -> tuple[Observation | None, str | None]:
+    """Return the observation of a frame after its estimate, and an unexpected failure.
+
+    It has no alternatives any more.
 
     A start elsewhere than the observed palm has chosen an alternative: the frame is segmented again around its pose.
     """
     if observation is None or observation.alternatives is None:
-        return observation
+        return observation, None
     if estimate.status is Status.STARTED and estimate.pose is not None:
         apart = float(np.linalg.norm(estimate.pose[POSITION] - observation.centre))
         if apart > _ELSEWHERE:
-            return segmenter.segment(frame, roi_prior(model, estimate.pose))
-    return replace(observation, alternatives=None)
+            try:
+                return segmenter.segment(frame, roi_prior(model, estimate.pose)), None
+            except Exception as error:
+                return replace(observation, alternatives=None), failure_of(error)
+    return replace(observation, alternatives=None), None
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:

@@ -80,11 +80,11 @@ class Pipeline:
         if estimate is None:
             estimate = replace(ABSENT, timestamp=frame.timestamp)
             self._tracker.restore([estimate])
-        observation = around_start(frame, observation, estimate, self._segmenter, self._model)
+        observation, later = around_start(frame, observation, estimate, self._segmenter, self._model)
         self._segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
         if estimate.pose is not None:
             self._start_pose = None
-        return TrackedFrame(frame, observation, estimate, milliseconds, failure)
+        return TrackedFrame(frame, observation, estimate, milliseconds, failure or later)
 
     def _track(self, observation: Observation) -> Estimate:
         if self._start_pose is not None:
@@ -136,9 +136,9 @@ def replay_frames(
     for frame, estimate in frames:
         observation, milliseconds, failure = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
         guide.restore([estimate])
-        observation = around_start(frame, observation, estimate, segmenter, model)
+        observation, later = around_start(frame, observation, estimate, segmenter, model)
         segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)
-        yield TrackedFrame(frame, observation, estimate, milliseconds, failure)
+        yield TrackedFrame(frame, observation, estimate, milliseconds, failure or later)
 
 
 def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:

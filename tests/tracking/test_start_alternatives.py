@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.morphology import bounding_box
 from depthtrack.segmentation.observation import Observation
@@ -15,6 +16,7 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking import guided_segmentation
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, replay_frames, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -104,6 +106,23 @@ def test_the_frame_is_segmented_around_the_start_in_a_replay_too(made: Synthesis
             assert again.observation is not None
             assert again.observation.region == each.observation.region
             np.testing.assert_array_equal(again.observation.depth, each.observation.depth)
+
+
+class FailsAroundTheStart(ForearmFirst):
+    """Segmenter that fails near any pose."""
+
+    def segment(self, frame: Frame, prior: RoiPrior | None = None) -> Observation | None:
+        if prior is not None:
+            raise np.linalg.LinAlgError("singular")
+        return super().segment(frame, prior)
+
+
+def test_a_failure_around_the_start_is_recorded(made: Synthesiser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guided_segmentation, "failure_text", failure_text)
+    first, *_ = track(made, "ik", FailsAroundTheStart(made))
+    assert first.failure is not None
+    assert "singular" in first.failure
+    assert error(made, first) < 0.005
 
 
 def test_alternatives_leave_the_state_of_the_segmenter() -> None:
