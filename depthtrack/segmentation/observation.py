@@ -5,13 +5,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.rendering.target import Target
 from depthtrack.segmentation.options import PointCloudOptions
-from depthtrack.segmentation.point_cloud import point_cloud
+from depthtrack.segmentation.point_cloud import count_readings, point_cloud
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Mask
 
@@ -68,7 +66,7 @@ class Observation(Target):
     @cached_property
     def reading_count(self) -> int:
         """Number of pixels with a reading, and of `points`."""
-        return int(np.count_nonzero(self.depth))
+        return count_readings(self.depth)
 
     def subsampled_cloud(self, every: int) -> tuple[Array, Array]:
         """Return every n-th point (N, 3) and its normal, from the middle of the first n."""

@@ -1,13 +1,16 @@
 """The point cloud of a depth map with normals."""
 
-import math
-
 import numpy as np
 
 from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.segmentation.options import PointCloudOptions
+from depthtrack.simd.functions import vabs, vsqrt
+from depthtrack.simd.vectors import F64X8, both, kernel_part, loader, select, store
 from depthtrack.types import Array, Depth, Index
+
+LANES = F64X8.lanes
+_load = loader(F64X8)
 
 
 def point_cloud(
@@ -25,7 +28,7 @@ def point_cloud(
     the normal is the line of sight.
     """
     options = options or PointCloudOptions()
-    pixels = _every_reading(depth, every, len(range(every // 2, np.count_nonzero(depth), every)))
+    pixels = _every_reading(depth, every)
     points, normals = np.empty((len(pixels), 3)), np.empty((len(pixels), 3))
     intrinsics = (camera.fx, camera.fy, camera.cx, camera.cy)
     _fit(depth, pixels, intrinsics, options.sample_spacing, options.same_surface, points, normals)
@@ -33,16 +36,32 @@ def point_cloud(
 
 
 @compiled(nogil=True)
-def _every_reading(depth: Depth, every: int, count: int) -> Index:
-    """Return row and column (count, 2) of every n-th pixel with a reading."""
-    pixels, wait, n = np.empty((count, 2), np.int64), every // 2, 0
+def count_readings(depth: Depth) -> int:
+    """Return the number of pixels with a reading."""
+    total = 0
     for v in range(depth.shape[0]):
-        for u in range(depth.shape[1]):
-            if depth[v, u] != 0.0:
-                if wait == 0:
-                    pixels[n, 0], pixels[n, 1] = v, u
-                    n, wait = n + 1, every
-                wait -= 1
+        row = depth[v]
+        for u in range(row.shape[0]):
+            total += row[u] != 0.0
+    return total
+
+
+@compiled(nogil=True)
+def _every_reading(depth: Depth, every: int) -> Index:
+    """Return row and column (N, 2) of every n-th pixel with a reading."""
+    width, first = depth.shape[1], every // 2
+    total = max(count_readings(depth) - first + every - 1, 0) // every
+    columns, pixels = np.empty(width + 1, np.int64), np.empty((total, 2), np.int64)
+    n, wait = 0, first
+    for v in range(depth.shape[0]):
+        row, count = depth[v], 0
+        for u in range(width):
+            columns[count] = u
+            count += row[u] != 0.0
+        while wait < count:
+            pixels[n, 0], pixels[n, 1] = v, columns[wait]
+            n, wait = n + 1, wait + every
+        wait -= count
     return pixels
 
 
@@ -59,34 +78,55 @@ def _fit(
     """Write points and normals of pixels, row and column (N, 2)."""
     fx, fy, cx, cy = intrinsics
     height, width = depth.shape
-    for n in range(pixels.shape[0]):
-        v, u = pixels[n, 0], pixels[n, 1]
-        z = np.float64(depth[v, u])
-        x, y = (u - cx) / fx, (v - cy) / fy
-        points[n, 0], points[n, 1], points[n, 2] = x * z, y * z, z
-        count, su, sv, suu, suv, svv, sw, suw, svw = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for j in range(-spacing, spacing + 1, spacing):
-            for i in range(-spacing, spacing + 1, spacing):
-                if not (0 <= v + j < height and 0 <= u + i < width):
-                    continue
-                there = np.float64(depth[v + j, u + i])
-                if there == 0.0 or abs(there - z) > same_surface:
-                    continue
-                w = 1.0 / there
-                count += 1
-                su, sv, sw = su + i, sv + j, sw + w
-                suu, suv, svv = suu + i * i, suv + i * j, svv + j * j
-                suw, svw = suw + i * w, svw + j * w
-        # Slopes of w about the mean of the samples.
-        nx, ny, nz = x, y, 1.0
-        if count >= 4:
-            a, b, c = suu - su * su / count, suv - su * sv / count, svv - sv * sv / count
-            p, q = suw - su * sw / count, svw - sv * sw / count
-            determinant = a * c - b * b
-            if determinant > 1e-9:
-                wu, wv = (c * p - b * q) / determinant, (a * q - b * p) / determinant
-                # w = n.(x, y, 1) / d for the plane n.X = d.
-                nx, ny = wu * fx, wv * fy
-                nz = 1.0 / z - x * nx - y * ny
-        length = -math.sqrt(nx * nx + ny * ny + nz * nz)
-        normals[n, 0], normals[n, 1], normals[n, 2] = nx / length, ny / length, nz / length
+    samples, found = np.empty((9, LANES)), np.empty((5, LANES))
+    for start in range(0, pixels.shape[0], LANES):
+        for lane in range(LANES):
+            # Lanes beyond the last pixel repeat it.
+            n = min(start + lane, pixels.shape[0] - 1)
+            v, u = pixels[n, 0], pixels[n, 1]
+            found[0, lane], found[1, lane] = (u - cx) / fx, (v - cy) / fy
+            inside = spacing <= v < height - spacing and spacing <= u < width - spacing
+            for k in range(9):
+                j, i = v + spacing * (k // 3 - 1), u + spacing * (k % 3 - 1)
+                there = inside or (0 <= j < height and 0 <= i < width)
+                samples[k, lane] = depth[j, i] if there else 0.0
+        _fit_block(samples, (fx, fy), spacing, same_surface, found)
+        for lane in range(min(LANES, pixels.shape[0] - start)):
+            n, z = start + lane, samples[4, lane]
+            points[n, 0], points[n, 1], points[n, 2] = found[0, lane] * z, found[1, lane] * z, z
+            normals[n, 0], normals[n, 1], normals[n, 2] = found[2, lane], found[3, lane], found[4, lane]
+
+
+@kernel_part
+def _fit_block(samples: Array, focal: tuple[float, float], spacing: int, same_surface: float, found: Array) -> None:
+    """Write the normals of eight pixels.
+
+    samples: (9, LANES) depths of the 3x3 samples of each pixel, metres; 0 without a reading.
+    found: (5, LANES) x, y of the pixels in the image plane z = 1; receives the normals as its last three rows.
+    """
+    (fx, fy), z = focal, _load(samples[4], 0)
+    nothing = z - z
+    count, su, sv, suu, suv, svv = nothing, nothing, nothing, nothing, nothing, nothing
+    sw, suw, svw = nothing, nothing, nothing
+    for k in range(9):
+        i, j = float(spacing * (k % 3 - 1)), float(spacing * (k // 3 - 1))
+        there = _load(samples[k], 0)
+        same = both(there > 0.0, same_surface >= vabs(there - z))
+        used, w = select(same, nothing + 1.0, nothing), select(same, 1.0 / there, nothing)
+        count, su, sv, sw = count + used, su + used * i, sv + used * j, sw + w
+        suu, suv, svv = suu + used * (i * i), suv + used * (i * j), svv + used * (j * j)
+        suw, svw = suw + w * i, svw + w * j
+    # Slopes of w about the mean of the samples.
+    a, b, c = suu - su * su / count, suv - su * sv / count, svv - sv * sv / count
+    p, q = suw - su * sw / count, svw - sv * sw / count
+    determinant = a * c - b * b
+    wu, wv = (c * p - b * q) / determinant, (a * q - b * p) / determinant
+    # w = n.(x, y, 1) / d for the plane n.X = d.
+    x, y = _load(found[0], 0), _load(found[1], 0)
+    fits = both(count > 3.5, determinant > 1e-9)
+    nx, ny = select(fits, wu * fx, x), select(fits, wv * fy, y)
+    nz = select(fits, 1.0 / z - x * nx - y * ny, nothing + 1.0)
+    scale = -1.0 / vsqrt(nx * nx + ny * ny + nz * nz)
+    store(found[2], 0, nx * scale)
+    store(found[3], 0, ny * scale)
+    store(found[4], 0, nz * scale)
