@@ -1,7 +1,7 @@
 """Search for the visible point closest to each observed point, sixteen at a time.
 
 Observed points are sorted by cell once. Sixteen neighbours in a row of cells search the visible points of their cells
-and of those around. The few that have none near search squares of cells that grow.
+and of those around. The few that have none near search larger squares of cells.
 """
 
 import math
@@ -12,13 +12,13 @@ import numpy as np
 from depthtrack.compilation import compiled
 from depthtrack.simd.functions import lowest_of_halves
 from depthtrack.simd.vectors import F32X16, both, filler, kernel_part, loader, select, store
+from depthtrack.solver.visible_points import FAR, LANES
 from depthtrack.types import Array, Array32, Index
 
-LANES = F32X16.lanes
-FAR = np.float32(1e6)
-"""Metres: coordinate of padding, beyond any point."""
 _WIDEST = 12
 """Cells of a row that a group of points spans at most."""
+_FIRST_RING = 3
+"""Cells on each side of its own that are searched first for a point that has no visible point beside it."""
 _LANE: Array32 = np.arange(LANES, dtype=np.float32)
 
 _load = loader(F32X16)
@@ -28,30 +28,31 @@ _fill = filler(F32X16)
 class Groups(NamedTuple):
     """Observed points sorted by cell, in groups of at most `LANES` points of a row of cells.
 
-    order: (N,) rows of the cloud.
+    order: (N,) rows of the cloud that was sorted.
     first: (G + 1,) group g has the sorted points from first[g] up to first[g + 1].
     cells: (G, 3) row, and first and last column of the cells of a group.
-    points: (3, N) metres, camera frame.
+    place: (3, N + LANES) metres, relative to the origin.
     normals: (3, N + LANES) unit.
     margin: (N,) distance to the nearest cell that is not beside the point's own, metres.
-    place, best, chosen: working memory: (3, N + LANES) points relative to the origin, and twice (N + LANES,) the
-        squared distance of the closest visible point, and its row.
+    best, chosen: working memory: twice (N + LANES,) the squared distance of the closest visible point, and its row.
     """
 
     order: Index
     first: Index
     cells: Index
-    points: Array
+    place: Array32
     normals: Array32
     margin: Array
-    place: Array32
     best: Array32
     chosen: Array32
 
 
 @compiled(nogil=True)
-def grouped(points, normals, cells):
-    """Return the groups of observed points and normals (N, 3) among cells."""
+def grouped(points, normals, cells, origin):
+    """Return the groups of observed points and normals (N, 3) among cells.
+
+    origin: (3,) metres, camera frame, of the visible points.
+    """
     count = points.shape[0]
     cell, slots = np.empty((count, 2), np.int64), np.zeros(cells.rows * cells.columns + 1, np.int64)
     inside = np.empty(count)
@@ -66,7 +67,7 @@ def grouped(points, normals, cells):
         order[slots[slot]] = i
         slots[slot] += 1
     first, span, total = np.zeros(count + 1, np.int64), np.empty((count, 3), np.int64), 0
-    sorted_points, sorted_normals = np.empty((3, count)), np.zeros((3, count + LANES), np.float32)
+    place, sorted_normals = np.zeros((3, count + LANES), np.float32), np.zeros((3, count + LANES), np.float32)
     margin, slant = np.empty(count), _slant(cells)
     for j in range(count):
         i = order[j]
@@ -79,20 +80,11 @@ def grouped(points, normals, cells):
         span[total - 1, 2] = column
         margin[j] = max(1.0 + inside[i], 0.0) * (cells.size * points[i, 2] * slant)
         for k in range(3):
-            sorted_points[k, j], sorted_normals[k, j] = points[i, k], normals[i, k]
+            place[k, j], sorted_normals[k, j] = points[i, k] - origin[k], normals[i, k]
     first[total] = count
-    place, memory = np.zeros((3, count + LANES), np.float32), np.zeros((2, count + LANES), np.float32)
-    return Groups(
-        order,
-        first[: total + 1].copy(),
-        span[:total].copy(),
-        sorted_points,
-        sorted_normals,
-        margin,
-        place,
-        memory[0],
-        memory[1],
-    )
+    memory = np.zeros((2, count + LANES), np.float32)
+    cells_of = span[:total].copy()
+    return Groups(order, first[: total + 1].copy(), cells_of, place, sorted_normals, margin, memory[0], memory[1])
 
 
 @compiled(nogil=True)
@@ -118,18 +110,14 @@ def _slant(cells):
 def closest_vertices(cloud, groups, visible, cells, max_distance, min_normal_cosine, closest):
     """Write the row of the visible point closest to each observed point to `closest`.
 
-    cloud: N observed points and normals, camera frame.
-    groups: of the cloud.
-    visible: visible points sorted by cell, see `surfaces.points.Visible`.
+    cloud: N observed points and normals in the order of their groups, camera frame.
+    visible: visible points sorted by cell, relative to the origin of the groups.
     max_distance: largest distance, m.
     min_normal_cosine: smallest cosine between the normals.
     closest: (N,) rows of `visible`, -1 for none.
     """
     first, table = visible.first, visible.table
     limit, least = np.float32(max_distance * max_distance), np.float32(min_normal_cosine)
-    for k in range(3):
-        for j in range(groups.points.shape[1]):
-            groups.place[k, j] = np.float32(groups.points[k, j] - visible.origin[k])
     for g in range(groups.cells.shape[0]):
         row, low, high = groups.cells[g, 0], groups.cells[g, 1], groups.cells[g, 2]
         left, right, at = max(low - 1, 0), min(high + 1, cells.columns - 1), groups.first[g]
@@ -147,49 +135,48 @@ def closest_vertices(cloud, groups, visible, cells, max_distance, min_normal_cos
         # Lanes beyond the group are those of the next one, which writes them again.
         store(groups.best, at, best)
         store(groups.chosen, at, chosen)
-    for j in range(groups.order.shape[0]):
+    slant = _slant(cells)
+    for j in range(cloud.points.shape[0]):
         nearest = groups.chosen[j]
         if groups.margin[j] * groups.margin[j] < groups.best[j]:
-            nearest = _search_beyond(groups, j, cloud.points[groups.order[j]], visible, cells, least, _slant(cells))
-        closest[groups.order[j]] = int(nearest) if nearest < FAR else -1
+            nearest = _search_beyond(groups, j, cloud.points[j], visible, cells, least, slant)
+        closest[j] = int(nearest) if nearest < FAR else -1
 
 
 @kernel_part
 def _search_beyond(groups, j, point, visible, cells, least, slant):
     """Return the row of the visible point closest to sorted point j, or FAR for none.
 
-    The cells beside its own have been searched. Further ones are searched in growing squares, until no point beyond can
-    be closer or no cell is left. The cells of a row are contiguous in memory. A load of sixteen points may include
-    further cells, whose points are valid too.
+    The cells beside its own have been searched. The search goes on in a square of cells that reaches as far as the
+    closest point so far. If there is none, it begins in a small square. The cells of a row are contiguous in memory. A
+    load of sixteen points may include further cells, whose points are valid too.
     """
     first, table = visible.first, visible.table
     px, py, pz = groups.place[0, j], groups.place[1, j], groups.place[2, j]
     mx, my, mz = groups.normals[0, j], groups.normals[1, j], groups.normals[2, j]
     column, row, inside = place_in_cell(cells, point[0], point[1], point[2])
-    side = cells.size * point[2] * slant
-    lanes, lowest, ring = _load(_LANE, 0), groups.best[j], 2
+    side, widest = cells.size * point[2] * slant, max(cells.columns, cells.rows)
+    lanes, lowest = _load(_LANE, 0), groups.best[j]
     best, chosen = _fill(lowest), _fill(FAR)
+    ring = min(int(math.sqrt(lowest) / side - inside) + 1, widest)
+    if groups.chosen[j] >= FAR:
+        ring = min(ring, _FIRST_RING)
     while True:
         left, right = max(column - ring, 0), min(column + ring, cells.columns - 1)
         for r in range(max(row - ring, 0), min(row + ring, cells.rows - 1) + 1):
             base = r * cells.columns
-            whole = r == row - ring or r == row + ring
-            # Only both ends of the middle rows of a square are new.
-            for end in range(1 if whole else 2):
-                low = left if whole or end == 0 else right
-                high = right if whole or end == 1 else left
-                for k in range(first[base + low], first[base + high + 1], LANES):
-                    dx, dy, dz = _load(table[0], k) - px, _load(table[1], k) - py, _load(table[2], k) - pz
-                    d = dx * dx + dy * dy + dz * dz
-                    same = _load(table[3], k) * mx + _load(table[4], k) * my + _load(table[5], k) * mz
-                    better = both(d < best, same >= least)
-                    best, chosen = select(better, d, best), select(better, lanes + np.float32(k), chosen)
+            for k in range(first[base + left], first[base + right + 1], LANES):
+                dx, dy, dz = _load(table[0], k) - px, _load(table[1], k) - py, _load(table[2], k) - pz
+                d = dx * dx + dy * dy + dz * dz
+                same = _load(table[3], k) * mx + _load(table[4], k) * my + _load(table[5], k) * mz
+                better = both(d < best, same >= least)
+                best, chosen = select(better, d, best), select(better, lanes + np.float32(k), chosen)
         one, other = lowest_of_halves(best)
         lowest = min(one, other)
-        # The next square begins where the nearest side of this one ends.
+        # Points beyond the square are farther than its nearest side.
         margin = (ring + inside) * side
-        if (margin >= 0.0 and margin * margin >= lowest) or ring >= max(cells.columns, cells.rows):
+        if (margin >= 0.0 and margin * margin >= lowest) or ring >= widest:
             break
-        ring += 1
+        ring = min(max(ring + 1, int(math.sqrt(lowest) / side - inside) + 1), widest)
     one, other = lowest_of_halves(select(best > lowest, FAR, chosen))
     return min(one, other) if min(one, other) < FAR else groups.chosen[j]

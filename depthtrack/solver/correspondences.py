@@ -1,10 +1,9 @@
 """Correspondences: the closest visible point of the hand for each observed point."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
 from depthtrack.types import Array, Index
 
@@ -27,6 +26,11 @@ class PointCloud(NamedTuple):
         """
         return PointCloud(*observation.subsampled_cloud(every))
 
+    def subsampled(self, every: int) -> "PointCloud":
+        """Return every n-th point, from the middle of the first n."""
+        rows = slice(every // 2, None, every)
+        return PointCloud(self.points[rows].copy(), self.normals[rows].copy())
+
 
 class Correspondences(NamedTuple):
     """Surface points that correspond to the observed points.
@@ -44,29 +48,3 @@ class Correspondences(NamedTuple):
     def allocate(count: int) -> "Correspondences":
         """Allocate correspondences for `count` points."""
         return Correspondences(np.full(count, -1), np.zeros((count, 3)), np.zeros((count, 3)))
-
-
-class Surface(Protocol):
-    """Surface of the hand, for searches of correspondences."""
-
-    def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        """Prepare searches for the points of a cloud.
-
-        max_distance: largest distance of a correspondence, m.
-        """
-        ...
-
-    def match(
-        self,
-        pose: Array,
-        bodies: BodyPoses,
-        cloud: PointCloud,
-        min_normal_cosine: float,
-        correspondences: Correspondences,
-    ) -> None:
-        """Write the closest visible points of the hand to `correspondences`.
-
-        pose: (27,), in which `bodies` are placed already.
-        min_normal_cosine: smallest cosine between the normals of surface and observation.
-        """
-        ...

@@ -12,17 +12,19 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.shape import HandShape
 from depthtrack.segmentation.observation import Observation
-from depthtrack.solver.correspondences import Correspondences, PointCloud, Surface
+from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.fixed_points import FixedPoints
 from depthtrack.solver.gauss_newton import solve
 from depthtrack.solver.keypoints import local_keypoints
 from depthtrack.solver.normal_equations import NormalEquations, clear
 from depthtrack.solver.options import IcpOptions
+from depthtrack.solver.point_search import KINDS, Schedule, fit_rounds
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.problem import Problem, Solution, SolverOptions, SolverState, limit_gradients
 from depthtrack.solver.reprojection import LinesOfSight
 from depthtrack.solver.residuals import add_correspondences
 from depthtrack.solver.subspace import FULL, PostureSubspace
+from depthtrack.solver.surface import Surface
 from depthtrack.types import Array
 
 
@@ -44,11 +46,12 @@ class IcpFitter:
 
     def set_target(self, observation: Observation, every: int) -> None:
         """Set the observation that the next fits are to, and use every n-th of its points."""
-        self._cloud = PointCloud.of(observation, every)
+        cloud = PointCloud.of(observation, every)
+        self._surface.set_target(observation, cloud, self.options.max_distance)
+        self._cloud = self._surface.arranged(cloud)
         self._matches = Correspondences.allocate(len(self._cloud.points))
-        self._coarse = PointCloud.of(observation, every * self.options.coarse_every)
+        self._coarse = self._surface.arranged(cloud.subsampled(self.options.coarse_every))
         self._coarse_matches = Correspondences.allocate(len(self._coarse.points))
-        self._surface.set_target(observation, self._cloud, self.options.max_distance)
         self._sight, self._points = None, FixedPoints.none()
         if observation.keypoints is not None and self.options.keypoint_weight > 0:
             self._sight = LinesOfSight.of(observation.keypoints, observation.camera, self._local)
@@ -78,7 +81,7 @@ class IcpFitter:
         pose = pose.copy()
         coordinates = subspace.project(pose[ANGLES])
         pose[ANGLES] = subspace.angles(coordinates)
-        for _ in range(options.rigid_iterations if align else 0):
+        if align:
             self._align(pose)
         state = SolverState(pose, coordinates, limit_gradients(coordinates, subspace.lower, subspace.upper))
         problem = Problem(self._chain, self._equations, self._points, pull, subspace)
@@ -86,13 +89,8 @@ class IcpFitter:
             options.gn_iterations, options.damping * share, options.pose_damping, options.avoid_limits
         )
         iterations = options.icp_iterations if iterations is None else iterations
-        trace = np.empty(options.gn_iterations + 1)
-        self.solution = None
-        for k in range(iterations):
-            self._match(pose, cloud, correspondences, k / max(iterations - 1, 1))
-            outcome = solve(problem, solver, self._bodies, state, trace)
-            if k == iterations - 1:
-                self.solution = Solution.of(pose, outcome, trace)
+        progress = [k / max(iterations - 1, 1) for k in range(iterations)]
+        self.solution = self._solve(problem, solver, state, cloud, correspondences, progress)
         return pose
 
     def residual(self, pose: Array, scale: float) -> float:
@@ -128,6 +126,34 @@ class IcpFitter:
         low, high = self.options.keypoint_trust
         return float(np.clip((agreement - low) / (high - low), 0, 1))
 
+    def _solve(
+        self,
+        problem: Problem,
+        solver: SolverOptions,
+        state: SolverState,
+        cloud: PointCloud,
+        correspondences: Correspondences,
+        progress: list[float],
+    ) -> Solution | None:
+        """Move `state` by rounds of correspondences and Gauss-Newton.
+
+        progress: of each round, see `IcpOptions.annealed`.
+
+        Return the solution of the last round, None without any.
+        """
+        search, trace = self._surface.search(cloud), np.empty(solver.iterations + 1)
+        if not progress:
+            return None
+        if search is not None and self._sight is None:
+            scales, cosines = np.array([self.options.annealed(share) for share in progress]).T
+            schedule = Schedule(KINDS[self.options.residual], scales, cosines)
+            outcome = fit_rounds(search, correspondences, problem, solver, schedule, self._bodies, state, trace)
+        else:
+            for share in progress:
+                self._match(state.pose, cloud, correspondences, share)
+                outcome = solve(problem, solver, self._bodies, state, trace)
+        return Solution.of(state.pose, outcome, trace)
+
     def _match(self, pose: Array, cloud: PointCloud, correspondences: Correspondences, progress: float) -> None:
         """Find the correspondences of a pose (27,), and accumulate their residuals."""
         kernel_scale, min_normal_cosine = self.options.annealed(progress)
@@ -145,17 +171,18 @@ class IcpFitter:
 
         In closed form for point residuals (Horn 1987), otherwise by the solver with a fixed posture.
         """
-        correspondences, options = self._coarse_matches, self.options
-        self._match(pose, self._coarse, correspondences, 0.0)
+        options = self.options
         if options.residual != "point":
             fixed = PostureSubspace(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
             problem = Problem(self._chain, self._equations, self._points, Prior.none(), fixed)
             solver = SolverOptions(options.gn_iterations, options.align_damping, options.pose_damping)
-            state = SolverState(pose, np.zeros(1), np.zeros(1))
-            solve(problem, solver, self._bodies, state, np.empty(options.gn_iterations + 1))
+            state, progress = SolverState(pose, np.zeros(1), np.zeros(1)), [0.0] * options.rigid_iterations
+            self._solve(problem, solver, state, self._coarse, self._coarse_matches, progress)
             return
-        found = correspondences.body >= 0
-        if found.sum() >= 3:
-            R, t = rigid_alignment(correspondences.x[found], self._coarse.points[found])
-            turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
-            pose[:] = make_pose(R @ pose[POSITION] + t, turned, pose[ANGLES])
+        for _ in range(options.rigid_iterations):
+            self._match(pose, self._coarse, self._coarse_matches, 0.0)
+            found = self._coarse_matches.body >= 0
+            if found.sum() >= 3:
+                R, t = rigid_alignment(self._coarse_matches.x[found], self._coarse.points[found])
+                turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
+                pose[:] = make_pose(R @ pose[POSITION] + t, turned, pose[ANGLES])

@@ -67,7 +67,7 @@ class RenderedHand(NamedTuple):
 
 
 class CapsuleSurface:
-    """Surface of tapered capsules: see `correspondences.Surface`."""
+    """Surface of tapered capsules: see `solver.surface.Surface`."""
 
     def __init__(self, shape: HandShape, scorer: Scorer, options: SurfaceOptions) -> None:
         self._options = options
@@ -82,6 +82,12 @@ class CapsuleSurface:
         self._lens = (c.fx, c.fy, c.cx, c.cy)
         self._max_distance = max_distance
         self._distances = Distances.allocate(len(self._capsules.body), len(cloud.points))
+
+    def arranged(self, cloud: PointCloud) -> PointCloud:
+        return cloud
+
+    def search(self, cloud: PointCloud) -> None:
+        return None
 
     def match(
         self,
@@ -161,7 +167,7 @@ def choose(
 
     A capsule is admissible if its closest point is visible and its normal agrees with the observed one.
 
-    limits: largest distance (m) and smallest cosine between the normals, see `correspondences.Surface`.
+    limits: largest distance (m) and smallest cosine between the normals, see `solver.surface.Surface`.
     """
     x, n, normals = correspondences.x, correspondences.n, cloud.normals
     max_distance, min_normal_cosine = limits

@@ -4,10 +4,11 @@ from functools import lru_cache
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import create_scorer
-from depthtrack.solver.correspondences import Surface
 from depthtrack.solver.options import SurfaceName, SurfaceOptions
+from depthtrack.solver.surface import Surface
+from depthtrack.solver.surface_points import PointBlocks
 from depthtrack.tracking.surfaces.capsules import CapsuleSurface
-from depthtrack.tracking.surfaces.points import PointSurface, SurfacePoints
+from depthtrack.tracking.surfaces.points import PointSurface
 from depthtrack.tracking.surfaces.primitives import primitive_points
 from depthtrack.tracking.surfaces.skin import skin_points
 
@@ -30,6 +31,6 @@ def make_surface(
 
 
 @lru_cache(maxsize=8)
-def _points(name: SurfaceName, hand: HandShape, spacing: float) -> SurfacePoints:
+def _points(name: SurfaceName, hand: HandShape, spacing: float) -> PointBlocks:
     """Return the points of a surface, which the fitters of a tracker share."""
-    return skin_points(hand, spacing) if name == "skin" else primitive_points(hand, spacing)
+    return PointBlocks.of(skin_points(hand, spacing) if name == "skin" else primitive_points(hand, spacing))

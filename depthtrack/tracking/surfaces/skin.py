@@ -4,7 +4,8 @@ import numpy as np
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
-from depthtrack.tracking.surfaces.points import SurfacePoints, subsample_evenly
+from depthtrack.solver.surface_points import SurfacePoints
+from depthtrack.tracking.surfaces.points import subsample_evenly
 
 
 def skin_points(shape: HandShape, spacing: float) -> SurfacePoints:

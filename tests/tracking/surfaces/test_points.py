@@ -12,21 +12,31 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver import closest_points as closest
 from depthtrack.solver.correspondences import Correspondences, PointCloud
-from depthtrack.tracking.surfaces import points as surface
-from depthtrack.tracking.surfaces.points import Cells, Posed, SurfacePoints, Visible
+from depthtrack.solver.point_search import resolve_bodies
+from depthtrack.solver.surface_points import PointBlocks, SurfacePoints, pose_blocks
+from depthtrack.solver.visible_points import FAR, Cells, Visible, cells_over, sort_visible
+from depthtrack.tracking.surfaces.points import subsample_evenly
 from depthtrack.tracking.surfaces.skin import mesh_points
 from tests.support.hands import random_pose
+from tests.support.surface_points import Posed, posed_points
 
 SHAPE = HandShape()
 SKIN = Skin.of(SHAPE)
 MODEL = mesh_points(SKIN, 0.004)
+BLOCKS = PointBlocks.of(MODEL)
+ORIGIN = np.array([0.01, -0.02, 0.5])
 TOLERANCE = 0.008
 
 
 def posed_hand(pose: np.ndarray, model: SurfacePoints = MODEL) -> Posed:
-    posed = Posed(np.empty_like(model.rest), np.empty_like(model.rest))
-    surface.pose_points(model, BodyPoses.at(Chain.of(SHAPE), pose), posed)
-    return posed
+    return posed_points(model, BodyPoses.at(Chain.of(SHAPE), pose))
+
+
+def posed_blocks(pose: np.ndarray) -> tuple[np.ndarray, Posed]:
+    """Return the posed points in blocks (6, P), and the same as rows, which padding has too."""
+    out = np.empty_like(BLOCKS.rest)
+    pose_blocks(BLOCKS, BodyPoses.at(Chain.of(SHAPE), pose), out)
+    return out, Posed(out[:3].T, out[3:].T)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -63,7 +73,7 @@ def test_four_bodies_per_vertex_suffice() -> None:
 
 def test_subsampled_points_are_apart_and_leave_no_gaps() -> None:
     points = np.random.default_rng(0).uniform(size=(400, 3))
-    picked = surface.subsample_evenly(points, 0.2)
+    picked = subsample_evenly(points, 0.2)
     distance = np.linalg.norm(points[:, None] - points[picked], axis=-1)
     between = distance[picked] + np.eye(len(picked))
     assert between.min() > 0.2
@@ -86,27 +96,28 @@ def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
 @given(seed=st.integers(0, 2**32 - 1))
 def test_visible_vertices_are_sorted_by_cell(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    posed = posed_hand(random_pose(rng))
-    cells = surface.cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
-    seen = surface.sort_visible(posed, cells, TOLERANCE)
+    blocks, posed = posed_blocks(random_pose(rng))
+    cells = cells_over(cloud_near(posed, rng).points, 0.006, 0.01)
+    seen = sort_visible(blocks, cells, ORIGIN, TOLERANCE)
     predicted_pose = _seen_slowly(posed, cells)
     assert seen.first[-1] == len(seen.vertex) == sum(map(len, predicted_pose.values()))
     for cell in range(cells.rows * cells.columns):
         assert seen.vertex[seen.first[cell] : seen.first[cell + 1]].tolist() == predicted_pose.get(cell, [])
+    np.testing.assert_array_equal(seen.points, np.column_stack([posed.x, posed.n])[seen.vertex])
     there = seen.table[:, : len(seen.vertex)]
     np.testing.assert_allclose(there[:3].T + seen.origin, posed.x[seen.vertex], atol=1e-7)
     np.testing.assert_allclose(there[3:].T, posed.n[seen.vertex], atol=1e-6)
-    assert np.all(seen.table[:, len(seen.vertex) :] == closest.FAR)
+    assert np.all(seen.table[:, len(seen.vertex) :] == FAR)
 
 
 def test_vertices_behind_another_finger_are_not_visible() -> None:
     """The outer fingers of a flat hand hide the middle finger from the side."""
     flat = make_pose([0, 0, 0.5], [np.sqrt(0.5), 0, np.sqrt(0.5), 0], np.zeros(20))
-    posed = posed_hand(flat)
-    cells = surface.cells_over(posed.x, 0.004, 0.01)
-    seen = surface.sort_visible(posed, cells, TOLERANCE)
+    blocks, posed = posed_blocks(flat)
+    cells = cells_over(posed.x, 0.004, 0.01)
+    seen = sort_visible(blocks, cells, ORIGIN, TOLERANCE)
     facing = np.einsum("vi,vi->v", posed.x, posed.n) < 0
-    middle = np.isin(MODEL.bodies[:, 0], [7, 8, 9])
+    middle = np.isin(BLOCKS.body, [7, 8, 9])
     assert middle[seen.vertex].sum() < 0.5 * (facing & middle).sum()
     assert len(seen.vertex) < 0.75 * facing.sum()
 
@@ -121,19 +132,17 @@ def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
     seed: int, max_distance: float, min_normal_cosine: float, cell: float
 ) -> None:
     rng = np.random.default_rng(seed)
-    posed = posed_hand(random_pose(rng))
+    blocks, posed = posed_blocks(random_pose(rng))
     cloud = cloud_near(posed, rng, spread=min(0.5 * max_distance, 0.02))
-    cells = surface.cells_over(cloud.points, cell, max_distance)
-    seen, correspondences = (
-        surface.sort_visible(posed, cells, TOLERANCE),
-        Correspondences.allocate(len(cloud.points)),
-    )
-    groups = closest.grouped(cloud.points, cloud.normals, cells)
+    cells = cells_over(cloud.points, cell, max_distance)
+    seen, correspondences = sort_visible(blocks, cells, ORIGIN, TOLERANCE), Correspondences.allocate(len(cloud.points))
+    groups = closest.grouped(cloud.points, cloud.normals, cells, ORIGIN)
+    cloud = PointCloud(cloud.points[groups.order], cloud.normals[groups.order])
     closest.closest_vertices(cloud, groups, seen, cells, max_distance, min_normal_cosine, correspondences.body)
     found, vertex = correspondences.body >= 0, seen.vertex[correspondences.body]
-    surface.resolve_bodies(MODEL, posed, seen, correspondences)
+    resolve_bodies(BLOCKS, seen, correspondences)
     np.testing.assert_array_equal(correspondences.body >= 0, found)
-    np.testing.assert_array_equal(correspondences.body[found], MODEL.bodies[vertex[found], 0])
+    np.testing.assert_array_equal(correspondences.body[found], BLOCKS.body[vertex[found]])
     np.testing.assert_array_equal(correspondences.x[found], posed.x[vertex[found]])
     np.testing.assert_array_equal(correspondences.n[found], posed.n[vertex[found]])
 
@@ -164,7 +173,7 @@ def _index(seen: Visible, vertex: np.ndarray) -> np.ndarray:
 )
 def test_cells_cover_the_cloud_and_its_surroundings(depth: float, size: float, around: float, side: float) -> None:
     points = np.random.default_rng(0).uniform([-0.1, -0.1, depth], [0.1, 0.1, depth + 0.05], (50, 3))
-    cells = surface.cells_over(points, size, around)
+    cells = cells_over(points, size, around)
     uv = points[:, :2] / points[:, 2:]
     margin = around / points[:, 2].mean()
     assert np.all(uv.min(axis=0) - margin >= np.array([cells.u, cells.v]) - 1e-12)

@@ -11,8 +11,9 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
-from depthtrack.tracking.surfaces.points import Posed, SurfacePoints, pose_points
+from depthtrack.solver.surface_points import SurfacePoints
 from depthtrack.tracking.surfaces.primitives import primitive_points, sample_primitive
+from tests.support.surface_points import Posed, posed_points
 
 SHAPES = {"average": HandShape(), "left, small": HandShape(side="left", scale=0.8)}
 
@@ -38,9 +39,7 @@ def test_samples_lie_on_the_primitives_with_outward_normals() -> None:
 
 
 def posed(points: SurfacePoints, shape: HandShape, pose: np.ndarray) -> Posed:
-    out = Posed(np.empty_like(points.rest), np.empty_like(points.rest))
-    pose_points(points, BodyPoses.at(Chain.of(shape), pose), out)
-    return out
+    return posed_points(points, BodyPoses.at(Chain.of(shape), pose))
 
 
 @pytest.mark.parametrize("name", SHAPES)
