@@ -5,7 +5,8 @@ from typing import NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from depthtrack.types import Mask
+from depthtrack.compilation import compiled
+from depthtrack.types import Labels, Mask
 
 Element = TypeVar("Element", bound=np.generic)
 
@@ -34,10 +35,7 @@ class Rect(NamedTuple):
     @classmethod
     def bounding(cls, mask: Mask) -> Self:
         """Return the bounding box of a mask (h, w), empty at the origin if the mask is empty."""
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if len(rows) == 0:
-            return cls(0, 0, 0, 0)
-        return cls(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+        return cls(*_bounds(np.ascontiguousarray(mask).view(np.uint8)))
 
     @classmethod
     def around(cls, pixels: ArrayLike, margin: ArrayLike = 0.0) -> Self:
@@ -112,3 +110,21 @@ class Rect(NamedTuple):
     def crop(self, image: NDArray[Element]) -> NDArray[Element]:
         """Return a copy of this rectangle of an image (h, w, ...), with zeros outside the image."""
         return Rect.of_image(image.shape).paste(image, self)
+
+
+@compiled(nogil=True)
+def _bounds(mask: Labels) -> tuple[int, int, int, int]:
+    """Return the bounding box of a mask (h, w), zeros if it is empty."""
+    height, width = mask.shape
+    columns, top, bottom = np.zeros(width, np.uint8), height, 0
+    for v in range(height):
+        row, any_set = mask[v], np.uint8(0)
+        for u in range(width):
+            columns[u] |= row[u]
+            any_set |= row[u]
+        if any_set != 0:
+            top, bottom = min(top, v), v + 1
+    if bottom == 0:
+        return 0, 0, 0, 0
+    found = np.flatnonzero(columns)
+    return found[0], top, found[-1] + 1, bottom

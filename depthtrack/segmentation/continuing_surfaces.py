@@ -52,10 +52,22 @@ def _continues(depth: Depth, kinds: Labels, v: int, u: int, jump: float) -> int:
 @compiled(nogil=True)
 def _border(depth: Depth, kinds: Labels, readings: Mask, focal_length: float, jump: float) -> float:
     """Return the length of the border between readings and surfaces beyond the reach, m."""
-    length = 0.0
+    length, last = 0.0, depth.shape[1] - 1
+    beside = np.empty(depth.shape[1], np.bool_)
     for v in range(depth.shape[0]):
+        row, here = readings[v], kinds[v]
+        above, below = kinds[max(v - 1, 0)], kinds[min(v + 1, depth.shape[0] - 1)]
+        # Few readings lie beside pixels outside the reach: they are found without branches.
+        found = row[0] | row[last]
+        for u in range(1, last):
+            around = (above[u] == OUTSIDE) | (below[u] == OUTSIDE) | (here[u - 1] == OUTSIDE) | (here[u + 1] == OUTSIDE)
+            beside[u] = row[u] & around
+            found |= beside[u]
+        if not found:
+            continue
+        beside[0], beside[last] = row[0], row[last]
         for u in range(depth.shape[1]):
-            if readings[v, u]:
+            if beside[u]:
                 length += _continues(depth, kinds, v, u, jump) * depth[v, u] / focal_length
     return length
 

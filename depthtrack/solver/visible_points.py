@@ -131,10 +131,12 @@ def _find_cells(posed: Array, cells: Cells, out: Array) -> None:
 
     It is -1 if the point faces away or lies in no cell.
     """
+    scale = 1.0 / cells.size
     for v in range(0, posed.shape[1], BLOCK):
         x, y, z = _load(posed[0], v), _load(posed[1], v), _load(posed[2], v)
         facing = _load(posed[3], v) * x + _load(posed[4], v) * y + _load(posed[5], v) * z
-        column, row = vfloor((x / z - cells.u) / cells.size), vfloor((y / z - cells.v) / cells.size)
+        inverse = 1.0 / z
+        column, row = vfloor((x * inverse - cells.u) * scale), vfloor((y * inverse - cells.v) * scale)
         ahead = both(z > 1e-3, facing < 0.0)
         inside = both(both(column >= 0.0, column < cells.columns), both(row >= 0.0, row < cells.rows))
         store(out, v, select(both(ahead, inside), row * cells.columns + column, -1.0))

@@ -29,8 +29,9 @@ class Candidate(NamedTuple):
 def evaluate(scorer: Scorer, poses: Array) -> list[Candidate]:
     """Score poses (N, 27); return them by increasing energy."""
     scores = scorer.evaluate(poses)
-    rows = zip(poses, scores.energy.tolist(), scores.agreement.tolist(), strict=True)
-    return by_energy(Candidate(pose, energy, agreement) for pose, energy, agreement in rows)
+    order = np.argsort(scores.energy, kind="stable")
+    rows = zip(poses[order], scores.energy[order].tolist(), scores.agreement[order].tolist(), strict=True)
+    return [Candidate(*row) for row in rows]
 
 
 def seen_part(candidate: Candidate, rendered: Depth, target: Target, objective: Objective) -> Candidate:

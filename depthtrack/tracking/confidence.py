@@ -80,4 +80,5 @@ def unexplained_share(rendered: Depth, target: Target, distance: float) -> float
     """
     side = max(1, round(THICK * target.camera.fx / distance))
     parts = (target.silhouette & (rendered == 0)).view(np.uint8)
-    return float(cv2.erode(parts, np.ones((side, side), np.uint8)).sum()) / max(int(target.silhouette.sum()), 1)
+    thick = cv2.erode(parts, np.ones((side, side), np.uint8)).view(np.bool_)
+    return int(np.count_nonzero(thick)) / max(int(np.count_nonzero(target.silhouette)), 1)

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -163,5 +163,11 @@ class FrameContext:
         Raises:
             InputError: if no skin fits the sizes of the hand.
         """
-        chosen = options if self.surface is None else replace(options, surface=self.surface)
+        chosen = options if self.surface is None else _with_surface(options, self.surface)
         return self.tools.fitter(chosen, self.observation)
+
+
+@cache
+def _with_surface(options: SurfaceFitOptions, surface: SurfaceName) -> SurfaceFitOptions:
+    """Return the options of a fit to another surface."""
+    return replace(options, surface=surface)
