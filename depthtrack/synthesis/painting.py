@@ -14,7 +14,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.synthesis.backdrop import FACE, FOREARM, Backdrop
 from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
 from depthtrack.synthesis.held_object import HELD
-from depthtrack.synthesis.randomness import coarse_normal_noise
+from depthtrack.synthesis.randomness import rounded_normal_noise
 from depthtrack.synthesis.scene import RenderedView
 from depthtrack.types import Array, Image, Mask
 
@@ -124,8 +124,8 @@ class Painter:
         picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(self._held, surface.normal[v, u])))
         if self._noise == 0:
             return picture
-        noise = self._noise * coarse_normal_noise(rng, picture.shape)
-        return np.asarray(cv2.add(picture, np.rint(noise), dtype=cv2.CV_8U), dtype=np.uint8)
+        noise = rounded_normal_noise(rng, picture.shape, self._noise)
+        return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), dtype=np.uint8)
 
     def _skin(self, points: Array, normal: Array, label: NDArray[np.int16], transforms: Array) -> Array:
         """Return the skin's albedo (N, 3) at camera-frame points (N, 3).

@@ -8,6 +8,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from depthtrack.types import Array32
@@ -61,8 +62,17 @@ def coarse_normal_noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Arr
 
     It is 3 times faster than `normal_noise`, and suits values that are rounded to few levels.
     """
-    drawn = rng.integers(0, 1 << 8, shape, dtype=np.uint8)
-    return np.asarray(cv2.LUT(drawn, _quantiles(1 << 8)), dtype=np.float32)
+    return np.asarray(cv2.LUT(_drawn(rng, shape), _quantiles(1 << 8)), dtype=np.float32)
+
+
+def rounded_normal_noise(rng: np.random.Generator, shape: tuple[int, ...], spread: float) -> NDArray[np.int16]:
+    """Return `coarse_normal_noise` of a standard deviation, rounded to whole numbers."""
+    values = np.rint(spread * _quantiles(1 << 8)).astype(np.int16)
+    return np.asarray(cv2.LUT(_drawn(rng, shape), values), dtype=np.int16)
+
+
+def _drawn(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    return rng.integers(0, 1 << 8, shape, dtype=np.uint8)
 
 
 @cache

@@ -9,6 +9,8 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Mask
 
+_SURELY_FLAT = 0.27
+"""Squared cosine of an angle of incidence that is below 60 degrees, whatever its last bits."""
 JUMP = 0.02
 """Relative depth difference of neighbouring pixels from which they belong to two surfaces."""
 
@@ -65,15 +67,40 @@ def dropout_probability(
 
 @compiled(nogil=True)
 def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], out: Array) -> None:
-    fx, fy, cx, cy = intrinsics
     for v in range(depth.shape[0]):
         for u in range(depth.shape[1]):
-            if depth[v, u] <= 0.0:
-                out[v, u] = math.pi / 2
-                continue
-            x, y = (u - cx) / fx, (v - cy) / fy
-            cosine = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2]) / math.sqrt(x * x + y * y + 1.0)
-            out[v, u] = math.acos(min(max(cosine, 0.0), 1.0))
+            out[v, u] = incidence_at(depth, normal, intrinsics, v, u)
+
+
+@compiled(nogil=True)
+def incidence_at(depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], v: int, u: int) -> float:
+    """Return the `incidence` of a pixel, radians.
+
+    normal: (h, w, 3) unit vectors, camera frame.
+    intrinsics: fx, fy, cx, cy, pixels.
+    """
+    if depth[v, u] <= 0.0:
+        return math.pi / 2
+    fx, fy, cx, cy = intrinsics
+    x, y = (u - cx) / fx, (v - cy) / fy
+    cosine = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2]) / math.sqrt(x * x + y * y + 1.0)
+    return math.acos(min(max(cosine, 0.0), 1.0))
+
+
+@compiled(nogil=True)
+def steep_incidence_at(
+    depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], v: int, u: int
+) -> float:
+    """Return the `incidence_at` of a pixel if it may reach 60 degrees, else 0.
+
+    Most angles are smaller, and take no root then.
+    """
+    fx, fy, cx, cy = intrinsics
+    x, y = (u - cx) / fx, (v - cy) / fy
+    along = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2])
+    if depth[v, u] > 0.0 and along > 0.0 and along * along > _SURELY_FLAT * (x * x + y * y + 1.0):
+        return 0.0
+    return incidence_at(depth, normal, intrinsics, v, u)
 
 
 @compiled(nogil=True)
@@ -95,19 +122,22 @@ def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
 @compiled(nogil=True)
 def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None:
     height, width = depth.shape
-    inverse = np.empty(width)
+    inverse, place = np.empty(width), np.empty(width)
     for v in range(height):
         inverse[:] = 0.0
+        for u in range(width):
+            place[u] = u - focal_baseline / depth[v, u] if depth[v, u] > 0.0 else 0.0
         for u in range(width):
             z = depth[v, u]
             if z <= 0.0:
                 continue
-            here = u - focal_baseline / z
+            here = place[u]
             # The segment ends at the right neighbour; an isolated pixel covers its own width.
             z_next = depth[v, u + 1] if u + 1 < width else 0.0
-            if not abs(z_next - z) <= jump * z:
+            continues = abs(z_next - z) <= jump * z
+            if not continues:
                 z_next = z
-            there = u + 1 - focal_baseline / z_next
+            there = place[u + 1] if continues else u + 1 - focal_baseline / z
             first, last = math.ceil(min(here, there)), math.floor(max(here, there))
             for k in range(max(first, 0), min(last, width - 1) + 1):
                 share = (k - here) / (there - here) if there != here else 0.0
@@ -116,7 +146,7 @@ def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None
             z = depth[v, u]
             if z <= 0.0:
                 continue
-            k = round(u - focal_baseline / z)
+            k = round(place[u])
             # Pixels outside the second image count as visible, since real second cameras cover a wider field.
             if 0 <= k < width and inverse[k] > (1.0 + jump) / z:
                 out[v, u] = True

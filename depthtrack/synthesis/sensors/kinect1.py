@@ -23,7 +23,14 @@ from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
-from depthtrack.synthesis.sensors.geometry import JUMP, dropout_probability, edges, incidence, shadow
+from depthtrack.synthesis.sensors.geometry import (
+    JUMP,
+    dropout_probability,
+    edges,
+    incidence_at,
+    shadow,
+    steep_incidence_at,
+)
 from depthtrack.types import Array, Array32, Mask
 
 BASELINE = 0.075
@@ -50,11 +57,11 @@ class Kinect1:
     def read(self, surface: RenderedSurface, rng: np.random.Generator) -> Array:
         """See `Sensor`."""
         shape = surface.depth.shape
-        theta = incidence(surface, self.camera)
-        out = np.zeros(shape)
+        camera, out = self.camera, np.zeros(shape)
         _read(
             surface.depth,
-            theta,
+            surface.normal,
+            (camera.fx, camera.fy, camera.cx, camera.cy),
             edges(surface.depth),
             shadow(surface.depth, self.camera, BASELINE),
             coarse_normal_noise(rng, (2, *shape)),
@@ -90,7 +97,8 @@ def lateral_noise(theta: float) -> float:
 @compiled(nogil=True)
 def _read(
     depth: Array,
-    theta: Array,
+    normal: Array,
+    lens: tuple[float, float, float, float],
     edge: Mask,
     dark: Mask,
     wander: Array32,
@@ -102,19 +110,18 @@ def _read(
     height, width = depth.shape
     for v in range(height):
         for u in range(width):
-            z, angle, blind = depth[v, u], theta[v, u], dark[v, u]
+            z, row, column = depth[v, u], v, u
             # Lateral noise: near a silhouette, a pixel may read the surface beside it.
             if edge[v, u] or z <= 0.0:
-                sigma = lateral_noise(angle if z > 0.0 else 0.0)
+                sigma = lateral_noise(incidence_at(depth, normal, lens, v, u) if z > 0.0 else 0.0)
                 us = min(max(u + round(sigma * wander[0, v, u]), 0), width - 1)
                 vs = min(max(v + round(sigma * wander[1, v, u]), 0), height - 1)
                 if abs(depth[vs, us] - z) > JUMP * z:
-                    z, angle, blind = depth[vs, us], theta[vs, us], dark[vs, us]
-            if (
-                z <= 0.0
-                or blind
-                or uniform[v, u] < dropout_probability(edge[v, u], angle, _EDGE_DROPOUT, _GRAZING[0], _GRAZING[1])
-            ):
+                    z, row, column = depth[vs, us], vs, us
+            if z <= 0.0 or dark[row, column]:
+                continue
+            angle = steep_incidence_at(depth, normal, lens, row, column)
+            if uniform[v, u] < dropout_probability(edge[v, u], angle, _EDGE_DROPOUT, _GRAZING[0], _GRAZING[1]):
                 continue
             # A disparity step equals z^2 / (8 f b) in depth; rounding adds a variance of a twelfth of a step squared.
             scale = STEPS * INFRARED_FOCAL * BASELINE
