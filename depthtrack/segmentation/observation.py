@@ -1,9 +1,10 @@
 """The observation of a frame: silhouette, depth and point cloud of the hand."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar, cast
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import ImageKeypoints
@@ -12,6 +13,8 @@ from depthtrack.segmentation.options import PointCloudOptions
 from depthtrack.segmentation.point_cloud import count_readings, point_cloud
 from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Mask
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -70,10 +73,17 @@ class Observation(Target):
 
     def subsampled_cloud(self, every: int) -> tuple[Array, Array]:
         """Return every n-th point (N, 3) and its normal, from the middle of the first n."""
-        if every not in self._clouds:
-            self._clouds[every] = point_cloud(self.camera, self.depth, self.cloud_options, every)
-        return self._clouds[every]
+        return self.shared(("points", every), lambda: point_cloud(self.camera, self.depth, self.cloud_options, every))
+
+    def shared(self, key: Hashable, make: Callable[[], Made]) -> Made:
+        """Return what `make` returned first for a key.
+
+        It must depend on the observation and the key alone.
+        """
+        if key not in self._made:
+            self._made.setdefault(key, make())
+        return cast(Made, self._made[key])
 
     @cached_property
-    def _clouds(self) -> dict[int, tuple[Array, Array]]:
+    def _made(self) -> dict[Hashable, object]:
         return {}

@@ -24,7 +24,7 @@ class PointCloud(NamedTuple):
 
         every: step between the kept points (Schroeder et al. 2014, Sec. VI-B).
         """
-        return PointCloud(*observation.subsampled_cloud(every))
+        return observation.shared(("cloud", every), lambda: PointCloud(*observation.subsampled_cloud(every)))
 
     def subsampled(self, every: int) -> "PointCloud":
         """Return every n-th point, from the middle of the first n."""

@@ -50,7 +50,9 @@ class IcpFitter:
         self._surface.set_target(observation, cloud, self.options.max_distance)
         self._cloud = self._surface.arranged(cloud)
         self._matches = Correspondences.allocate(len(self._cloud.points))
-        self._coarse = self._surface.arranged(cloud.subsampled(self.options.coarse_every))
+        step = self.options.coarse_every
+        coarse = observation.shared(("coarse cloud", every, step), lambda: cloud.subsampled(step))
+        self._coarse = self._surface.arranged(coarse)
         self._coarse_matches = Correspondences.allocate(len(self._coarse.points))
         self._sight, self._points = None, FixedPoints.none()
         if observation.keypoints is not None and self.options.keypoint_weight > 0:

@@ -9,12 +9,12 @@ from scipy.spatial import cKDTree
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
-from depthtrack.solver.closest_points import grouped
+from depthtrack.solver.closest_points import Groups, grouped
 from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.options import SurfaceOptions
 from depthtrack.solver.point_search import PointSearch, match_points
 from depthtrack.solver.surface_points import PointBlocks
-from depthtrack.solver.visible_points import cells_over
+from depthtrack.solver.visible_points import Cells, cells_over
 from depthtrack.types import Array, Index
 
 
@@ -36,16 +36,21 @@ class PointSurface:
         self._posed = np.empty_like(blocks.rest)
 
     def set_target(self, observation: Observation, cloud: PointCloud, max_distance: float) -> None:
-        self._max_distance, self._origin = max_distance, observation.centre
-        self._cells = cells_over(cloud.points, self._options.cell, max_distance)
+        size, points = self._options.cell, cloud.points
+        self._max_distance, self._observation = max_distance, observation
+        # The clouds of the observation live as long as it does.
+        key = ("cells", id(points), size, max_distance)
+        self._cells = observation.shared(key, lambda: cells_over(points, size, max_distance))
         self._searches: list[PointSearch] = []
 
     def arranged(self, cloud: PointCloud) -> PointCloud:
-        groups = grouped(cloud.points, cloud.normals, self._cells, self._origin)
-        arranged = PointCloud(cloud.points[groups.order], cloud.normals[groups.order])
+        observation, cells = self._observation, self._cells
+        key = ("groups", id(cloud.points), cells)
+        arranged, groups = observation.shared(key, lambda: _in_groups(cloud, cells, observation.centre))
+        groups = groups._replace(best=np.zeros_like(groups.best), chosen=np.zeros_like(groups.chosen))
         limits = self._options.hidden_depth, self._max_distance
         self._searches.append(
-            PointSearch(self._blocks, self._posed, self._cells, arranged, groups, self._origin, *limits)
+            PointSearch(self._blocks, self._posed, cells, arranged, groups, observation.centre, *limits)
         )
         return arranged
 
@@ -65,3 +70,9 @@ class PointSurface:
         correspondences: Correspondences,
     ) -> None:
         match_points(self._search_of(cloud), bodies, min_normal_cosine, correspondences)
+
+
+def _in_groups(cloud: PointCloud, cells: Cells, origin: Array) -> tuple[PointCloud, Groups]:
+    """Return a cloud in the order of its groups, and the groups; surfaces share them."""
+    groups = grouped(cloud.points, cloud.normals, cells, origin)
+    return PointCloud(cloud.points[groups.order], cloud.normals[groups.order]), groups
