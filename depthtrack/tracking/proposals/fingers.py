@@ -8,7 +8,6 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION, make_pose
 from depthtrack.hand.postures import POSTURES
-from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.tracking.candidate import Candidate, evaluate, poses_of
 from depthtrack.tracking.options import FingerOptions
@@ -48,18 +47,15 @@ def finger_shift_proposals(model: HandModel, pose: Array) -> Array:
     They correct a hand that was matched one finger beside its place. The thumb moves along. So does a finger without a
     neighbour on that side.
     """
-
-    # The last bits of these points reach the tracked poses, which the compiled kinematics would change.
-    def endpoints(of: Array) -> Array:
-        return model.endpoints_of(reference_transforms(model.chain, of)).reshape(5, 4, 3)
-
-    there = endpoints(pose)
+    there = model.endpoints(pose).reshape(5, 4, 3)
     poses = np.tile(pose, (2, 1))
     for other, fingers, neighbours in zip(poses, ([1, 2, 3], [2, 3, 4]), ([2, 3, 4], [1, 2, 3]), strict=True):
         angles = pose[ANGLES].reshape(5, 4).copy()
         angles[fingers] = angles[neighbours]
         other[ANGLES] = angles.ravel()
-        R, t = rigid_alignment(endpoints(other)[fingers].reshape(-1, 3), there[neighbours].reshape(-1, 3))
+        R, t = rigid_alignment(
+            model.endpoints(other).reshape(5, 4, 3)[fingers].reshape(-1, 3), there[neighbours].reshape(-1, 3)
+        )
         turned = quaternion_from_matrix(R @ rotation_matrix(pose[ORIENTATION]))
         other[:] = make_pose(R @ pose[POSITION] + t, turned, other[ANGLES])
     return within_limits(poses)
