@@ -83,10 +83,10 @@ def test_a_hand_that_jumps_is_found_in_the_same_frame(made: Synthesiser) -> None
     """The mean jump of the joints exceeds 3 cm, which the swarm does not cover."""
     tracker = create_tracker(tracker_config("pso", resolution=64, refine=False), HandShape())
     *_, before = follow(made, tracker, range(10, 14))
-    assert errors_mm(made, [before], range(300, 301))[0] > 30
-    found = tracker.track(observe(made, 300))
+    assert errors_mm(made, [before], range(280, 281))[0] > 30
+    found = tracker.track(observe(made, 280))
     assert found.status is Status.TRACKED
-    assert errors_mm(made, [found], range(300, 301))[0] < 5
+    assert errors_mm(made, [found], range(280, 281))[0] < 5
 
 
 def test_poses_do_not_depend_on_the_number_of_threads(made: Synthesiser) -> None:
