@@ -1,13 +1,14 @@
 """Calibration of a hand of one side while it is tracked: sizes of fingers and palm.
 
 The average hand is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of these sizes is
-tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay. The alternation
-follows Tkach et al., "Online generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording.
+tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay. Every second
+hand is not tracked: its poses are fitted from those of the views. The alternation follows Tkach et al., "Online
+generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording.
 """
 
 from collections.abc import Callable
 from collections.abc import Sequence as Views
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_o
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.stretches import TrackedView, track_stretches
+from depthtrack.tracking.stretches import TrackedView, refine_views, track_stretches
 from depthtrack.types import Array
 
 _POSE_ITERATIONS = 8
@@ -58,6 +59,7 @@ class Calibration:
     poses: (V, 27) of `hand` in them.
     poses_before: (V, 27) of the average hand.
     sure_margin: margin from which on the side is sure.
+    energies: (N,) of the last hand that was tracked, in all tracked frames; NaN without a pose.
     """
 
     hand: HandShape
@@ -69,6 +71,7 @@ class Calibration:
     poses: Array
     poses_before: Array
     sure_margin: float = CalibrationOptions.sure_margin
+    energies: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def side_sure(self) -> bool:
@@ -114,21 +117,26 @@ def calibrate(
     report = progress or (lambda stage, share: None)
     options = options or CalibrationOptions()
     stretches = replace(options.stretches, tracker=replace(options.stretches.tracker, seed=seed))
-    values, rounds, joint = np.zeros(COUNT), options.rounds, options.joint
+    values, rounds, joint, energies = np.zeros(COUNT), options.rounds, options.joint, np.zeros(0)
     for number in range(rounds):
-        if number > 0 or not views:
+        hand = hand_of(values, side)
+        if number % 2 == 1 or not views:
             show = _part(report, number / rounds, 0.6 / rounds)
-            hand = hand_of(values, side)
-            views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show).views
+            energies, views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show)
+        elif number > 0:
+            views = refine_views(views, hand, stretches.tracker, threads)
         _check_views(views, sequence, options)
         report("fingers and palm", (number + 0.6) / rounds)
-        chosen = best_views(views, options.accepted.good_views)
+        rows = best_rows(views, options.accepted.good_views)
+        chosen = [views[row] for row in rows]
         observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
         fitted = fit_jointly(observed, poses, values, side, options.iterations, options=joint, threads=threads)
         found = nearest_solid(fitted.values, side)
         change, values = np.abs(found - values)[: WIDTHS.start].max(), found
-        if change < options.converged:
+        if number > 0 and change < options.converged:
             break
+        poses_of = dict(zip(rows, fitted.poses, strict=True))
+        views = [view._replace(pose=poses_of.get(row, view.pose)) for row, view in enumerate(views)]
     report("confidence", 0.95)
     last = options.exact_iterations
     fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint, threads=threads)
@@ -148,6 +156,7 @@ def calibrate(
         after.poses,
         before.poses,
         options.sure_margin,
+        energies,
     )
 
 
@@ -158,8 +167,13 @@ def _part(report: Progress, begun: float, share: float) -> Callable[[int, int], 
 
 def best_views(views: Views[TrackedView], share: float) -> list[TrackedView]:
     """Return the share of the views with the lowest energies, at least two, in order."""
+    return [views[row] for row in best_rows(views, share)]
+
+
+def best_rows(views: Views[TrackedView], share: float) -> list[int]:
+    """Return the rows of `best_views`."""
     order = np.argsort([each.energy for each in views], kind="stable")
-    return [views[i] for i in sorted(order[: max(2, round(share * len(views)))].tolist())]
+    return sorted(order[: max(2, round(share * len(views)))].tolist())
 
 
 def _check_views(views: Views[TrackedView], sequence: Sequence, options: CalibrationOptions) -> None:

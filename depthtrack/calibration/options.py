@@ -61,7 +61,7 @@ class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
     stretches: StretchOptions = option(StretchOptions(), "Frames that the hand is tracked in")
-    rounds: int = option(4, "Rounds of tracking and joint optimisation, at most")
+    rounds: int = option(4, "Rounds of joint optimisation, at most; every second hand is tracked")
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
     exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")

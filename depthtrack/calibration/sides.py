@@ -1,7 +1,8 @@
 """Calibration of a hand whose side is unknown.
 
 The average hands of both sides are tracked over the recording. If that leaves the side open, hands of both sides are
-calibrated and tracked. A few views alone leave it open often: a hand of adapted sizes fits them from its back as well.
+calibrated. The energies of the last hands tracked for that are compared. A few views alone leave the side open often: a
+hand of adapted sizes fits them from its back as well.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies, track_sides
+from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies
 
 
 def calibrate_either_side(
@@ -51,31 +52,26 @@ def calibrate_either_side(
     sides: tuple[Side, ...] = ("right", "left")
     for n, side in enumerate(sides):
         try:
-            calibrations[side] = measured(side, 0.25 + 0.3 * n, 0.3)
+            calibrations[side] = measured(side, 0.25 + 0.375 * n, 0.375)
         except InputError as error:
             failure = error
     if failure is not None:
         if not calibrations:
             raise failure
         return next(iter(calibrations.values()))
-    hands = {side: each.hand for side, each in calibrations.items()}
-    tracked = track_sides(
-        sequence, hands, segmentation, threads, frames, options.stretches, _frames(report, 0.85, 0.15)
-    )
-    return _cheaper(calibrations, *mean_energies(tracked), choice)
+    return _cheaper(calibrations, choice)
 
 
-def _cheaper(
-    calibrations: dict[Side, Calibration], energies: dict[Side, float], frames: int, choice: SideChoice
-) -> Calibration:
+def _cheaper(calibrations: dict[Side, Calibration], choice: SideChoice) -> Calibration:
     """Return the calibration of the side that costs less.
 
-    energies: mean energy of each side while its hand is tracked in `frames` frames.
     choice: the comparison of the average hands.
 
-    The cost of a side is a product of three figures: that energy, the energy of its average hand, and the median
-    distance of the views' points to its skin. The energies do not count if no tracked frame shows a hand.
+    The cost of a side is a product of three figures: the mean energy of its last tracked hand, that of its average
+    hand, and the median distance of the views' points to its skin. The first one does not count if no frame shows both
+    hands.
     """
+    energies, frames = mean_energies({side: each.energies for side, each in calibrations.items()})
     costs = {side: each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()}
     costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
     side, other = sorted(calibrations, key=lambda each: costs[each])

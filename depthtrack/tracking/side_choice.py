@@ -61,7 +61,7 @@ def choose_side(
     hands: dict[Side, HandShape] = {"right": HandShape(), "left": HandShape(side="left")}
     tracked = track_sides(sequence, hands, segmentation, threads, frames, options.stretches, progress)
     views = {side: each.views for side, each in tracked.items()}
-    means, count = mean_energies(tracked)
+    means, count = mean_energies({side: each.energies for side, each in tracked.items()})
     if count == 0:
         return SideChoice("right", 0.0, False, 0, views)
     side, other = sorted(means, key=lambda each: means[each])
@@ -88,12 +88,12 @@ def track_sides(
     return dict(zip(hands, found, strict=True))
 
 
-def mean_energies(tracked: Mapping[Side, TrackedStretches]) -> tuple[dict[Side, float], int]:
+def mean_energies(tracked: Mapping[Side, Array]) -> tuple[dict[Side, float], int]:
     """Return the mean energy of each side, and the number of frames with both poses.
 
-    Other frames do not count.
+    tracked: energies (N,) of each side in the same frames; NaN without a pose. Such frames do not count.
     """
-    energies: Array = np.array([each.energies for each in tracked.values()])
+    energies: Array = np.array(list(tracked.values()))
     known = np.isfinite(energies).all(axis=0)
     if not known.any():
         return dict.fromkeys(tracked, np.inf), 0

@@ -110,6 +110,22 @@ def track_hands(
     return [TrackedStretches(each.energies, tuple(each.views)) for each in tracked]
 
 
+def refine_views(
+    views: Iterable[TrackedView], hand: HandShape, config: TrackerConfig, threads: int = 1
+) -> tuple[TrackedView, ...]:
+    """Fit the poses of views to a hand of other sizes, without the frames between them.
+
+    Observations stay those of the hand that was tracked.
+    """
+    refined = list[TrackedView]()
+    with closing(create_tracker(config, hand, threads)) as tracker:
+        for view in views:
+            found = tracker.start(view.observation, view.pose)
+            if found.pose is not None:
+                refined.append(TrackedView(view.observation, found.pose, found.energy, found.agreement))
+    return tuple(refined)
+
+
 class _Tracked:
     """Results of one hand so far.
 

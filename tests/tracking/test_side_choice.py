@@ -15,7 +15,7 @@ from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
-from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, track_hands, track_stretches
+from depthtrack.tracking.stretches import StretchOptions, track_hands, track_stretches
 
 OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
 
@@ -94,6 +94,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     class Measured:
         hand: HandShape
         after_mm: float
+        energies: np.ndarray
         side_margin: float | None = None
         sure_margin: float = CalibrationOptions().sure_margin
 
@@ -101,13 +102,11 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
 
     def calibrate(sequence: object, side: Side, *rest: object) -> Measured:
         tried.append(side)
-        return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side])
+        energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
+        return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side], energies[side])
 
     monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
     monkeypatch.setattr(sides, "calibrate", calibrate)
-    energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
-    tracked = {side: TrackedStretches(values, ()) for side, values in energies.items()}
-    monkeypatch.setattr(sides, "track_sides", lambda *rest, **more: tracked)
     found = calibrate_either_side(None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
     assert found.hand.side == ("left" if sure else "right")
