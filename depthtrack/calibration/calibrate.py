@@ -1,32 +1,23 @@
-"""Calibration of a hand of one side while it is tracked: sizes of fingers and palm.
+"""Calibration of a hand of one side on a recording: sizes of fingers and palm, and its skin."""
 
-The average hand is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of these sizes is
-tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay. Every second
-hand is not tracked: its poses are fitted from those of the views. The alternation follows Tkach et al., "Online
-generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording.
-"""
-
-from collections.abc import Callable
 from collections.abc import Sequence as Views
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from depthtrack.calibration.acceptance import check_resembles_hand
+from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin, prepared
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
-from depthtrack.calibration.residuals import CalibrationView
-from depthtrack.calibration.solid_hands import nearest_solid
-from depthtrack.errors import InputError
+from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.files import compact_json
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, WIDTHS, hand_of, measures
+from depthtrack.hand.size_parameters import COUNT, hand_of, measures
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.stretches import TrackedView, refine_views, track_stretches
+from depthtrack.tracking.stretches import TrackedView
 from depthtrack.types import Array
 
 _POSE_ITERATIONS = 8
@@ -114,98 +105,46 @@ def calibrate(
     Raises:
         InputError: if too few frames show a hand, or what they show does not resemble one.
     """
+    source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
     report = progress or (lambda stage, share: None)
-    options = options or CalibrationOptions()
-    stretches = replace(options.stretches, tracker=replace(options.stretches.tracker, seed=seed))
-    values, rounds, joint, energies = np.zeros(COUNT), options.rounds, options.joint, np.zeros(0)
-    for number in range(rounds):
-        hand = hand_of(values, side)
-        if number % 2 == 1 or not views:
-            show = _part(report, number / rounds, 0.6 / rounds)
-            energies, views = track_stretches(sequence, hand, segmentation, threads, frames, stretches, show)
-        elif number > 0:
-            views = refine_views(views, hand, stretches.tracker, threads)
-        _check_views(views, sequence, options)
-        report("fingers and palm", (number + 0.6) / rounds)
-        rows = best_rows(views, options.accepted.good_views)
-        chosen = [views[row] for row in rows]
-        observed, poses = [CalibrationView(each.observation) for each in chosen], np.stack([v.pose for v in chosen])
-        fitted = fit_jointly(observed, poses, values, side, options.iterations, options=joint, threads=threads)
-        found = nearest_solid(fitted.values, side)
-        change, values = np.abs(found - values)[: WIDTHS.start].max(), found
-        if number > 0 and change < options.converged:
-            break
-        poses_of = dict(zip(rows, fitted.poses, strict=True))
-        views = [view._replace(pose=poses_of.get(row, view.pose)) for row, view in enumerate(views)]
+    sizes = fit_sizes(source, side, views, lambda stage, share: report(stage, 0.6 * share))
+    skin = fit_skin(source, sizes, lambda stage, share: report(stage, 0.6 + 0.35 * share))
     report("confidence", 0.95)
-    last = options.exact_iterations
-    fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint, threads=threads)
-    values = with_usual_proportions(fitted.values)
-    before, after = (
-        fit_jointly(observed, fitted.poses, sizes, side, _POSE_ITERATIONS, slice(0, 0), options=joint, threads=threads)
-        for sizes in (np.zeros(COUNT), values)
-    )
+    found = calibration_of(source, skin)
     report("done", 1.0)
+    return found
+
+
+def calibration_of(source: CalibrationSource, fitted: FittedHand) -> Calibration:
+    """Return the calibration with a fitted hand, compared with the average one."""
+    joint, threads, side = source.options.joint, source.threads, fitted.side
+    observed, _ = prepared(fitted.views)
+    before, after = (
+        fit_jointly(
+            observed,
+            fitted.poses,
+            values,
+            side,
+            _POSE_ITERATIONS,
+            slice(0, 0),
+            exact=len(values) > COUNT,
+            options=joint,
+            threads=threads,
+        )
+        for values in (np.zeros(COUNT), fitted.values)
+    )
     return Calibration(
-        hand_of(values, side, f"calibrated on {sequence.name}"),
-        measured_sizes(values, fitted.covariance, size_covariance(joint)),
+        hand_of(fitted.values, side, f"calibrated on {source.sequence.name}"),
+        measured_sizes(fitted.values[:COUNT], fitted.covariance, size_covariance(joint)),
         None,
         1000 * float(np.median(before.distances)),
         1000 * float(np.median(after.distances)),
-        tuple(each.observation for each in chosen),
+        tuple(each.observation for each in fitted.views),
         after.poses,
         before.poses,
-        options.sure_margin,
-        energies,
+        source.options.sure_margin,
+        fitted.energies,
     )
-
-
-def _part(report: Progress, begun: float, share: float) -> Callable[[int, int], None]:
-    """Return the progress of a part of the work that tracks frames."""
-    return lambda done, total: report("poses of the hand", begun + share * done / total)
-
-
-def best_views(views: Views[TrackedView], share: float) -> list[TrackedView]:
-    """Return the share of the views with the lowest energies, at least two, in order."""
-    return [views[row] for row in best_rows(views, share)]
-
-
-def best_rows(views: Views[TrackedView], share: float) -> list[int]:
-    """Return the rows of `best_views`."""
-    order = np.argsort([each.energy for each in views], kind="stable")
-    return sorted(order[: max(2, round(share * len(views)))].tolist())
-
-
-def _check_views(views: Views[TrackedView], sequence: Sequence, options: CalibrationOptions) -> None:
-    """Check that enough views show a hand.
-
-    Raises:
-        InputError: if they do not.
-    """
-    if len(views) < options.fewest:
-        raise InputError(
-            f"a hand was tracked in {len(views)} of {min(len(sequence), options.stretches.views)} frames of "
-            f"{sequence.name}: calibrating needs at least {options.fewest} frames that show a bare hand, "
-            "best with open fingers towards the camera"
-        )
-    check_resembles_hand([each.agreement for each in views], options.accepted.hand_like)
-
-
-def with_usual_proportions(values: Array) -> Array:
-    """Return sizes (35,) of the same hand with usual proportions.
-
-    The median factor of fingers and palm moves into the scale.
-    """
-    parts = np.append(values[LENGTHS].reshape(5, 3).mean(axis=1), values[PALM][:2])
-    common = float(np.median(parts))
-    out = values.copy()
-    out[0] += common
-    out[1:24] -= common  # lengths, widths and palm
-    out[24:] /= np.exp(common)
-    # The factors of the palm do not move the base of the thumb out of the palm: its offset has to.
-    height = HandShape().bases[0, 2]
-    out[-1] += height / np.exp(common) - height
-    return out
 
 
 def measured_sizes(values: Array, covariance: Array, prior: Array) -> dict[str, Measured]:

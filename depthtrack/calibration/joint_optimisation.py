@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from depthtrack.calibration.options import JointFitOptions
 from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
 from depthtrack.calibration.solid_hands import solid_step
+from depthtrack.hand.displacement_grid import NODES, neighbour_differences
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ANGLES, retract
+from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
 from depthtrack.hand.shape import Side
 from depthtrack.hand.size_parameters import COUNT, hand_of, placement_covariance, prior_covariance
 from depthtrack.solver.shared_parameters import EliminatedPose, eliminate_pose, solve_free
@@ -28,7 +30,7 @@ from depthtrack.types import Array
 class JointFit:
     """Sizes and poses that fit all views.
 
-    values: (35,) sizes, see `hand.size_parameters`.
+    values: (35,) sizes, see `hand.size_parameters`; behind them the displacement of the skin if it was fitted.
     covariance: (35, 35) of the sizes given views and prior.
     poses: (V, 27).
     distances: (V,) metres, median distance of the points of each view to the skin.
@@ -46,7 +48,7 @@ def fit_jointly(
     values: Array,
     side: Side,
     iterations: int,
-    free: slice = slice(0, COUNT),
+    free: slice = slice(None),
     exact: bool = False,
     options: JointFitOptions | None = None,
     threads: int = 1,
@@ -54,8 +56,9 @@ def fit_jointly(
     """Return the sizes and poses that fit all views best.
 
     poses: (V, 27) to start from.
-    values: (35,) sizes to start from.
-    free: the sizes that may change.
+    values: (35,) sizes to start from; or sizes and displacement of the skin, which are then fitted together and need
+        `exact`.
+    free: the sizes that may change; all by default.
     exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale. The
         sizes to start from must give a solid hand, and steps that do not are shortened.
     threads: among which the views are divided. Sizes and poses do not depend on their number.
@@ -63,25 +66,27 @@ def fit_jointly(
     options = options or JointFitOptions()
     soft, firm = (options.kernel_scale[1],) * 2 if exact else options.kernel_scale
     poses, values = within_limits(poses), values.copy()
-    prior = np.linalg.inv(size_covariance(options))
-    held = np.ones(COUNT, dtype=np.bool_)
+    displaced = len(values) > COUNT
+    prior = prior_information(options, displaced)
+    held = np.ones(len(values), dtype=np.bool_)
     held[free] = False
     with ThreadPoolExecutor(threads, thread_name_prefix="views") as pool:
         for k in range(iterations):
             skin = PosedSkin(hand_of(values, side), exact)
             kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
-            evidence = list(pool.map(partial(linearise, skin=skin, kernel_scale=kernel_scale), views, poses))
+            linearised = partial(linearise, skin=skin, kernel_scale=kernel_scale, displaced=displaced)
+            evidence = list(pool.map(linearised, views, poses))
             eliminated = [_eliminate(*each, options) for each in zip(views, evidence, poses, strict=True)]
             information = np.sum([e.information for e in eliminated], axis=0)
             gradient = np.sum([e.gradient for e in eliminated], axis=0)
             change = solve_free(information + prior, -(gradient + prior @ values), held)
-            change *= min(1.0, options.largest_change / max(np.abs(change).max(), 1e-12))
+            change *= min(1.0, options.largest_change / max(np.abs(change[:COUNT]).max(), 1e-12))
             before, values = values, solid_step(values, change, side) if exact else values + change
             change = values - before
             tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
             poses = within_limits(retract(poses, tangents))
     distances = np.array([e.distance for e in evidence])
-    return JointFit(values, np.linalg.inv(information + prior), poses, distances)
+    return JointFit(values, np.linalg.inv(information + prior)[:COUNT, :COUNT], poses, distances)
 
 
 def size_covariance(options: JointFitOptions) -> Array:
@@ -92,12 +97,29 @@ def size_covariance(options: JointFitOptions) -> Array:
     return prior_covariance() + placement_covariance(options.joint_places, options.palm_flesh)
 
 
+def prior_information(options: JointFitOptions, displaced: bool) -> Array:
+    """Return the inverse covariance (n, n) of the parameters before any view.
+
+    They are the sizes, and the displacement of the skin if wanted. Displacements are
+    small, and those of neighbouring nodes alike.
+    """
+    sizes: Array = np.linalg.inv(size_covariance(options)).astype(np.float64, copy=False)
+    if not displaced:
+        return sizes
+    differences = neighbour_differences()
+    skin = np.eye(NODES) / options.displacement**2
+    skin += (differences.T @ differences).toarray() / options.displacement_difference**2
+    return np.asarray(block_diag(sizes, skin), dtype=np.float64)
+
+
 def _eliminate(view: CalibrationView, evidence: Evidence, pose: Array, options: JointFitOptions) -> EliminatedPose:
     """Return the normal equations of the sizes for one view.
 
     They are scaled to its number of independent measurements.
     """
-    noise = max(options.noise, options.misfit * evidence.distance) ** 2
+    displaced = len(evidence.g) > TANGENT_SIZE + COUNT
+    misfit = options.displaced_misfit if displaced else options.misfit
+    noise = max(options.noise, misfit * evidence.distance) ** 2
     scale = min(view.patches / max(evidence.count, 1), 1.0) / noise
     damping = 1 / np.repeat(options.step_spread, [3, 3, 20]) ** 2
     return eliminate_pose(scale * evidence.H, scale * evidence.g, pose[ANGLES], damping)

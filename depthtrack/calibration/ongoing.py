@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from depthtrack.calibration.acceptance import check_resembles_hand
-from depthtrack.calibration.calibrate import Measured, best_views, measured_sizes, with_usual_proportions
+from depthtrack.calibration.calibrate import Measured, measured_sizes
+from depthtrack.calibration.fitted_hand import best_views, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import OngoingOptions
 from depthtrack.calibration.residuals import CalibrationView

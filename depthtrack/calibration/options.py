@@ -39,6 +39,15 @@ class JointFitOptions:
         source="chosen on the tuning seeds of the cross-model benchmark",
     )
     palm_flesh: float = option(0.1, "Standard deviation of the logarithm of the palm's thickness, beside that of sizes")
+    displaced_misfit: float = option(
+        1.0, "`misfit` while the displacement of the skin is fitted, which removes such errors"
+    )
+    displacement: float = option(
+        0.003, "Standard deviation of the skin's displacement from that of the sizes", unit="m"
+    )
+    displacement_difference: float = option(
+        0.002, "Standard deviation of the difference between neighbouring nodes of the displacement", unit="m"
+    )
     largest_change: float = option(
         0.08, "Change of the logarithm of a size in one iteration; the skin is linear within about that"
     )
@@ -64,6 +73,8 @@ class CalibrationOptions:
     rounds: int = option(4, "Rounds of joint optimisation, at most; every second hand is tracked")
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
     exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")
+    skin_rounds: int = option(2, "Fits of the skin's displacement; without any, the skin follows from the sizes")
+    skin_iterations: int = option(12, "Iterations of each")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
     accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")

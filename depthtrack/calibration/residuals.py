@@ -16,6 +16,7 @@ from depthtrack.calibration.outline_and_surface import SeenSkin, SeenView, outli
 from depthtrack.calibration.posed_mesh import PosableMesh, posed_mesh
 from depthtrack.calibration.size_equations import PARAMETERS, SizedHand, add_normal_equations
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
+from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.kinematics import HandModel, body_of
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
@@ -79,10 +80,12 @@ def _mesh_of(skin: Skin) -> PosableMesh:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Normal equations of a view, for pose and sizes (26 + 35).
+    """Normal equations of a view for n parameters.
 
-    H: (61, 61) weighted sum of a a^T, with gradients a (61,).
-    g: (61,) weighted sum of a e, with residuals e (m).
+    They are pose, sizes and, if wanted, the displacement of the skin.
+
+    H: (n, n) weighted sum of a a^T, with gradients a (n,).
+    g: (n,) weighted sum of a e, with residuals e (m).
     count: number of residuals.
     distance: median distance of the observed points to the skin, m, infinite if there are none.
     """
@@ -93,17 +96,21 @@ class Evidence:
     distance: float
 
 
-def linearise(view: CalibrationView, pose: Array, skin: PosedSkin, kernel_scale: float) -> Evidence:
+def linearise(
+    view: CalibrationView, pose: Array, skin: PosedSkin, kernel_scale: float, displaced: bool = False
+) -> Evidence:
     """Return the evidence of a view for a pose (27,).
 
     kernel_scale: m, scale of the Geman-McClure kernel.
+    displaced: for the displacement of the skin too.
     """
     surface, camera = skin.seen(view, pose), view.observation.camera
     hand = SizedHand.at(skin.model, pose)
     seen = SeenSkin(surface.depth, surface.label, surface.normal, (camera.fx, camera.fy, camera.cx, camera.cy))
     on_surface = surface_residuals(view.seen, seen, hand.bodies.T[0], skin.wrist)
     on_outline = outline_residuals(view.seen, seen, hand.bodies.T[0], skin.wrist)
-    H, g = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    n = PARAMETERS + (NODES if displaced else 0)
+    H, g = np.zeros((n, n)), np.zeros(n)
     for residuals in (on_surface, on_outline):
         add_normal_equations(hand, residuals, kernel_scale, H, g)
     found = on_surface.distances

@@ -8,9 +8,11 @@ hand of adapted sizes fits them from its back as well.
 from collections.abc import Callable
 from dataclasses import replace
 
-from depthtrack.calibration.calibrate import Calibration, calibrate
+from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
+from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
+from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
 from depthtrack.recording.sequence import Sequence
@@ -39,31 +41,32 @@ def calibrate_either_side(
     choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.0, 0.25))
     options = options or CalibrationOptions()
 
-    def measured(side: Side, begun: float, share: float) -> Calibration:
-        part = _part(report, begun, share)
-        views = choice.views.get(side, ())
-        return calibrate(sequence, side, views, segmentation, seed, threads, frames, part, options)
-
     if choice.sure:
-        found = measured(choice.side, 0.25, 0.75)
+        views, part = choice.views.get(choice.side, ()), _part(report, 0.25, 0.75)
+        found = calibrate(sequence, choice.side, views, segmentation, seed, threads, frames, part, options)
         return replace(found, side_margin=choice.margin, sure_margin=side_options.sure_margin)
-    calibrations: dict[Side, Calibration] = {}
+    source = CalibrationSource(sequence, segmentation, seed, threads, frames, options)
+    sized: dict[Side, FittedHand] = {}
     failure: InputError | None = None
     sides: tuple[Side, ...] = ("right", "left")
     for n, side in enumerate(sides):
         try:
-            calibrations[side] = measured(side, 0.25 + 0.375 * n, 0.375)
+            part = _part(report, 0.25 + 0.25 * n, 0.25)
+            sized[side] = fit_sizes(source, side, choice.views.get(side, ()), part)
         except InputError as error:
             failure = error
     if failure is not None:
-        if not calibrations:
+        if not sized:
             raise failure
-        return next(iter(calibrations.values()))
-    return _cheaper(calibrations, choice)
+        return calibration_of(source, fit_skin(source, next(iter(sized.values())), _part(report, 0.75, 0.25)))
+    calibrations = {side: calibration_of(source, each) for side, each in sized.items()}
+    side, margin = _cheaper(calibrations, choice)
+    found = calibration_of(source, fit_skin(source, sized[side], _part(report, 0.85, 0.15)))
+    return replace(found, side_margin=margin)
 
 
-def _cheaper(calibrations: dict[Side, Calibration], choice: SideChoice) -> Calibration:
-    """Return the calibration of the side that costs less.
+def _cheaper(calibrations: dict[Side, Calibration], choice: SideChoice) -> tuple[Side, float]:
+    """Return the side that costs less, and the share by which the other one costs more.
 
     choice: the comparison of the average hands.
 
@@ -75,7 +78,7 @@ def _cheaper(calibrations: dict[Side, Calibration], choice: SideChoice) -> Calib
     costs = {side: each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()}
     costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
     side, other = sorted(calibrations, key=lambda each: costs[each])
-    return replace(calibrations[side], side_margin=costs[other] / costs[side] - 1)
+    return side, costs[other] / costs[side] - 1
 
 
 def _part(progress: Progress, begun: float, share: float) -> Progress:

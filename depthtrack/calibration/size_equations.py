@@ -1,7 +1,7 @@
-"""Add up the normal equations of a view by pose and sizes in kernels.
+"""Add up the normal equations of a view by pose, sizes and displacement in kernels.
 
-A residual depends on the palm, on one finger and on the sizes of both: on 20 of 61 parameters at most. Only these are
-added up.
+A residual depends on the palm, on one finger, on the sizes of both and on four nodes of the displacement: on 24
+parameters at most. Only these are added up.
 """
 
 from typing import NamedTuple
@@ -14,13 +14,14 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import TANGENT_SIZE
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.size_parameters import COUNT, KNUCKLES, LENGTHS, PALM, THUMB_BASE, WIDTHS
+from depthtrack.hand.skin.displacement import TOUCHED, DisplacementGrid, write_nodes
 from depthtrack.solver.robust import compiled_geman_mcclure
 from depthtrack.types import Array, Index
 
 PARAMETERS = TANGENT_SIZE + COUNT
 _LENGTHS, _WIDTHS, _PALM = (TANGENT_SIZE + part.start for part in (LENGTHS, WIDTHS, PALM))
 _KNUCKLES, _THUMB_BASE = (TANGENT_SIZE + part.start for part in (KNUCKLES, THUMB_BASE))
-_MOST = 24
+_MOST = 24 + TOUCHED
 """Bound on the parameters that one residual depends on."""
 
 
@@ -31,6 +32,7 @@ class SizedHand(NamedTuple):
     lengths: (5, 3) of the phalanges, m.
     grown: (5, 3) places of the base joints by the palm's sizes alone, m, palm frame of a hand of scale 1.
     scale, mirror: of the hand.
+    grid: of the displacement of its skin.
     """
 
     bodies: BodyPoses
@@ -38,6 +40,7 @@ class SizedHand(NamedTuple):
     grown: Array
     scale: float
     mirror: float
+    grid: DisplacementGrid
 
     @staticmethod
     def at(model: HandModel, pose: Array) -> "SizedHand":
@@ -45,7 +48,8 @@ class SizedHand(NamedTuple):
         shape, average = model.shape, HandShape()
         breadth, length = shape.palm_breadth / average.palm_breadth, shape.palm_length / average.palm_length
         grown = average.bases * [breadth, length, 1.0]
-        return SizedHand(BodyPoses.at(model.chain, pose), model.lengths, grown, shape.scale, float(shape.mirror))
+        bodies, grid = BodyPoses.at(model.chain, pose), DisplacementGrid.of(shape)
+        return SizedHand(bodies, model.lengths, grown, shape.scale, float(shape.mirror), grid)
 
 
 class Residuals(NamedTuple):
@@ -121,6 +125,30 @@ def write_gradient(hand: SizedHand, b: int, x: Array, n: Array, columns: Index, 
 
 
 @compiled(nogil=True)
+def _write_displacement(hand: SizedHand, b: int, x: Array, columns: Index, a: Array, count: int) -> int:
+    """Write the derivatives by the displacement behind `count` others.
+
+    Returns the number of all. The direction of the residual counts as the skin's normal, along which a displacement
+    moves the point.
+    """
+    T, nodes, shares = hand.bodies.T, np.empty(TOUCHED, np.int64), np.empty(TOUCHED)
+    qx, qy, qz = x[0] - T[b, 0, 3], x[1] - T[b, 1, 3], x[2] - T[b, 2, 3]
+    across = (T[b, 0, 0] * qx + T[b, 1, 0] * qy + T[b, 2, 0] * qz) * hand.mirror / hand.scale
+    along = (T[b, 0, 1] * qx + T[b, 1, 1] * qy + T[b, 2, 1] * qz) / hand.scale
+    deep = (T[b, 0, 2] * qx + T[b, 1, 2] * qy + T[b, 2, 2] * qz) / hand.scale
+    write_nodes(hand.grid, b, across, along, deep, nodes, shares)
+    for i in range(TOUCHED):
+        at = count + i
+        # The nodes are in no order, but the sums need one.
+        column, value = PARAMETERS + nodes[i], hand.scale * shares[i]
+        while at > count and columns[at - 1] > column:
+            columns[at], a[at] = columns[at - 1], a[at - 1]
+            at -= 1
+        columns[at], a[at] = column, value
+    return count + TOUCHED
+
+
+@compiled(nogil=True)
 def _along(T: Array, body: int, axis: int, n: Array) -> float:
     """Return the component of n (3,) along an axis of a body."""
     return float(T[body, 0, axis] * n[0] + T[body, 1, axis] * n[1] + T[body, 2, axis] * n[2])
@@ -130,12 +158,16 @@ def _along(T: Array, body: int, axis: int, n: Array) -> float:
 def add_normal_equations(hand: SizedHand, residuals: Residuals, kernel_scale: float, H: Array, g: Array) -> None:
     """Add the weighted sums of a a^T to H (61, 61) and of a e to g (61,).
 
+    If H and g have rows for the nodes of the displacement as well, these are added up too.
+
     a: gradients; e: residuals.
     kernel_scale: m, scale of the Geman-McClure kernel.
     """
     columns, a = np.empty(_MOST, np.int64), np.empty(_MOST)
     for k in range(residuals.bodies.shape[0]):
         count = write_gradient(hand, residuals.bodies[k], residuals.x[k], residuals.directions[k], columns, a)
+        if H.shape[0] > PARAMETERS:
+            count = _write_displacement(hand, residuals.bodies[k], residuals.x[k], columns, a, count)
         weight = compiled_geman_mcclure(residuals.distances[k] ** 2, kernel_scale)
         for i in range(count):
             share = weight * a[i]

@@ -14,6 +14,7 @@ import numpy as np
 
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json, read_json
+from depthtrack.hand.displacement_grid import NODES, displacement_fields, displacement_of
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig_file import RigFile
 from depthtrack.hand.rig_file import Side as Side
@@ -66,6 +67,7 @@ class HandShape:
     bases: (5, 3) base joints.
     thumb_direction, thumb_pad: (3,) directions of the resting thumb and of its pad.
     rig: the mesh that the sizes were measured on; None if the surface is built from the sizes (`Skin.of`).
+    displacement: (NODES,) of the skin along its normals, see `skin.displacement`; None for none.
     uncertainty: standard deviation of a point of the person's hand from that of this one in the same pose, metres. By
         default it is that of a calibrated hand; 0 for the true one.
 
@@ -87,6 +89,7 @@ class HandShape:
     wrist_thickness: float = 0.039
     source: str = _SOURCE
     rig: RigFile | None = None
+    displacement: Array | None = None
     uncertainty: float = CALIBRATED
 
     def __post_init__(self) -> None:
@@ -99,11 +102,20 @@ class HandShape:
             object.__setattr__(self, name, array)
             if array.shape != shape or not np.all(np.isfinite(array)):
                 raise InputError(f"hand {name} must be {shape} finite numbers, found shape {array.shape}")
+        if self.displacement is not None:
+            self._check_displacement(_frozen(self.displacement))
         if not 0 <= self.uncertainty <= 0.1:
             raise InputError(f"hand uncertainty must lie between 0 and 100 mm, found {1000 * self.uncertainty!r}")
         sizes = np.concatenate([self.lengths.ravel(), self.radii.ravel(), [getattr(self, n) for n in _PALM_SIZES]])
         if sizes.min() < 1e-4 or sizes.max() > 0.5 or np.abs(self.bases).max() > 0.5:
             raise InputError("hand sizes must lie between 0.1 and 500 mm; is the file in millimetres?")
+
+    def _check_displacement(self, displacement: Array) -> None:
+        object.__setattr__(self, "displacement", displacement)
+        if self.rig is not None:
+            raise InputError("a hand with a rig takes its surface from there: remove the entry `skin_displacement_mm`")
+        if displacement.shape != (NODES,) or not np.all(np.abs(displacement) <= 0.02):
+            raise InputError(f"the skin's displacement must be {NODES} numbers within 20 mm")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, HandShape) and self.to_json() == other.to_json()
@@ -148,6 +160,7 @@ class HandShape:
                 }
                 for f, finger in enumerate(FINGERS)
             },
+            **({} if self.displacement is None else {"skin_displacement_mm": displacement_fields(self.displacement)}),
             "source": self.source,
             **({} if self.uncertainty == CALIBRATED else {"uncertainty_mm": _mm(self.uncertainty)}),
             **({} if self.rig is None else {"rig": self.rig.to_fields()}),
@@ -182,6 +195,9 @@ class HandShape:
             thumb_pad=_frozen(fields["thumb_at_rest"]["pad"]),
             source=str(fields.get("source", "")),
             uncertainty=float(fields.get("uncertainty_mm", 1000 * CALIBRATED)) / 1000,
+            displacement=(
+                None if fields.get("skin_displacement_mm") is None else displacement_of(fields["skin_displacement_mm"])
+            ),
             rig=None if fields.get("rig") is None else RigFile.from_fields(fields["rig"]),
             **{name: float(fields["palm"][f"{name}_mm"]) / 1000 for name in _PALM_SIZES},
         )

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from depthtrack.calibration.calibrate import Calibration, calibrate, summary, with_usual_proportions
+from depthtrack.calibration.calibrate import Calibration, calibrate, summary
+from depthtrack.calibration.fitted_hand import with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions, JointFitOptions
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise
@@ -17,6 +18,8 @@ from depthtrack.cli.calibrate import _text
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rotations import quaternion_product
+from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
@@ -30,6 +33,7 @@ from depthtrack.hand.size_parameters import (
     measures,
     motion_of,
     prior_covariance,
+    values_of,
 )
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
@@ -46,10 +50,17 @@ from tests.support.observations import observe
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("calibration")]
 
 
-def _rendered(pose: np.ndarray) -> Observation:
-    """Return the observation of the true hand without noise."""
+def _towards_camera(turn: float) -> np.ndarray:
+    """Return the pose of a relaxed palm, turned about its long axis by an angle."""
+    palm = np.array([0.0, 1.0, 0.0, 0.0])
+    about_y = np.array([np.cos(turn / 2), 0.0, np.sin(turn / 2), 0.0])
+    return make_pose([0, 0, 0.5], quaternion_product(palm, about_y), POSTURES["relaxed"])
+
+
+def _rendered(pose: np.ndarray, hand: HandShape | None = None) -> Observation:
+    """Return the observation of a hand, by default the true one, without noise."""
     camera = Camera(240, 240, 500, 500, 120, 120)
-    skin = Skin.of(TRUE_HAND)
+    skin = Skin.of(hand or TRUE_HAND)
     vertices = skin.at(pose)
     surface = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies)
     depth = surface.depth.astype(np.float32)
@@ -142,6 +153,27 @@ def test_a_side_with_a_small_margin_is_not_sure(calibration: Calibration, margin
     assert ("the side is uncertain; give --side" in text) == (not sure)
     assert "0.99" in text
     assert "1.00\n" not in text
+
+
+def test_sizes_of_a_hand_are_those_that_gave_it() -> None:
+    values = np.random.default_rng(7).standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
+    np.testing.assert_allclose(values_of(hand_of(values, "left")), values, atol=1e-12)
+
+
+def test_a_displaced_skin_is_recovered() -> None:
+    """Fingers are thicker on the palmar side alone, which no sizes describe."""
+    displacement = np.zeros(NODES)
+    rows = displacement[: 5 * 7 * 8].reshape(5, 7, 8)
+    rows[:, :, 1:4] = 0.0025
+    hand = HandShape(displacement=displacement)
+    model, poses = HandModel(hand), np.stack([_towards_camera(turn) for turn in np.linspace(-0.7, 0.7, 6)])
+    views = [CalibrationView(_rendered(pose, hand)) for pose in poses]
+    plain = fit_jointly(views, poses, np.zeros(COUNT), "right", 8, exact=True)
+    displaced = fit_jointly(views, poses, np.zeros(COUNT + NODES), "right", 12, exact=True)
+    assert np.median(displaced.distances) < 0.7 * np.median(plain.distances)
+    of_fits = [(HandModel(hand_of(fit.values, "right")), fit.poses) for fit in (plain, displaced)]
+    errors = [endpoint_error(found, fitted, model, poses).values.mean() for found, fitted in of_fits]
+    assert errors[1] < errors[0]
 
 
 @pytest.mark.parametrize("side", ["right", "left"])

@@ -12,11 +12,13 @@ from depthtrack.calibration.size_equations import (
     add_normal_equations,
     write_gradient,
 )
+from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
-from depthtrack.hand.shape import Side
+from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import COUNT, hand_of, motion_of, prior_covariance
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver.robust import geman_mcclure
 
 
@@ -58,3 +60,24 @@ def test_normal_equations_are_weighted_sums_of_gradients() -> None:
     a, weights = _gradients(model, pose, residuals), geman_mcclure(residuals.distances**2, 0.01)
     np.testing.assert_allclose(H, 2 * (a * weights[:, None]).T @ a, rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(g, 2 * a.T @ (weights * residuals.errors), rtol=1e-11, atol=1e-12)
+
+
+def test_displacements_are_added_by_finite_differences_of_the_skin() -> None:
+    """A node's derivative is the motion of skin points along their normals."""
+    side: Side = "left"
+    hand, pose = HandShape(side=side, scale=0.9), make_pose([0.02, 0, 0.5], [0.5, 0.5, -0.4, 0.6], POSTURES["relaxed"])
+    skin, model = Skin.of(hand.with_(displacement=np.zeros(NODES))), HandModel(hand)
+    # Points that one body moves are rigid with it, so that its frame places them in every pose.
+    rigid = np.flatnonzero(skin.weights.max(axis=1) > 1 - 1e-9)[::90]
+    x, normals = skin.at(pose)[rigid], skin.normals(skin.at(pose))[rigid]
+    bodies, errors = skin.weights[rigid].argmax(axis=1), np.linspace(-0.004, 0.004, len(rigid))
+    residuals = Residuals(bodies, x, normals, errors, np.abs(errors))
+    H, g = np.zeros((PARAMETERS + NODES,) * 2), np.zeros(PARAMETERS + NODES)
+    add_normal_equations(SizedHand.at(model, pose), residuals, 0.01, H, g)
+    by_node, weights = np.zeros((len(rigid), NODES)), geman_mcclure(residuals.distances**2, 0.01)
+    for node in range(NODES):
+        displaced = Skin.of(hand.with_(displacement=0.001 * np.eye(NODES)[node])).at(pose)[rigid]
+        by_node[:, node] = np.einsum("ni,ni->n", displaced - x, normals) / 0.001
+    a = np.concatenate([_gradients(model, pose, residuals), by_node], axis=1)
+    np.testing.assert_allclose(g, a.T @ (weights * errors), atol=1e-6)
+    np.testing.assert_allclose(H, (a * weights[:, None]).T @ a, atol=1e-3)

@@ -3,7 +3,7 @@
 Source: Schroeder et al. 2014, Sec. III.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -19,6 +19,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.rig.rig_import import RiggedHand, reread_rigged_hand
 from depthtrack.hand.shape import SIZE_NAMES, HandShape
+from depthtrack.hand.skin.displacement import displacement_basis
 from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
 from depthtrack.hand.skin.weights import skin_weights
 from depthtrack.types import Array, Faces, Index
@@ -109,7 +110,22 @@ class Skin:
 
 @lru_cache(maxsize=8)
 def _skin_of(shape: HandShape) -> Skin:
-    return _built(shape) if shape.rig is None else _rigged(shape, reread_rigged_hand(shape.rig))
+    if shape.rig is not None:
+        return _rigged(shape, reread_rigged_hand(shape.rig))
+    if shape.displacement is None:
+        return _built(shape)
+    return _displaced(_skin_of(shape.with_(displacement=None)), shape, shape.displacement)
+
+
+def _displaced(skin: Skin, shape: HandShape, displacement: Array) -> Skin:
+    """Return a skin whose vertices are moved along their normals."""
+    mirror = np.diag([shape.mirror, 1, 1, 1])
+    T_body_rest = mirror @ skin.T_body_rest @ mirror
+    T_body_rest[:, :3, 3] /= shape.scale
+    right = skin.rest @ mirror[:3, :3] / shape.scale
+    basis = displacement_basis(shape.with_(scale=1.0, side="right"), right, skin.weights, T_body_rest)
+    along = shape.scale * (basis @ displacement)
+    return replace(skin, shape=shape, rest=skin.rest + along[:, None] * skin.normals(skin.rest))
 
 
 def _rigged(shape: HandShape, rigged: RiggedHand) -> Skin:
