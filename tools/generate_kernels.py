@@ -42,7 +42,7 @@ from depthtrack.solver.options import SwarmOptions
 
 SCENES: tuple[dict[str, Any], ...] = (
     {"model": "skin", "sensor": "kinect1", "background": "room"},
-    {"model": "primitives"},
+    {"model": "primitives", "sensor": "kinect2"},
 )
 """Synthetic recordings: with colour, noise and a skin; depth alone, of spheres and cylinders."""
 TRACKERS: tuple[tuple[str, dict[str, Any]], ...] = (

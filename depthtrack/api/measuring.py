@@ -5,6 +5,7 @@ from functools import partial
 from depthtrack.api.choices import Hand, Recording, open_hand, to_track
 from depthtrack.calibration.calibrate import Calibration
 from depthtrack.calibration.calibrate import calibrate as calibrate_side
+from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress, ScorerFactory
 from depthtrack.calibration.rig_calibration import RigCalibration
 from depthtrack.calibration.rig_calibration import calibrate_rig as calibrate_rig_on_views
@@ -28,6 +29,7 @@ def calibrate(
     threads: int | None = None,
     frames: int | None = None,
     progress: Progress | None = None,
+    options: CalibrationOptions | None = None,
 ) -> Calibration:
     """Measure the hand of a recording: side, scale, fingers and palm.
 
@@ -39,6 +41,7 @@ def calibrate(
     threads: threads of the renderer, one per core if absent; the hand does not depend on it.
     frames: number of first frames to use; all if absent.
     progress: called with the current stage and the share of the work that is done.
+    options: rounds and weights; `CalibrationOptions(skin_rounds=0)` measures the sizes alone.
 
     Raises:
         InputError: the recording does not show a hand well enough.
@@ -51,8 +54,8 @@ def calibrate(
     sequence = to_track(recording)
     threads = threads or usable_cores()
     if side is None:
-        return calibrate_either_side(sequence, segmentation, seed, threads, frames, progress)
-    return calibrate_side(sequence, side, (), segmentation, seed, threads, frames, progress)
+        return calibrate_either_side(sequence, segmentation, seed, threads, frames, progress, options)
+    return calibrate_side(sequence, side, (), segmentation, seed, threads, frames, progress, options)
 
 
 def calibrate_rig(

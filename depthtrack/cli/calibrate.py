@@ -29,7 +29,8 @@ class Command:
     """Measure the hand of a recording: side, scale, palm, length and width of each finger.
 
     Record a few seconds of one bare hand that turns, opens and closes in front of the camera. Sizes that the recording
-    does not show keep the average. The file contains a confidence for each size. Use the file with `track --hand`.
+    does not show keep the average. The skin is displaced where no sizes describe it. The file contains a confidence for
+    each size. Use the file with `track --hand`.
 
     With --hand RIG.glb, only the scale of the mesh is measured. The file then refers to the mesh.
     """
@@ -43,6 +44,8 @@ class Command:
     """Rigged mesh (.glb, .gltf), or hand file that refers to one, to scale to the recording."""
     picture: Annotated[Path | None, PICTURE, stated_default(metavar="FILE.png")] = None
     """Picture of the hand before and after calibration to write (default: beside the hand file)."""
+    sizes_only: bool = False
+    """Measure the sizes alone, without the displacement of the skin from the surface that they give."""
     skin_model: Annotated[Path | None, stated_default(metavar="FILE")] = None
     """Skin colour model from `depthtrack train-skin` (default: published statistics)."""
     seed: Annotated[int, number(0, MOST_SEED)] = 0
@@ -54,6 +57,7 @@ class Command:
 
     def run(self) -> None:
         from depthtrack.calibration.calibrate import summary
+        from depthtrack.calibration.options import CalibrationOptions
         from depthtrack.hand.hand_file import load_hand
         from depthtrack.segmentation.options import SegmentationOptions
         from depthtrack.strict_data import json_text
@@ -74,7 +78,8 @@ class Command:
             content, page = scaled.to_json(), calibration_picture(scaled, rig)
             report, text = scaled.summary(), _rig_text(scaled, self.out, picture)
         else:
-            measured = calibrate_sequence(sequence, segmentation, side, self.seed, self.threads)
+            options = CalibrationOptions(skin_rounds=0) if self.sizes_only else CalibrationOptions()
+            measured = calibrate_sequence(sequence, segmentation, side, self.seed, self.threads, options=options)
             content, page = measured.to_json(), calibration_picture(measured)
             report, text = summary(measured), _text(measured, self.out, picture)
         write_atomic(self.out, content)

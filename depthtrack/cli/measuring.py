@@ -6,6 +6,7 @@ from depthtrack.cli.progress import percent_bar
 
 if TYPE_CHECKING:
     from depthtrack.calibration.calibrate import Calibration
+    from depthtrack.calibration.options import CalibrationOptions
     from depthtrack.calibration.rig_calibration import RigCalibration
     from depthtrack.hand.shape import HandShape, Side
     from depthtrack.recording import Sequence
@@ -19,6 +20,7 @@ def calibrate_sequence(
     seed: int = 0,
     threads: int | None = None,
     frames: int | None = None,
+    options: "CalibrationOptions | None" = None,
 ) -> "Calibration":
     """Return the calibration of a recording's hand; both sides are tried if `side` is None.
 
@@ -29,7 +31,14 @@ def calibrate_sequence(
 
     with percent_bar() as show:
         return calibrate(
-            sequence, side, segmentation=segmentation, seed=seed, threads=threads, frames=frames, progress=show
+            sequence,
+            side,
+            segmentation=segmentation,
+            seed=seed,
+            threads=threads,
+            frames=frames,
+            progress=show,
+            options=options,
         )
 
 

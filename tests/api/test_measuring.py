@@ -8,6 +8,7 @@ import pytest
 import depthtrack as dt
 from depthtrack.api import measuring
 from depthtrack.api.choices import Recording
+from depthtrack.calibration.options import CalibrationOptions
 
 
 @pytest.mark.parametrize("as_object", [False, True])
@@ -24,18 +25,25 @@ def test_the_arguments_reach_the_calibration(path: Path, monkeypatch: pytest.Mon
         threads: Any,
         frames: Any,
         progress: Any,
+        options: Any,
     ) -> str:
-        seen.extend((len(sequence), side, seed, threads, frames))
+        seen.extend((len(sequence), side, seed, threads, frames, options))
         progress("measuring", 1.0)
         return "a calibration"
 
     monkeypatch.setattr(measuring, "calibrate_side", calibrate)
     recording: Recording = dt.open_recording(path) if as_object else str(path)
     found: Any = dt.calibrate(
-        recording, "left", seed=3, threads=1, frames=2, progress=lambda stage, share: stages.append(stage)
+        recording,
+        "left",
+        seed=3,
+        threads=1,
+        frames=2,
+        progress=lambda stage, share: stages.append(stage),
+        options=CalibrationOptions(skin_rounds=0),
     )
     assert found == "a calibration"
-    assert seen == [4, "left", 3, 1, 2]
+    assert seen == [4, "left", 3, 1, 2, CalibrationOptions(skin_rounds=0)]
     assert stages == ["measuring"]
 
 

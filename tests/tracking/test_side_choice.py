@@ -98,17 +98,29 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         side_margin: float | None = None
         sure_margin: float = CalibrationOptions().sure_margin
 
-    tried = list[Side]()
+    tried, skins = list[Side](), list[Side]()
 
-    def calibrate(sequence: object, side: Side, *rest: object) -> Measured:
+    def fit_sizes(source: object, side: Side, *rest: object) -> Side:
         tried.append(side)
+        return side
+
+    def fit_skin(source: object, side: Side, *rest: object) -> Side:
+        skins.append(side)
+        return side
+
+    def calibration_of(source: object, side: Side) -> Measured:
         energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
         return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side], energies[side])
 
     monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
-    monkeypatch.setattr(sides, "calibrate", calibrate)
+    monkeypatch.setattr(sides, "fit_sizes", fit_sizes)
+    monkeypatch.setattr(sides, "fit_skin", fit_skin)
+    monkeypatch.setattr(sides, "calibration_of", calibration_of)
+    monkeypatch.setattr(sides, "calibrate", lambda s, side, *rest: calibration_of(s, fit_skin(s, fit_sizes(s, side))))
     found = calibrate_either_side(None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
+    # The skin of the side that was chosen is fitted alone.
+    assert skins == ["left" if sure else "right"]
     assert found.hand.side == ("left" if sure else "right")
     assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
