@@ -87,6 +87,7 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
     options, fitted = source.options, sized
     values = np.concatenate([sized.values, np.zeros(NODES)])
     views, poses = sized.views, sized.poses
+    observed, _ = prepared(views)
     for number in range(options.skin_rounds):
         begun = number / options.skin_rounds
         if number > 0:
@@ -95,11 +96,11 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
             if len(tracked) < options.fewest:
                 break
             views = tuple(best_views(tracked, options.accepted.good_views))
-            poses = prepared(views)[1]
+            observed, poses = prepared(views)
         report("skin", begun + 0.6 / options.skin_rounds)
         iterations = options.skin_iterations
         fit = fit_jointly(
-            prepared(views)[0],
+            observed,
             poses,
             values,
             sized.side,

@@ -48,22 +48,6 @@ def hand_of(values: Array, side: Side, source: str = "") -> HandShape:
     return resized(HandShape(), values[:COUNT]).with_(side=side, source=source, displacement=displacement)
 
 
-def values_of(hand: HandShape) -> Array:
-    """Return the sizes (35,) of a hand, relative to the average one: the inverse of `hand_of`.
-
-    Sizes that `hand_of` does not vary, such as the direction of the thumb, are disregarded.
-    """
-    average, values = HandShape(), np.zeros(COUNT)
-    values[SCALE] = np.log(hand.scale)
-    values[LENGTHS] = np.log(hand.lengths / average.lengths).ravel()
-    values[WIDTHS] = np.log(hand.radii / average.radii).mean(axis=1)
-    palm = [getattr(hand, name) / getattr(average, name) for name in ("palm_breadth", "palm_length", "palm_thickness")]
-    values[PALM] = np.log(palm)
-    moved = hand.bases - average.bases * [palm[0], palm[1], 1.0]
-    values[KNUCKLES], values[THUMB_BASE] = moved[1:, :2].ravel(), moved[0]
-    return values
-
-
 def resized(hand: HandShape, values: Array) -> HandShape:
     """Return a hand with its sizes changed by `values` (35,).
 

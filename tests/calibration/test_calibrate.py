@@ -33,7 +33,6 @@ from depthtrack.hand.size_parameters import (
     measures,
     motion_of,
     prior_covariance,
-    values_of,
 )
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.recording import SequenceWriter, open_sequence
@@ -153,11 +152,6 @@ def test_a_side_with_a_small_margin_is_not_sure(calibration: Calibration, margin
     assert ("the side is uncertain; give --side" in text) == (not sure)
     assert "0.99" in text
     assert "1.00\n" not in text
-
-
-def test_sizes_of_a_hand_are_those_that_gave_it() -> None:
-    values = np.random.default_rng(7).standard_normal(COUNT) * np.sqrt(np.diag(prior_covariance()))
-    np.testing.assert_allclose(values_of(hand_of(values, "left")), values, atol=1e-12)
 
 
 def test_a_displaced_skin_is_recovered() -> None:
