@@ -1,5 +1,6 @@
 """The scorer protocol of all backends that render hypotheses and compare them with a target."""
 
+import math
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
@@ -108,6 +109,7 @@ def as_batch(poses: ArrayLike) -> Array:
     batch = np.ascontiguousarray(poses, dtype=np.float64)
     if batch.ndim != 2 or batch.shape[1] != POSE_SIZE:
         raise ValueError(f"poses must be (B, {POSE_SIZE}), found {batch.shape}")
-    if not np.all(np.isfinite(batch)):
+    # Squares add to a finite number unless one is not finite, or huge.
+    if not math.isfinite(np.dot(batch.ravel(), batch.ravel())) and not np.isfinite(batch).all():
         raise ValueError("poses must be finite numbers")
     return batch

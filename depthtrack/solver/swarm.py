@@ -11,7 +11,7 @@ import numpy as np
 
 from depthtrack.compilation import compiled
 from depthtrack.solver.options import SwarmOptions
-from depthtrack.types import Array
+from depthtrack.types import Array, Index
 
 
 class Optimum(NamedTuple):
@@ -102,10 +102,10 @@ def minimise(
     velocity = np.zeros_like(position)
     energy = score(position)
     own_best, own_energy = position.copy(), energy.copy()
-    best = int(np.argmin(own_energy))
+    best, draws = int(np.argmin(own_energy)), np.empty((2, *position.shape))
     progress(float(own_energy[best]))
     for generation in range(1, options.generations):
-        draws = generator.random((2, *position.shape))
+        generator.random(out=draws)
         domain.advance(position, velocity, own_best, own_best[best], draws, options)
         if options.randomise_every and generation % options.randomise_every == 0:
             domain.randomise(position, own_best[best], generator, options)
@@ -145,6 +145,17 @@ def advance(
 
 
 @compiled()
+def keep_lowest(energy: Array, agreement: Array, least: Array, kept: Array) -> None:
+    """Keep the lower of two energies of each particle, and its agreement, in place.
+
+    energy, agreement, least, kept: (N,).
+    """
+    for n in range(energy.shape[0]):
+        if energy[n] < least[n]:
+            least[n], kept[n] = energy[n], agreement[n]
+
+
+@compiled()
 def keep_better(position: Array, energy: Array, own_best: Array, own_energy: Array) -> int:
     """Keep the positions whose energies are lower than their particles' best, in place.
 
@@ -174,11 +185,36 @@ def randomise(
     options: SwarmOptions,
 ) -> None:
     """Replace one random finger dimension of a share of the particles, in place (Sec. 2.4)."""
-    count = round(options.randomise * len(position))
-    rows = generator.permutation(len(position))[:count]
-    dimension = generator.integers(fingers.start, fingers.stop, count)
-    value = generator.uniform(lower[dimension], upper[dimension])
-    if options.near_best > 0:
-        near = best[dimension] + options.near_spread * generator.standard_normal(count)
-        value = np.where(generator.random(count) < options.near_best, near, value)
-    position[rows, dimension] = np.clip(value, lower[dimension], upper[dimension])
+    count, near = round(options.randomise * len(position)), options.near_best
+    rows = generator.permutation(len(position))
+    dimensions, values = generator.integers(fingers.start, fingers.stop, count), generator.random(count)
+    normal = generator.standard_normal(count) if near > 0 else values
+    choice = generator.random(count) if near > 0 else np.ones(count)
+    replace(position, best, lower, upper, rows, dimensions, (values, normal, choice), near, options.near_spread)
+
+
+@compiled()
+def replace(
+    position: Array,
+    best: Array,
+    lower: Array,
+    upper: Array,
+    rows: Index,
+    dimensions: Index,
+    draws: tuple[Array, Array, Array],
+    near_best: float,
+    near_spread: float,
+) -> None:
+    """Replace one dimension of some particles by a random value within its bounds, in place.
+
+    rows, dimensions: (K,) or more particles, and (K,) the dimension of each.
+    draws: (K,) uniform in 0..1 the value between the bounds, normal the distance from the swarm's best, and uniform
+        in 0..1 the choice between both: below `near_best`, the value is near the best.
+    """
+    values, normal, choice = draws
+    for k in range(dimensions.shape[0]):
+        d = dimensions[k]
+        value = lower[d] + (upper[d] - lower[d]) * values[k]
+        if choice[k] < near_best:
+            value = best[d] + near_spread * normal[k]
+        position[rows[k], d] = min(max(value, lower[d]), upper[d])

@@ -11,7 +11,7 @@ from depthtrack.geometry.rotations import normalised
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.pose import make_pose, retract, tangent_between
 from depthtrack.solver.options import SwarmOptions, constriction
-from depthtrack.solver.swarm import Box, advance, keep_better, minimise, randomise
+from depthtrack.solver.swarm import Box, advance, keep_better, keep_lowest, minimise, randomise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.visible_centroid import visible_centroid
 
@@ -49,6 +49,35 @@ def test_randomisation_moves_one_finger_dimension_of_its_share(seed: int, share:
     assert changed.sum(axis=1).max(initial=0) <= 1
     assert changed.sum() == round(share * 16)
     assert np.all((after >= lower) & (after <= upper))
+
+
+@given(seed=seeds, near=st.sampled_from([0.0, 0.5]))
+def test_randomisation_equals_the_plain_rule(seed: int, near: float) -> None:
+    rng = np.random.default_rng(seed)
+    lower, upper, options = np.full(10, -1.0), np.linspace(0, 2, 10), SwarmOptions(near_best=near)
+    before = rng.uniform(lower, upper, (16, 10))
+    after, expected, best = before.copy(), before.copy(), before[0].copy()
+    randomise(after, best, lower, upper, slice(4, 10), np.random.default_rng([seed, 1]), options)
+    draw = np.random.default_rng([seed, 1])
+    count = round(options.randomise * len(before))
+    rows, dimension = draw.permutation(len(before))[:count], draw.integers(4, 10, count)
+    value = draw.uniform(lower[dimension], upper[dimension])
+    if near > 0:
+        close = best[dimension] + options.near_spread * draw.standard_normal(count)
+        value = np.where(draw.random(count) < near, close, value)
+    expected[rows, dimension] = np.clip(value, lower[dimension], upper[dimension])
+    np.testing.assert_array_equal(after, expected)
+
+
+@given(seed=seeds)
+def test_each_particle_keeps_the_agreement_of_its_lowest_energy(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    energies, agreements = rng.integers(0, 4, (5, 9)).astype(np.float64), rng.random((5, 9))
+    least, kept = np.full(9, np.inf), np.zeros(9)
+    for energy, agreement in zip(energies, agreements, strict=True):
+        keep_lowest(energy, agreement, least, kept)
+    np.testing.assert_array_equal(least, energies.min(axis=0))
+    np.testing.assert_array_equal(kept, agreements[energies.argmin(axis=0), np.arange(9)])
 
 
 def test_a_swarm_finds_a_minimum_within_its_bounds() -> None:

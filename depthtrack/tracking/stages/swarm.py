@@ -9,7 +9,7 @@ import numpy as np
 from depthtrack.hand.pose import POSITION, retract
 from depthtrack.rendering.scorer import Scorer
 from depthtrack.solver.options import SwarmOptions
-from depthtrack.solver.swarm import Box, minimise
+from depthtrack.solver.swarm import Box, keep_lowest, minimise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
@@ -31,8 +31,7 @@ def run_swarm(
 
     def score(coordinates: Array) -> Array:
         scores = scorer.evaluate(space.poses(coordinates))
-        better = scores.energy < least
-        least[better], agreement[better] = scores.energy[better], scores.agreement[better]
+        keep_lowest(*scores, least, agreement)
         return scores.energy
 
     found = minimise(score, particles, Box(space.lower, space.upper, space.fingers), generator, options)
