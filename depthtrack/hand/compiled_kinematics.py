@@ -1,4 +1,4 @@
-"""Compiled forward kinematics and retraction of the hand, one pose at a time.
+"""Compiled forward kinematics of the hand, one pose at a time.
 
 `HandModel` wraps them for batches. The tests compare them with `reference_kinematics`.
 """
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.geometry.rotations import compiled_exp, compiled_matrix, compiled_normalised, compiled_product
+from depthtrack.geometry.rotations import compiled_matrix
 from depthtrack.hand.shape import HandShape
 from depthtrack.types import Array
 
@@ -123,27 +123,6 @@ def transforms_of(chain: Chain, poses: Array, out: Array) -> None:
                 for i in range(3):
                     out[n, b, i, j] = bodies.T[b, i, j]
                 out[n, b, 3, j] = 1.0 if j == 3 else 0.0
-
-
-@compiled(nogil=True)
-def retract(pose: Array, tangent: Array, out: Array) -> None:
-    """Write the pose `out` (27,) reached from `pose` by a step (26,); see `pose.retract`."""
-    retract_unnormalised(pose, tangent, out)
-    out[3], out[4], out[5], out[6] = compiled_normalised(out[3], out[4], out[5], out[6])
-
-
-@compiled(nogil=True)
-def retract_unnormalised(pose: Array, tangent: Array, out: Array) -> None:
-    """Write the retraction to `out` (27,) without normalising its quaternion.
-
-    The quaternion is unit up to rounding, of either sign. Forward kinematics accepts any length.
-    """
-    for i in range(3):
-        out[i] = pose[i] + tangent[i]
-    w, x, y, z = compiled_exp(tangent[3], tangent[4], tangent[5])
-    out[3], out[4], out[5], out[6] = compiled_product(w, x, y, z, pose[3], pose[4], pose[5], pose[6])
-    for i in range(20):
-        out[7 + i] = pose[7 + i] + tangent[6 + i]
 
 
 @compiled(nogil=True)

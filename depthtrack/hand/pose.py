@@ -5,16 +5,13 @@ the camera frame (4), finger angles (20, radians): thumb, index, middle, ring, l
 three flexions from the palm outward. Every function broadcasts over leading axes: a batch is `(..., 27)`.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from depthtrack.geometry.rotations import (
-    normalised,
-    quaternion_exp,
-    quaternion_from_matrix,
-    quaternion_log,
-    quaternion_product,
-)
+from depthtrack.geometry.rotations import normalised, quaternion_from_matrix, quaternion_product
+from depthtrack.hand.compiled_tangent import retract_rows, tangent_rows
 from depthtrack.types import Array
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
@@ -50,12 +47,8 @@ def retract(pose: ArrayLike, tangent: ArrayLike) -> Array:
     pose: (..., 27).
     tangent: (..., 26) translation (3, metres), rotation vector about the palm's centre (3, radians), both in the camera
         frame, and change of the finger angles (20, radians).
-
-    `compiled_kinematics.retract` is the compiled form.
     """
-    p, t = np.asarray(pose, dtype=np.float64), np.asarray(tangent, dtype=np.float64)
-    quaternion = quaternion_product(quaternion_exp(t[..., 3:6]), p[..., ORIENTATION])
-    return make_pose(p[..., POSITION] + t[..., :3], quaternion, p[..., ANGLES] + t[..., 6:])
+    return _of_rows(retract_rows, pose, tangent, POSE_SIZE)
 
 
 def transformed(pose: ArrayLike, T_to_from: ArrayLike) -> Array:
@@ -75,7 +68,15 @@ def tangent_between(start: ArrayLike, end: ArrayLike) -> Array:
 
     start, end: poses (..., 27). The rotation angle of the step is at most pi.
     """
-    a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    conjugate = a[..., ORIENTATION] * np.array([1.0, -1.0, -1.0, -1.0])
-    rotation = quaternion_log(quaternion_product(b[..., ORIENTATION], conjugate))
-    return np.concatenate([b[..., POSITION] - a[..., POSITION], rotation, b[..., ANGLES] - a[..., ANGLES]], axis=-1)
+    return _of_rows(tangent_rows, start, end, TANGENT_SIZE)
+
+
+def _of_rows(kernel: Callable[[Array, Array, Array], None], first: ArrayLike, second: ArrayLike, size: int) -> Array:
+    """Return the output (..., size) of a kernel over the rows of two arrays, which broadcast."""
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    batch = a.shape[:-1] if a.shape[:-1] == b.shape[:-1] else np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    out = np.empty((*batch, size))
+    # Copies are contiguous and writable, so that one compiled kernel takes them all.
+    a, b = (np.array(np.broadcast_to(x, (*batch, x.shape[-1])), order="C") for x in (a, b))
+    kernel(a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1]), out.reshape(-1, size))
+    return out

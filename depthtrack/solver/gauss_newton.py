@@ -8,7 +8,8 @@ decreases the energy.
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.hand.compiled_kinematics import BodyPoses, forward_kinematics, retract
+from depthtrack.hand.compiled_kinematics import BodyPoses, forward_kinematics
+from depthtrack.hand.compiled_tangent import retract
 from depthtrack.solver.linear_algebra import cholesky_solve, hold_parameter
 from depthtrack.solver.normal_equations import energy, normal_equations
 from depthtrack.solver.prior import add_prior, prior_energy, reduced_precision

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.hand.compiled_kinematics import retract_unnormalised
+from depthtrack.hand.compiled_tangent import retract_unnormalised
 from depthtrack.hand.limits import LOWER, UPPER, within_limits
 from depthtrack.hand.pose import ANGLES, ORIENTATION, POSE_SIZE, TANGENT_SIZE, tangent_between
 from depthtrack.types import Array

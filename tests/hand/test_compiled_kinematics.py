@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from depthtrack.hand import compiled_kinematics
 from depthtrack.hand.compiled_kinematics import BodyPoses, Chain
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import ORIENTATION, retract, tangent_between
+from depthtrack.hand.pose import ORIENTATION
 from depthtrack.hand.reference_kinematics import reference_transforms
 from depthtrack.hand.shape import HandShape, Side
 from tests.support.hands import random_pose
@@ -57,13 +57,3 @@ def test_batches_agree_with_single_poses_and_the_reference(seed: int, length: fl
     scaled[..., ORIENTATION] *= length
     np.testing.assert_allclose(model.transforms(scaled), T, atol=1e-13)
     assert model.transforms(np.empty((0, 27))).shape == (0, 16, 4, 4)
-
-
-@given(seed=SEEDS, size=st.sampled_from([0.0, 1e-12, 1e-3, 1.0, 4.0]))
-def test_a_step_is_a_retraction(seed: int, size: float) -> None:
-    rng = np.random.default_rng(seed)
-    pose, tangent, out = random_pose(rng), size * rng.normal(size=26), np.empty(27)
-    compiled_kinematics.retract(pose, tangent, out)
-    np.testing.assert_allclose(tangent_between(out, retract(pose, tangent)), np.zeros(26), atol=1e-9)
-    assert np.linalg.norm(out[3:7]) == pytest.approx(1)
-    assert out[3] >= 0

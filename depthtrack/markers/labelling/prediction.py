@@ -3,7 +3,8 @@
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.hand.compiled_kinematics import BodyPoses, retract
+from depthtrack.hand.compiled_kinematics import BodyPoses
+from depthtrack.hand.compiled_tangent import retract
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.markers.labelling.scene import Scene, place_markers
 from depthtrack.markers.labelling.state import FrameLabels, Settings, TrackState

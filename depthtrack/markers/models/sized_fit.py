@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from depthtrack.compilation import compiled
-from depthtrack.hand.compiled_kinematics import BodyPoses, retract
+from depthtrack.hand.compiled_kinematics import BodyPoses
+from depthtrack.hand.compiled_tangent import retract
 from depthtrack.hand.limits import LOWER, UPPER
 from depthtrack.hand.size_parameters import COUNT, prior_covariance, resized
 from depthtrack.hand.synergies import load_synergies
