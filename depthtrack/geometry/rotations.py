@@ -52,6 +52,10 @@ def quaternion_log(quaternion: ArrayLike) -> Array:
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """Return the rotation matrix (..., 3, 3) of a quaternion (..., 4) of any length except zero."""
     q = np.asarray(quaternion, dtype=np.float64)
+    if q.ndim == 1:
+        out = np.empty((3, 3))
+        compiled_matrix(*q.tolist(), out)
+        return out
     w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

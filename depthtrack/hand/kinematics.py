@@ -72,6 +72,11 @@ class HandModel:
         """The constants of the hand for compiled kinematics."""
         return Chain.of(self.shape)
 
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance from the palm's centre to a fingertip, metres."""
+        return self.shape.reach
+
     @property
     def lengths(self) -> Array:
         """The phalanx lengths (5, 3), metres, scaled."""
@@ -87,7 +92,7 @@ class HandModel:
     def wrist(self, pose: ArrayLike) -> Array:
         """Return the wrist (..., 3), metres, camera frame, of poses (..., 27)."""
         p = np.asarray(pose, dtype=np.float64)
-        return np.einsum("...ij,j->...i", rotation_matrix(p[..., ORIENTATION]), self.shape.wrist) + p[..., POSITION]
+        return np.asarray(rotation_matrix(p[..., ORIENTATION]) @ self.shape.wrist + p[..., POSITION])
 
     def joints(self, pose: ArrayLike) -> Array:
         """Return the joints (..., 16, 3), metres, camera frame: wrist, then phalanx origins."""

@@ -133,6 +133,12 @@ class HandShape:
         """The wrist joint (3,), metres, palm frame, scaled."""
         return np.array([0.0, -self.palm_length / 2 * self.scale, 0.0])
 
+    @property
+    def reach(self) -> float:
+        """Largest distance from the palm's centre to a fingertip, metres."""
+        fingers = np.linalg.norm(self.bases, axis=1) + self.lengths.sum(axis=1)
+        return float(fingers.max() * self.scale)
+
     def with_(self, **changes: Any) -> Self:
         """Return a copy with some fields replaced and all checked again.
 

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
-
 from depthtrack.hand.shape import HandShape
 
 
@@ -24,11 +22,10 @@ class HandSize:
     @classmethod
     def of(cls, shape: HandShape) -> Self:
         """Return the sizes of a hand."""
-        fingers = np.linalg.norm(shape.bases, axis=1) + shape.lengths.sum(axis=1)
         return cls(
             shape.palm_thickness / 2 * shape.scale,
             shape.palm_length / 2 * shape.scale,
-            float(fingers.max() * shape.scale),
+            shape.reach,
         )
 
 

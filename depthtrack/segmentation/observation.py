@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Hashable, Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar, cast
@@ -47,6 +48,12 @@ class Observation(Target):
     arrived: float = math.nan
     alternatives: Callable[[], Iterator["Observation"]] | None = None
     cost: float = 0.0
+
+    def arrived_at(self, arrived: float) -> "Observation":
+        """Return the observation with another time of arrival; its maps are not checked again."""
+        other = copy(self)
+        object.__setattr__(other, "arrived", arrived)
+        return other
 
     def whole_mask(self, shape: tuple[int, ...]) -> Mask:
         """Return the silhouette in the whole frame of `shape` (height, width)."""

@@ -28,7 +28,6 @@ _fill = filler(F32X16)
 class Groups(NamedTuple):
     """Observed points sorted by cell, in groups of at most `LANES` points of a row of cells.
 
-    order: (N,) rows of the cloud that was sorted.
     first: (G + 1,) group g has the sorted points from first[g] up to first[g + 1].
     cells: (G, 3) row, and first and last column of the cells of a group.
     place: (3, N + LANES) metres, relative to the origin.
@@ -37,7 +36,6 @@ class Groups(NamedTuple):
     best, chosen: working memory: twice (N + LANES,) the squared distance of the closest visible point, and its row.
     """
 
-    order: Index
     first: Index
     cells: Index
     place: Array32
@@ -49,7 +47,7 @@ class Groups(NamedTuple):
 
 @compiled(nogil=True)
 def grouped(points, normals, cells, origin):
-    """Return the groups of observed points and normals (N, 3) among cells.
+    """Return the sorted points and normals (N, 3) of a cloud, and their groups among cells.
 
     origin: (3,) metres, camera frame, of the visible points.
     """
@@ -68,6 +66,7 @@ def grouped(points, normals, cells, origin):
         slots[slot] += 1
     first, span, total = np.zeros(count + 1, np.int64), np.empty((count, 3), np.int64), 0
     place, sorted_normals = np.zeros((3, count + LANES), np.float32), np.zeros((3, count + LANES), np.float32)
+    sorted_points, cloud_normals = np.empty((count, 3)), np.empty((count, 3))
     margin, slant = np.empty(count), _slant(cells)
     for j in range(count):
         i = order[j]
@@ -80,11 +79,12 @@ def grouped(points, normals, cells, origin):
         span[total - 1, 2] = column
         margin[j] = max(1.0 + inside[i], 0.0) * (cells.size * points[i, 2] * slant)
         for k in range(3):
+            sorted_points[j, k], cloud_normals[j, k] = points[i, k], normals[i, k]
             place[k, j], sorted_normals[k, j] = points[i, k] - origin[k], normals[i, k]
     first[total] = count
     memory = np.zeros((2, count + LANES), np.float32)
-    cells_of = span[:total].copy()
-    return Groups(order, first[: total + 1].copy(), cells_of, place, sorted_normals, margin, memory[0], memory[1])
+    found = first[: total + 1].copy(), span[:total].copy(), place, sorted_normals, margin
+    return sorted_points, cloud_normals, Groups(*found, memory[0], memory[1])
 
 
 @compiled(nogil=True)

@@ -12,7 +12,7 @@ from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
-from depthtrack.segmentation.hand_size import AVERAGE_HAND, HandSize
+from depthtrack.segmentation.hand_size import AVERAGE_HAND
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
@@ -45,7 +45,7 @@ def segment(
     except Exception as error:
         failure = failure_of(error)
     if observation is not None:
-        observation = replace(observation, arrived=begun)
+        observation = observation.arrived_at(begun)
     return observation, 1e3 * (clock() - begun), failure
 
 
@@ -88,7 +88,7 @@ def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:
     if pose is None:
         return None
     wrist = WristPlane(model.wrist(pose), -rotation_matrix(pose[ORIENTATION])[:, 1])
-    return RoiPrior(pose[POSITION].copy(), wrist, replace(AVERAGE_HAND, reach=HandSize.of(model.shape).reach))
+    return RoiPrior(pose[POSITION].copy(), wrist, replace(AVERAGE_HAND, reach=model.reach))
 
 
 def failure_of(error: Exception) -> str:

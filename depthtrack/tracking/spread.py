@@ -81,9 +81,9 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
         visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
     measured = visible & own & (differences < AGREES)
     posture, uncertainty = float(np.sqrt(2 * prior_energy(pose, common_postures()))), model.shape.uncertainty
-    usual = spread = keypoint_spread(model, bodies, ends, points, measured, CALIBRATED)
-    if uncertainty != CALIBRATED:
-        spread = keypoint_spread(model, bodies, ends, points, measured, max(LEAST, uncertainty))
+    deviations = (CALIBRATED,) if uncertainty == CALIBRATED else (CALIBRATED, max(LEAST, uncertainty))
+    usual, *others = keypoint_spreads(model, bodies, ends, points, measured, deviations)
+    spread = others[0] if others else usual
     return BonesInView(visible, differences, spread, float(usual.max()), posture)
 
 
@@ -93,32 +93,28 @@ def bone_radii(shape: HandShape) -> Array:
     return np.stack([radii[:, 1:], (radii[:, 1:] + radii[:, :-1]) / 2], axis=2)
 
 
-def keypoint_spread(
-    model: HandModel, bodies: BodyPoses, ends: Array, points: Array, measured: Mask, uncertainty: float
-) -> Array:
-    """Return the root mean square distance (21,) of the keypoints from the truth, metres.
+def keypoint_spreads(
+    model: HandModel,
+    bodies: BodyPoses,
+    ends: Array,
+    points: Array,
+    measured: Mask,
+    uncertainties: tuple[float, ...],
+) -> list[Array]:
+    """Return the root mean square distances (21,) of the keypoints from the truth, metres.
 
     ends: (5, 4, 3) endpoints of the phalanges, metres, camera frame.
     points: (5, 3, 2, 3) far end and middle of each bone, metres, camera frame.
     measured: (5, 3, 2) which of them are measured; the palm always is.
-    uncertainty: standard deviation of a measured point, metres.
+    uncertainties: standard deviations of a measured point, metres; each gives one array.
     """
     palm, keypoints = bodies.T[0], np.empty((21, 3))
     keypoints[0], keypoints[1:] = palm[:, :3] @ model.shape.wrist + palm[:, 3], ends.reshape(20, 3)
     seen = measured.reshape(-1)
     at = np.concatenate([points.reshape(-1, 3)[seen], keypoints[_PALM]])
     fixed_to = np.append(_BODIES[seen], KEYPOINT_BODIES[_PALM])
-    return np.asarray(
-        point_spread(
-            bodies,
-            common_postures().precision,
-            uncertainty,
-            fixed_to,
-            at,
-            KEYPOINT_BODIES,
-            keypoints,
-        )
-    )
+    measurements, precision = (fixed_to, at, KEYPOINT_BODIES, keypoints), common_postures().precision
+    return [point_spread(bodies, precision, each, *measurements) for each in uncertainties]
 
 
 @compiled(nogil=True)

@@ -151,6 +151,19 @@ def test_poses_of_a_wrong_shape_are_rejected(poses: np.ndarray) -> None:
         scorer.score(poses)
 
 
+def test_memory_of_other_images_changes_no_bit() -> None:
+    rng = np.random.default_rng(11)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    with RasterScorer(shape) as used:
+        for size in (224, 97, 230, 64, 300, 101):
+            target = target_of(shape, poses[0], window_on(shape, poses[0], size), rng)
+            used.set_target(target)
+            with RasterScorer(shape) as new:
+                new.set_target(target)
+                np.testing.assert_array_equal(used.score(poses), new.score(poses))
+                np.testing.assert_array_equal(used.render(poses[1]), new.render(poses[1]))
+
+
 def test_scoring_without_a_target_is_an_error() -> None:
     with pytest.raises(RuntimeError, match="set_target"):
         RasterScorer(HandShape()).score(np.zeros((1, 27)))

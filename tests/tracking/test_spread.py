@@ -22,7 +22,7 @@ from depthtrack.tracking.spread import (
     bone_radii,
     bones_in_view,
     compare_points,
-    keypoint_spread,
+    keypoint_spreads,
 )
 from depthtrack.types import Array, Depth, Mask
 from tests.support.observations import observe
@@ -44,7 +44,8 @@ def points_of(pose: Array) -> Array:
 
 def spread_of(pose: Array, measured: Mask) -> Array:
     ends = MODEL.endpoints(pose).reshape(5, 4, 3)
-    return keypoint_spread(MODEL, BodyPoses.at(MODEL.chain, pose), ends, points_of(pose), measured, HAND.uncertainty)
+    bodies = BodyPoses.at(MODEL.chain, pose)
+    return keypoint_spreads(MODEL, bodies, ends, points_of(pose), measured, (HAND.uncertainty,))[0]
 
 
 def compared_with(points: Array, rendered: Depth, target: Target) -> tuple[Mask, Mask, Array]:

@@ -1,7 +1,6 @@
 """The arrays of the kernel: those that all threads share, and a workspace per thread."""
 
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,27 +9,25 @@ from depthtrack.hand.pose import POSE_SIZE
 from depthtrack.rendering.raster import hand_constants as constants
 from depthtrack.rendering.raster import kernel, quadrics, tiles
 from depthtrack.rendering.raster.work_queue.queue import Tickets
-from depthtrack.types import Array, Array32, Depth, Index
+from depthtrack.types import Array, Array32
 
 
 @dataclass
 class Workspace:
-    """Arrays of one thread: see `kernel.score_poses`."""
+    """Arrays of one thread: see `kernel.score_poses`.
 
-    buffer: Depth
-    first: Index
-    last: Index
-    low: Index
-    high: Index
+    memory: of the buffer, zeros.
+    """
+
+    memory: Array32
     scratch: Array = field(default_factory=lambda: np.zeros(4 * constants.LANES))
     table: Array32 = field(default_factory=lambda: np.zeros(quadrics.COEFFICIENT_ROWS * quadrics.SLOTS, np.float32))
 
-    @classmethod
-    def of(cls, shape: tuple[int, int]) -> Self:
-        """Return the workspace for images (h, w)."""
-        columns, rows = tiles.tile_counts(shape)
-        first, last = np.zeros((2, columns + 1), np.int64)
-        return cls(tiles.new_tiled_image(shape), first, last, np.full(columns, rows), np.full(columns, -1))
+    def fit_to(self, columns: int, rows: int) -> None:
+        """Set the sizes of the arrays to those of an image of `columns` by `rows` tiles."""
+        self.buffer = self.memory[: columns * rows * tiles.TILE_PIXELS]
+        self.first, self.last = np.zeros((2, columns + 1), np.int64)
+        self.low, self.high = np.full(columns, rows), np.full(columns, -1)
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
@@ -48,6 +45,7 @@ class KernelArrays:
         self.hand, self.objective, self.tickets = hand, objective, tickets
         self.camera, self.empty, self.has_occluder = np.empty(8), np.empty(3), np.zeros(1, np.bool_)
         self.workspaces: list[Workspace] = []
+        self._capacity = 0
         self.allocate_poses(256)
 
     def allocate_poses(self, count: int) -> None:
@@ -56,10 +54,21 @@ class KernelArrays:
         self.energies, self.agreements = np.empty((2, count))
 
     def allocate_images(self, shape: tuple[int, int], threads: int) -> None:
-        """Allocate the images (h, w) of the target, tiled, and the workspace of each thread."""
-        self.workspaces = [Workspace.of(shape) for _ in range(threads)]
-        self.observed, self.hidden_from = (tiles.new_tiled_image(shape) for _ in range(2))
-        self.labels = np.zeros(len(self.observed) // tiles.TILE_PIXELS, np.int64)
+        """Allocate the images (h, w) of the target, tiled, and the workspace of each thread.
+
+        The memory of larger images is used again.
+        """
+        columns, rows = tiles.tile_counts(shape)
+        count = columns * rows
+        if count > self._capacity:
+            self._capacity = count + count // 4  # regions grow and shrink by a little
+            self.workspaces = [Workspace(tiles.new_tiles(self._capacity)) for _ in range(threads)]
+            self._observed, self._hidden_from = (tiles.new_tiles(self._capacity) for _ in range(2))
+        for each in self.workspaces:
+            each.fit_to(columns, rows)
+        size = count * tiles.TILE_PIXELS
+        self.observed, self.hidden_from = self._observed[:size], self._hidden_from[:size]
+        self.labels = np.zeros(count, np.int64)
 
     def score_tickets(self, thread: int, spin_limit: int) -> None:
         """Score poses of the batch in this thread until `queue.pop` returns -1."""

@@ -22,12 +22,14 @@ def tile_counts(shape: tuple[int, int]) -> tuple[int, int]:
 
 
 def new_tiled_image(shape: tuple[int, int]) -> Array32:
-    """Return zeros (columns * rows * TILE_PIXELS,) for an image of `shape` (height, width).
-
-    The memory is aligned to cache lines.
-    """
+    """Return zeros (columns * rows * TILE_PIXELS,) for an image of `shape` (height, width)."""
     columns, rows = tile_counts(shape)
-    size = columns * rows * TILE_PIXELS
+    return new_tiles(columns * rows)
+
+
+def new_tiles(count: int) -> Array32:
+    """Return zeros (count * TILE_PIXELS,), aligned to cache lines."""
+    size = count * TILE_PIXELS
     memory = np.zeros(size + _CACHE_LINE // 4, np.float32)
     start = -memory.ctypes.data % _CACHE_LINE // 4
     return memory[start : start + size]
@@ -71,14 +73,23 @@ def write_labels(silhouette: Mask, depth: Depth, labels: Index) -> None:
     Bit n of a label is set if pixel n of the tile is on the silhouette, bit TILE_PIXELS + n if its depth is missing.
     """
     height, width = silhouette.shape
-    rows = -(-height // TILE_HEIGHT)
-    for n in range(labels.shape[0]):
-        labels[n] = 0
-    for v in range(height):
-        for u in range(width):
-            bit = v % TILE_HEIGHT * TILE_WIDTH + u % TILE_WIDTH
-            label = np.int64(silhouette[v, u]) << bit | np.int64(depth[v, u] == 0) << (TILE_PIXELS + bit)
-            labels[u // TILE_WIDTH * rows + v // TILE_HEIGHT] |= label
+    rows, columns = -(-height // TILE_HEIGHT), -(-width // TILE_WIDTH)
+    for row in range(rows):
+        for column in range(columns):
+            label, left = np.int64(0), TILE_WIDTH * column
+            for j in range(min(TILE_HEIGHT, height - TILE_HEIGHT * row)):
+                v = TILE_HEIGHT * row + j
+                on, missing = np.int64(0), np.int64(0)
+                if left + TILE_WIDTH <= width:
+                    for i in range(TILE_WIDTH):
+                        on |= np.int64(silhouette[v, left + i]) << i
+                        missing |= np.int64(depth[v, left + i] == 0) << i
+                else:
+                    for i in range(width - left):
+                        on |= np.int64(silhouette[v, left + i]) << i
+                        missing |= np.int64(depth[v, left + i] == 0) << i
+                label |= (on | missing << TILE_PIXELS) << (j * TILE_WIDTH)
+            labels[column * rows + row] = label
 
 
 @compiled(nogil=True)

@@ -74,5 +74,5 @@ class PointSurface:
 
 def _in_groups(cloud: PointCloud, cells: Cells, origin: Array) -> tuple[PointCloud, Groups]:
     """Return a cloud in the order of its groups, and the groups; surfaces share them."""
-    groups = grouped(cloud.points, cloud.normals, cells, origin)
-    return PointCloud(cloud.points[groups.order], cloud.normals[groups.order]), groups
+    points, normals, groups = grouped(cloud.points, cloud.normals, cells, origin)
+    return PointCloud(points, normals), groups

@@ -136,8 +136,11 @@ def test_correspondences_are_the_closest_visible_vertices_with_agreeing_normals(
     cloud = cloud_near(posed, rng, spread=min(0.5 * max_distance, 0.02))
     cells = cells_over(cloud.points, cell, max_distance)
     seen, correspondences = sort_visible(blocks, cells, ORIGIN, TOLERANCE), Correspondences.allocate(len(cloud.points))
-    groups = closest.grouped(cloud.points, cloud.normals, cells, ORIGIN)
-    cloud = PointCloud(cloud.points[groups.order], cloud.normals[groups.order])
+    *arranged, groups = closest.grouped(cloud.points, cloud.normals, cells, ORIGIN)
+    rows = np.lexsort(cloud.points.T), np.lexsort(arranged[0].T)
+    np.testing.assert_array_equal(arranged[0][rows[1]], cloud.points[rows[0]])
+    np.testing.assert_array_equal(arranged[1][rows[1]], cloud.normals[rows[0]])
+    cloud = PointCloud(*arranged)
     closest.closest_vertices(cloud, groups, seen, cells, max_distance, min_normal_cosine, correspondences.body)
     found, vertex = correspondences.body >= 0, seen.vertex[correspondences.body]
     resolve_bodies(BLOCKS, seen, correspondences)
