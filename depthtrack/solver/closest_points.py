@@ -44,6 +44,10 @@ class Groups(NamedTuple):
     best: Array32
     chosen: Array32
 
+    def with_own_memory(self) -> "Groups":
+        """Return the groups with other working memory."""
+        return self._replace(best=np.zeros_like(self.best), chosen=np.zeros_like(self.chosen))
+
 
 @compiled(nogil=True)
 def grouped(points, normals, cells, origin):

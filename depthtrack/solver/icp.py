@@ -3,6 +3,9 @@
 It alternates the search for correspondences and Gauss-Newton.
 """
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 
 from depthtrack.geometry.alignment import rigid_alignment
@@ -43,10 +46,29 @@ class IcpFitter:
         self._local = local_keypoints(HandModel(shape))
         self._sight: LinesOfSight | None = None
         self._bodies, self._equations = BodyPoses.empty(), NormalEquations.empty()
+        self._twins = dict[int, Self]()
+
+    def twin(self, number: int) -> Self | None:
+        """Return a fitter to the same target with its own memory; None if it has to share some.
+
+        number: of the twin; each one is made once per target.
+        """
+        surface = None if self._sight is not None else self._surface.twin()
+        if surface is None:
+            return None
+        if number not in self._twins:
+            other = copy(self)
+            other._surface, other._twins = surface, {}
+            other._bodies, other._equations = BodyPoses.empty(), NormalEquations.empty()
+            other._matches = Correspondences.allocate(len(self._cloud.points))
+            other._coarse_matches = Correspondences.allocate(len(self._coarse.points))
+            self._twins[number] = other
+        return self._twins[number]
 
     def set_target(self, observation: Observation, every: int) -> None:
         """Set the observation that the next fits are to, and use every n-th of its points."""
         cloud = PointCloud.of(observation, every)
+        self._twins.clear()
         self._surface.set_target(observation, cloud, self.options.max_distance)
         self._cloud = self._surface.arranged(cloud)
         self._matches = Correspondences.allocate(len(self._cloud.points))

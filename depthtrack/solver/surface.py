@@ -1,6 +1,6 @@
 """The protocol of surfaces that observed points are matched to."""
 
-from typing import Protocol
+from typing import Protocol, Self
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
@@ -26,6 +26,10 @@ class Surface(Protocol):
 
     def search(self, cloud: PointCloud) -> PointSearch | None:
         """Return the arguments of `point_search.fit_rounds` for an arranged cloud, if any."""
+        ...
+
+    def twin(self) -> Self | None:
+        """Return a surface with the same target and its own memory; None if it has to share some."""
         ...
 
     def match(

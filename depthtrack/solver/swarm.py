@@ -89,14 +89,16 @@ def minimise(
     generator: np.random.Generator,
     options: SwarmOptions,
     progress: Callable[[float], None] = lambda energy: None,
+    is_over: Callable[[], bool] = lambda: False,
 ) -> Optimum:
     """Return the optimum of a swarm within a domain.
 
     score: returns energies (N,) of positions (N, D).
     particles: (N, D) positions of the first generation.
     progress: receives the least energy after each generation.
+    is_over: whether the other generations are left out; asked before each of them.
 
-    The number of evaluations is N times `options.generations`. Equal generator states give equal bits.
+    The number of evaluations is N times `options.generations` then, at most. Equal generator states give equal bits.
     """
     position = domain.confined(particles)
     velocity = np.zeros_like(position)
@@ -105,6 +107,8 @@ def minimise(
     best, draws = int(np.argmin(own_energy)), np.empty((2, *position.shape))
     progress(float(own_energy[best]))
     for generation in range(1, options.generations):
+        if is_over():
+            break
         generator.random(out=draws)
         domain.advance(position, velocity, own_best, own_best[best], draws, options)
         if options.randomise_every and generation % options.randomise_every == 0:

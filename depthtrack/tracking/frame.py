@@ -17,6 +17,7 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.lifting import Lifter
 from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName
+from depthtrack.solver.parallel_fits import ParallelFits
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
 from depthtrack.tracking.state import InterruptedSearch, TrackState
@@ -35,8 +36,9 @@ class Toolkit:
         self, hand: HandShape, scoring: ScoringOptions, threads: int = 1, synergies: Synergies | None = None
     ) -> None:
         self.hand, self.model, self.scoring = hand, HandModel(hand), scoring
-        self._threads = {"threads": threads} if scoring.renderer == "raster" else {}
-        self.scorer = create_scorer(scoring.renderer, hand, scoring.objective, **self._threads)
+        threaded = {"threads": threads} if scoring.renderer == "raster" else {}
+        self.scorer = create_scorer(scoring.renderer, hand, scoring.objective, **threaded)
+        self.fits = ParallelFits(threads)
         self.synergies = synergies or load_synergies()
         self._coarse: dict[int, Scorer] = {}
         self._fitters: dict[SurfaceFitOptions, IcpFitter] = {}
@@ -85,7 +87,8 @@ class Toolkit:
         return self._lifters[options]
 
     def close(self) -> None:
-        """Free the renderers."""
+        """Free the renderers, and end the threads of fits."""
+        self.fits.close()
         for scorer in (self.scorer, *self._coarse.values()):
             scorer.close()
 

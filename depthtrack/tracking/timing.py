@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Self
 
+FOR_FIT = 0.25
+"""Share of the deadline that is left to fit the best pose of a search."""
+
 
 class StageClock:
     """Clock of consecutive stages: `milliseconds` of each, 0 for stages that did not run."""

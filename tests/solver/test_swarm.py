@@ -98,6 +98,19 @@ def test_a_swarm_finds_a_minimum_within_its_bounds() -> None:
     assert sum(evaluated) == 40 * 60 + 1
 
 
+def test_a_swarm_ends_when_its_time_is_over() -> None:
+    rng, evaluated = np.random.default_rng(0), list[int]()
+
+    def score(x: np.ndarray) -> np.ndarray:
+        evaluated.append(len(x))
+        return (x**2).sum(axis=1)
+
+    box, options = Box(np.full(4, -1.0), np.full(4, 1.0), slice(2, 4)), SwarmOptions(particles=8, generations=20)
+    found = minimise(score, rng.uniform(-1, 1, (8, 4)), box, rng, options, is_over=lambda: len(evaluated) == 5)
+    assert len(evaluated) == 5
+    assert found.energy == score(found.position[None])[0]
+
+
 def test_the_same_generator_gives_the_same_bits() -> None:
     def run() -> np.ndarray:
         rng = np.random.Generator(np.random.Philox(key=[5, 7]))

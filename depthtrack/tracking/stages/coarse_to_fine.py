@@ -6,7 +6,7 @@ rendered energy decides which.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import takewhile
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from depthtrack.rendering.scorer import Scorer
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
+from depthtrack.solver.parallel_fits import ParallelFits
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.candidate import Candidate, by_energy, evaluate, poses_of
 from depthtrack.tracking.frame import Toolkit
@@ -79,11 +80,12 @@ def estimate_single_frame(
         poses_of(starts)[:, ANGLES], coarse_to_fine.min_difference, coarse_to_fine.rounds[0].keep
     )
     chosen = [starts[i] for i in distinct]
-    return run_rounds(fitter, scorer, chosen, tools.synergies, coarse_to_fine.rounds, kept=1.0)[0]
+    return run_rounds(fitter, tools.fits, scorer, chosen, tools.synergies, coarse_to_fine.rounds, kept=1.0)[0]
 
 
 def run_rounds(
     fitter: IcpFitter,
+    fits: ParallelFits,
     scorer: Scorer,
     starts: list[Candidate],
     synergies: Synergies,
@@ -101,8 +103,8 @@ def run_rounds(
     deadline = deadline or Deadline()
     for each in rounds:
         chosen = starts[: each.keep]
-        in_time = takewhile(lambda _: not deadline.is_over, chosen)
-        poses = [fit_in_synergies(fitter, start.pose, synergies, each, kept) for start in in_time]
+        fit = partial(fit_in_synergies, synergies=synergies, options=each, kept=kept)
+        poses = fits.fit_each(fitter, [start.pose for start in chosen], fit, lambda: deadline.is_over)
         if not poses:
             break
         starts = by_energy([*evaluate(scorer, np.stack(poses)), *chosen[len(poses) :]])

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -69,13 +70,15 @@ class RefineFingers:
 
     def _shifted(self, frame: FrameContext, best: Candidate, fitter: IcpFitter) -> Candidate:
         """Return the better fit of the fingers shifted by one place, in both directions."""
-        proposals, brief = finger_shift_proposals(frame.tools.model, best.pose), self.options.shift_iterations
+        fits, brief = frame.tools.fits, self.options.shift_iterations
+        proposals = finger_shift_proposals(frame.tools.model, best.pose)
         if brief > 0:
-            coarse = frame.evaluate(np.stack([fitter.fit(pose, iterations=brief, coarse=True) for pose in proposals]))
+            briefly = partial(IcpFitter.fit, iterations=brief, coarse=True)
+            coarse = frame.evaluate(np.stack(fits.fit_each(fitter, proposals, briefly)))
             if coarse[0].energy >= self.options.shift_margin * best.energy:
                 return coarse[0]
             proposals = coarse[0].pose[None]
-        return frame.evaluate(np.stack([fitter.fit(pose) for pose in proposals]))[0]
+        return frame.evaluate(np.stack(fits.fit_each(fitter, proposals, IcpFitter.fit)))[0]
 
     def _due_turns(self, frame: FrameContext, best: Candidate) -> set[int]:
         """Return the turns of this frame: fingers 0 to 4, and `_SHIFTS`."""

@@ -1,6 +1,7 @@
 """A search for the hand that goes on over the frames after a loss, so that no frame is late."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,10 +14,7 @@ from depthtrack.tracking.proposals.global_ import distinct_orientations, global_
 from depthtrack.tracking.stages.coarse_to_fine import fit_in_synergies
 from depthtrack.tracking.stages.searches import FitSearch
 from depthtrack.tracking.state import InterruptedSearch
-from depthtrack.tracking.timing import Deadline
-
-_FOR_FIT = 0.25
-"""Share of the deadline that is left to fit the best pose so far."""
+from depthtrack.tracking.timing import FOR_FIT, Deadline
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class SearchInParts:
         part = _moved(before, frame) if before is not None and before.has_begun else self._begun(frame)
         rounds = self.search.options.rounds
         fitter, kept = frame.fitter(self.search.surface), frame.posture_kept(self.search.surface.icp)
-        found, deadline = self._scored(frame, part), frame.deadline.sooner(_FOR_FIT)
+        found, deadline = self._scored(frame, part), frame.deadline.sooner(FOR_FIT)
         while part.turn < len(rounds):
             part = self._improved(frame, part, rounds[part.turn], fitter, kept, deadline)
             found = self._scored(frame, part)
@@ -64,11 +62,9 @@ class SearchInParts:
         deadline: Deadline,
     ) -> InterruptedSearch:
         """Return the search after fits until the deadline, one at least."""
-        fitted = []
-        for pose in part.waiting:
-            fitted.append(fit_in_synergies(fitter, pose, frame.tools.synergies, turn, kept))
-            if deadline.is_over:
-                break
+        fit = partial(fit_in_synergies, synergies=frame.tools.synergies, options=turn, kept=kept)
+        first = iter([False])
+        fitted = frame.tools.fits.fit_each(fitter, part.waiting, fit, lambda: next(first, True) and deadline.is_over)
         improved = np.concatenate([part.improved, np.stack(fitted)])
         return part._replace(waiting=part.waiting[len(fitted) :], improved=improved)
 

@@ -94,7 +94,7 @@ class FitSearch:
             starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
         tools, kept = frame.tools, frame.posture_kept(self.surface.icp)
         fitter, rounds = frame.fitter(self.surface), self.options.rounds
-        return run_rounds(fitter, tools.scorer, starts, tools.synergies, rounds, kept, frame.deadline)
+        return run_rounds(fitter, tools.fits, tools.scorer, starts, tools.synergies, rounds, kept, frame.deadline)
 
     def fitter(self, frame: FrameContext) -> IcpFitter | None:
         return frame.fitter(self.surface)

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from depthtrack.hand.pose import ANGLES
+from depthtrack.solver.icp import IcpFitter
 from depthtrack.solver.options import SurfaceFitOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.posture_prior import prior_near
+from depthtrack.types import Array
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,12 @@ class SurfaceFit:
             before = candidates[0].pose if last is None else last
             prior = prior_near(before[ANGLES], frame.posture_kept(icp), icp)
         iterations = (effort or self.effort) * icp.icp_iterations
-        poses = [
-            fitter.fit(candidate.pose, self.subspace, iterations, prior, align=self.align) for candidate in candidates
-        ]
-        return frame.evaluate(np.stack(poses))
+
+        def fit(own: IcpFitter, pose: Array) -> Array:
+            return own.fit(pose, self.subspace, iterations, prior, align=self.align)
+
+        poses = [candidate.pose for candidate in candidates]
+        return frame.evaluate(np.stack(frame.tools.fits.fit_each(fitter, poses, fit)))
 
 
 @dataclass(frozen=True)

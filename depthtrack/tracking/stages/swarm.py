@@ -13,6 +13,7 @@ from depthtrack.solver.swarm import Box, keep_lowest, minimise
 from depthtrack.solver.swarm_space import ParameterSpace, SwarmSpace, TangentSpace
 from depthtrack.tracking.candidate import Candidate, by_energy
 from depthtrack.tracking.frame import FrameContext
+from depthtrack.tracking.timing import Deadline
 from depthtrack.tracking.visible_centroid import visible_centroid
 from depthtrack.types import Array
 
@@ -21,11 +22,17 @@ Spread = tuple[float, float, float]
 
 
 def run_swarm(
-    scorer: Scorer, space: SwarmSpace, particles: Array, generator: np.random.Generator, options: SwarmOptions
+    scorer: Scorer,
+    space: SwarmSpace,
+    particles: Array,
+    generator: np.random.Generator,
+    options: SwarmOptions,
+    deadline: Deadline | None = None,
 ) -> list[Candidate]:
     """Return the best pose of each particle, best first.
 
     particles: (N, D) in the coordinates of `space`.
+    deadline: time after which no generation begins.
     """
     least, agreement = np.full(len(particles), np.inf), np.zeros(len(particles))
 
@@ -34,7 +41,8 @@ def run_swarm(
         keep_lowest(*scores, least, agreement)
         return scores.energy
 
-    found = minimise(score, particles, Box(space.lower, space.upper, space.fingers), generator, options)
+    deadline, box = deadline or Deadline(), Box(space.lower, space.upper, space.fingers)
+    found = minimise(score, particles, box, generator, options, is_over=lambda: deadline.is_over)
     rows = zip(space.poses(found.positions), found.energies.tolist(), agreement.tolist(), strict=True)
     return by_energy(Candidate(*row) for row in rows)
 

@@ -11,6 +11,7 @@ from depthtrack.tracking.frame import FrameContext
 from depthtrack.tracking.options import SwarmProposalOptions
 from depthtrack.tracking.stages.surface_fit import SurfaceFit
 from depthtrack.tracking.stages.swarm import run_swarm
+from depthtrack.tracking.timing import FOR_FIT
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class SwarmProposals:
         steps = frame.random.standard_normal((len(centres), 26)) * np.repeat(options.spread, [3, 3, 20])
         steps[:3] = 0  # the centres themselves take part
         particles = space.coordinates(retract(centres, steps))
-        proposals = run_swarm(frame.tools.scorer, space, particles, frame.random, options.swarm)
+        deadline = frame.deadline.sooner(FOR_FIT)
+        proposals = run_swarm(frame.tools.scorer, space, particles, frame.random, options.swarm, deadline)
         fitted = self.fit.fitted(frame, proposals[: options.keep])
         return by_energy([best, *fitted]) if fitted[0].energy < options.accept * best.energy else candidates

@@ -89,6 +89,9 @@ class CapsuleSurface:
     def search(self, cloud: PointCloud) -> None:
         return None
 
+    def twin(self) -> None:
+        return None
+
     def match(
         self,
         pose: Array,

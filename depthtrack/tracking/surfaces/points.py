@@ -4,6 +4,9 @@ A posed point is visible if it faces the camera and no nearer point hides it. Th
 of the image. The search visits the cells around an observed point until no other cell can contain a closer point.
 """
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -47,7 +50,7 @@ class PointSurface:
         observation, cells = self._observation, self._cells
         key = ("groups", id(cloud.points), cells)
         arranged, groups = observation.shared(key, lambda: _in_groups(cloud, cells, observation.centre))
-        groups = groups._replace(best=np.zeros_like(groups.best), chosen=np.zeros_like(groups.chosen))
+        groups = groups.with_own_memory()
         limits = self._options.hidden_depth, self._max_distance
         self._searches.append(
             PointSearch(self._blocks, self._posed, cells, arranged, groups, observation.centre, *limits)
@@ -56,6 +59,14 @@ class PointSurface:
 
     def search(self, cloud: PointCloud) -> PointSearch:
         return self._search_of(cloud)
+
+    def twin(self) -> Self:
+        other = copy(self)
+        other._posed = np.empty_like(self._posed)
+        other._searches = [
+            search._replace(posed=other._posed, groups=search.groups.with_own_memory()) for search in self._searches
+        ]
+        return other
 
     def _search_of(self, cloud: PointCloud) -> PointSearch:
         """Return the search of an arranged cloud of the target."""
