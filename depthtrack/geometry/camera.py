@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.files import compact_json
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.types import Array, Depth
+from depthtrack.types import Array, Depth, Index
 
 MAX_SIDE = 8192
 """Largest image side accepted, pixels: a bound on the memory that a damaged header requests."""
@@ -75,6 +75,14 @@ class Camera:
         uv = np.asarray(pixels, dtype=np.float64)
         z = np.asarray(depth, dtype=np.float64)
         return np.stack([(uv[..., 0] - self.cx) / self.fx * z, (uv[..., 1] - self.cy) / self.fy * z, z], axis=-1)
+
+    def unproject_rows(self, rows: Index, depth: Array) -> Array:
+        """Return the camera-frame points (N, 3), metres, of some pixels of a depth map (h, w).
+
+        rows: (N,) their places in the flat map.
+        """
+        v, u = np.divmod(rows, self.width)
+        return self.unproject(np.stack([u, v], axis=-1), depth.reshape(-1)[rows])
 
     def metres(self, stored: NDArray[np.uint16]) -> Depth:
         """Return the depth (h, w) in metres of an image of stored units (h, w); 0 stays 0."""

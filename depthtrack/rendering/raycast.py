@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
-from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import CYLINDER
 from depthtrack.rendering.rendered_surface import NEAR, RenderedSurface
 from depthtrack.types import Array, Index
+
+_OF_SPHERE: Array = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_OF_CYLINDER: Array = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 1.0)])
+"""(8, 4) corners of the bounding boxes of the primitives in their unit frames."""
 
 
 def raycast(
@@ -36,12 +39,12 @@ def raycast(
     """
     surface = RenderedSurface.empty(camera) if onto is None else onto
     inverses: Array = np.linalg.inv(np.asarray(T_camera_unit, dtype=np.float64)).astype(np.float64, copy=False)
-    regions = np.array([_bounds(camera, kind, T) for kind, T in zip(kinds, T_camera_unit, strict=True)], dtype=np.int64)
+    regions = _bounds(camera, np.asarray(kinds), np.asarray(T_camera_unit, dtype=np.float64).reshape(-1, 4, 4))
     _cast(
         np.asarray(kinds, dtype=np.int64),
         inverses,
         np.asarray(labels, dtype=np.int16),
-        regions.reshape(-1, 4),
+        regions,
         (camera.fx, camera.fy, camera.cx, camera.cy),
         surface.depth,
         surface.label,
@@ -50,16 +53,22 @@ def raycast(
     return surface
 
 
-def _bounds(camera: Camera, kind: int, T: Array) -> Rect:
-    """Return the pixels that a primitive may cover: those of its projected bounding box."""
-    low = 0.0 if kind == CYLINDER else -1.0
-    corners = np.array([(x, y, z, 1.0) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (low, 1.0)]) @ T.T
-    points = corners[:, :3] / corners[:, 3:]
-    if points[:, 2].max() < NEAR:
-        return Rect(0, 0, 0, 0)
-    if points[:, 2].min() < NEAR:  # extends behind the camera: its image is unbounded
-        return camera.rect
-    return Rect.around(camera.project(points)).clipped(camera.rect)
+def _bounds(camera: Camera, kinds: Index, T: Array) -> Index:
+    """Return the pixels (N, 4), as in `Rect`, that the bounding boxes of primitives cover.
+
+    T: (N, 4, 4) T_camera_unit.
+    """
+    corners = np.where((kinds == CYLINDER)[:, None, None], _OF_CYLINDER, _OF_SPHERE) @ np.swapaxes(T, 1, 2)
+    points = corners[..., :3] / corners[..., 3:]
+    z = points[..., 2]
+    # Beyond an image's size, rounding to whole pixels does not matter.
+    pixels = np.clip(np.nan_to_num(camera.project(points)), -1e6, 1e6)
+    low, high = np.floor(pixels.min(axis=1)), np.ceil(pixels.max(axis=1)) + 1
+    size = np.array([camera.width, camera.height], dtype=np.float64)
+    regions = np.concatenate([np.clip(low, 0, size), np.clip(high, 0, size)], axis=1).astype(np.int64)
+    regions[z.min(axis=1) < NEAR] = camera.rect  # extends behind the camera: its image is unbounded
+    regions[z.max(axis=1) < NEAR] = 0
+    return regions
 
 
 @compiled(nogil=True)

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.kinematics import HandModel
@@ -16,7 +17,7 @@ from depthtrack.synthesis.colour import linear_from_lab, srgb_from_linear
 from depthtrack.synthesis.held_object import HELD
 from depthtrack.synthesis.randomness import rounded_normal_noise
 from depthtrack.synthesis.scene import RenderedView
-from depthtrack.types import Array, Image, Mask
+from depthtrack.types import Array, Array32, Image, Mask
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Painter:
         self._camera = camera
         self._tone = tone
         self._noise = noise
-        self._held = np.zeros(3) if held is None else held
+        self._held = held
         self._light = Light.sample(rng)
         self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32)
         self._phases = rng.uniform(0, 2 * np.pi, 6).astype(np.float32)
@@ -115,13 +116,14 @@ class Painter:
         """Return the RGB image (h, w, 3) of a rendered frame."""
         surface = rendered.surface
         picture = self._background.copy()
-        v, u = np.nonzero((surface.label >= 0) & (surface.label <= FOREARM))
-        label, normal = surface.label[v, u], surface.normal[v, u]
-        points = self._camera.unproject(np.stack([u, v], axis=-1), surface.depth[v, u])
-        albedo = self._skin(points, normal, label, rendered.transforms)
-        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(albedo, normal, shine=True)))
-        v, u = np.nonzero(surface.label == HELD)
-        picture[v, u] = np.rint(255 * srgb_from_linear(self._light.reflected(self._held, surface.normal[v, u])))
+        pixels, labels, normals = picture.reshape(-1, 3), surface.label.reshape(-1), surface.normal.reshape(-1, 3)
+        at = np.flatnonzero((labels >= 0) & (labels <= FOREARM))
+        normal = normals[at]
+        albedo = self._skin(self._camera.unproject_rows(at, surface.depth), normal, labels[at], rendered.transforms)
+        pixels[at] = np.rint(255 * srgb_from_linear(self._light.reflected(albedo, normal, shine=True)))
+        if self._held is not None:
+            at = np.flatnonzero(labels == HELD)
+            pixels[at] = np.rint(255 * srgb_from_linear(self._light.reflected(self._held, normals[at])))
         if self._noise == 0:
             return picture
         noise = rounded_normal_noise(rng, picture.shape, self._noise)
@@ -132,15 +134,46 @@ class Painter:
 
         The texture moves with the hand, since it is a function of the point in the neutral pose.
         """
-        T = (self._T_palm_body @ np.linalg.inv(transforms))[label]
-        neutral = np.einsum("nij,nj->ni", T[:, :3, :3], points) + T[:, :3, 3]
-        inward = np.einsum("nj,nj->n", transforms[label, :3, 2], normal)
-        # 0 on the back of the hand, 1 on the palmar side, blended over the fingers' edges.
-        palmar = np.clip(0.5 + 1.2 * inward, 0, 1)[:, None]
-        albedo = self._tone.back + (palmar**2 * (3 - 2 * palmar)) * (self._tone.palm - self._tone.back)
-        blotches = np.sin(neutral.astype(np.float32) @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
+        T = self._T_palm_body @ np.linalg.inv(transforms)
+        neutral, albedo = np.empty((len(points), 3), np.float32), np.empty((len(points), 3))
+        tone = self._tone.back, self._tone.palm - self._tone.back
+        place_on_skin(points, normal, label, T, transforms, tone, neutral, albedo)
+        blotches = np.sin(neutral @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
         # Haemoglobin absorbs green and blue more than red.
-        return np.asarray(albedo * (1 + blotches[:, None] * np.array([0.02, 0.045, 0.045])))
+        albedo *= 1 + blotches[:, None] * np.array([0.02, 0.045, 0.045])
+        return albedo
+
+
+@compiled(nogil=True)
+def place_on_skin(
+    points: Array,
+    normal: Array,
+    label: NDArray[np.int16],
+    T_neutral: Array,
+    transforms: Array,
+    tone: tuple[Array, Array],
+    neutral: Array32,
+    albedo: Array,
+) -> None:
+    """Write points in the neutral pose, and the albedo between the back and the palmar side.
+
+    points, normal: (N, 3) metres and unit, camera frame.
+    label: (N,) body of each point.
+    T_neutral, transforms: (17, 4, 4) from the camera to the neutral pose, and T_camera_body, metres.
+    tone: (3,) linear RGB of the back, and the difference of the palmar side.
+    neutral, albedo: (N, 3) output, metres and linear RGB.
+    """
+    back, difference = tone
+    for n in range(points.shape[0]):
+        T, body = T_neutral[label[n]], transforms[label[n]]
+        x, y, z = points[n, 0], points[n, 1], points[n, 2]
+        inward = body[0, 2] * normal[n, 0] + body[1, 2] * normal[n, 1] + body[2, 2] * normal[n, 2]
+        # 0 on the back of the hand, 1 on the palmar side, blended over the fingers' edges.
+        palmar = min(max(0.5 + 1.2 * inward, 0.0), 1.0)
+        share = palmar * palmar * (3.0 - 2.0 * palmar)
+        for i in range(3):
+            neutral[n, i] = T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]
+            albedo[n, i] = back[i] + share * difference[i]
 
 
 def flip_skin(

@@ -75,12 +75,12 @@ class Scene:
         """
         label = rendered.surface.label
         hand = (label >= 0) & (label < BODY_COUNT)
-        v, u = np.nonzero(label == FOREARM)
-        points = self.camera.unproject(np.stack([u, v], axis=-1), rendered.surface.depth[v, u])
+        at = np.flatnonzero(label == FOREARM)
+        points = self.camera.unproject_rows(at, rendered.surface.depth)
         T_camera_palm = rendered.transforms[0]
         towards_fingers = T_camera_palm[:3, 1]
         wrist = T_camera_palm[:3, :3] @ self.shape.wrist + T_camera_palm[:3, 3]
-        hand[v, u] = (points - wrist) @ towards_fingers > 0
+        hand.reshape(-1)[at] = (points - wrist) @ towards_fingers > 0
         return hand
 
     @cached_property

@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import CYLINDER, PRIMITIVE_COUNT, SPHERE, Primitives, cone, ellipsoid
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.raycast import raycast
+from depthtrack.rendering.raycast import _bounds, raycast
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.rendering.triangles import rasterise
 from tests.support.hands import random_pose_in_view
@@ -34,6 +35,25 @@ def test_the_hand_has_the_papers_37_primitives() -> None:
     assert sum("cone" in name for name in names) == 4 * 3 + 2
     assert sum("sphere" in name for name in names) == 4 * 4 + 3
     assert sum(kinds == CYLINDER) == 4 * 3 + 2 + 1
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_primitives_are_drawn_within_their_bounding_boxes(seed: int) -> None:
+    rng, kinds = np.random.default_rng(seed), np.array([SPHERE, CYLINDER])
+    T = np.tile(np.eye(4), (2, 1, 1))
+    T[:, :3, :3] = rng.normal(0, 0.05, (2, 3, 3))
+    T[:, :3, 3] = rng.uniform([-0.5, -0.5, -0.3], [0.5, 0.5, 0.8], (2, 3))
+    regions = _bounds(CAMERA, kinds, T)
+    for kind, each, region in zip(kinds, T, regions, strict=True):
+        low = 0.0 if kind == CYLINDER else -1.0
+        corners = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (low, 1)]) @ each.T
+        near = corners[:, 2] < NEAR
+        if near.all():
+            assert tuple(region) == (0, 0, 0, 0)
+        elif near.any():
+            assert tuple(region) == CAMERA.rect
+        else:
+            assert tuple(region) == Rect.around(CAMERA.project(corners[:, :3])).clipped(CAMERA.rect)
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -4,8 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from depthtrack.synthesis.painting import SkinTone
+from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.shape import HandShape
+from depthtrack.synthesis.painting import SkinTone, place_on_skin
 from depthtrack.synthesis.randomness import Stream, generator
+from tests.support.hands import random_pose
 from tests.support.synthesis import synthesiser
 
 
@@ -33,6 +36,21 @@ def test_skin_varies_between_people_and_over_the_hand() -> None:
     frame = synthesiser(sensor="ideal", seed=1)[0]
     assert np.all(frame.colour[frame.mask].std(axis=0) > 3)
     assert np.all(SkinTone.sample(generator(9, 0, Stream.SKIN)).palm >= tones[9] - 0.02)
+
+
+def test_points_of_the_skin_move_with_their_bodies() -> None:
+    rng, model = np.random.default_rng(4), HandModel(HandShape())
+    transforms = np.tile(np.eye(4), (17, 1, 1))
+    transforms[:16] = model.transforms(random_pose(rng))
+    T = rng.normal(size=(17, 4, 4))
+    points, normal, label = rng.normal(size=(50, 3)), rng.normal(size=(50, 3)), rng.integers(0, 17, 50).astype(np.int16)
+    back, difference = rng.random((2, 3))
+    neutral, albedo = np.empty((50, 3), np.float32), np.empty((50, 3))
+    place_on_skin(points, normal, label, T, transforms, (back, difference), neutral, albedo)
+    expected = np.einsum("nij,nj->ni", T[label][:, :3, :3], points) + T[label][:, :3, 3]
+    np.testing.assert_allclose(neutral, expected, rtol=1e-6, atol=1e-6)
+    palmar = np.clip(0.5 + 1.2 * np.einsum("nj,nj->n", transforms[label, :3, 2], normal), 0, 1)[:, None]
+    np.testing.assert_allclose(albedo, back + palmar**2 * (3 - 2 * palmar) * difference, atol=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3])

@@ -234,10 +234,43 @@ def test_incidence_is_the_angle_between_normal_and_viewing_ray() -> None:
     np.testing.assert_allclose(theta[v, u], np.arcsin(np.minimum(miss / radius, 1)), atol=1e-6)
 
 
-def test_edges_are_pixels_with_a_neighbour_on_another_surface() -> None:
+@pytest.mark.parametrize("shape", [(30, 40), (5, 3), (1, 1)])
+@pytest.mark.parametrize("radius", [1, 2, 4])
+def test_edges_are_pixels_with_a_neighbour_on_another_surface(shape: tuple[int, int], radius: int) -> None:
     rng = np.random.default_rng(5)
-    depth = np.where(rng.random((30, 40)) < 0.2, 0.0, 1.0 + 0.05 * (rng.random((30, 40)) < 0.3))
-    padded = np.pad(depth, 1, mode="edge")
-    neighbours = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
-    expected = (depth > 0) & np.any([np.abs(n - depth) > JUMP * depth for n in neighbours], axis=0)
-    np.testing.assert_array_equal(edges(depth), expected)
+    depth = np.where(rng.random(shape) < 0.2, 0.0, 1.0 + 0.05 * (rng.random(shape) < 0.3))
+    height, width = shape
+    v, u = np.mgrid[:height, :width]
+    steps = [step for step in range(-radius, radius + 1) if step]
+    beside = [depth[v, np.clip(u + step, 0, width - 1)] for step in steps]
+    beside += [depth[np.clip(v + step, 0, height - 1), u] for step in steps]
+    expected = (depth > 0) & np.any([np.abs(other - depth) > JUMP * depth for other in beside], axis=0)
+    np.testing.assert_array_equal(edges(depth, radius), expected)
+
+
+def test_kinect1_reads_plain_pixels_like_the_others() -> None:
+    surface, error = _tilted(SMALL, 1.0, 20), normal_noise(_rng(), SMALL.shape)
+    lens, limits, nowhere = (SMALL.fx, SMALL.fy, SMALL.cx, SMALL.cy), (0.4, 5.0), np.zeros(SMALL.shape, np.bool_)
+    out, plain = np.zeros(SMALL.shape), np.zeros(SMALL.width, np.bool_)
+    kinect1._read(
+        surface.depth,
+        surface.normal,
+        lens,
+        nowhere,
+        nowhere,
+        np.zeros((2, *SMALL.shape), np.float32),
+        error,
+        np.ones(SMALL.shape, np.float32),
+        limits,
+        out,
+    )
+    scale = kinect1.STEPS * kinect1.INFRARED_FOCAL * kinect1.BASELINE
+    sigma = np.vectorize(kinect1.axial_noise)(surface.depth, 0.0) * scale / surface.depth**2
+    disparity = scale / surface.depth + np.sqrt(np.maximum(sigma**2 - 1 / 12, 0)) * error
+    np.testing.assert_allclose(out, scale / np.rint(disparity), rtol=1e-12)
+    row = np.empty(SMALL.width)
+    kinect1._read_plain(
+        surface.depth[3], surface.normal[3], 3, lens, nowhere[3], nowhere[3], error[3], limits, plain, row
+    )
+    assert plain.all()
+    np.testing.assert_array_equal(row, out[3])

@@ -9,7 +9,7 @@ from depthtrack.geometry.camera import Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
 from depthtrack.types import Array, Mask
 
-_SURELY_FLAT = 0.27
+SURELY_FLAT = 0.27
 """Squared cosine of an angle of incidence that is below 60 degrees, whatever its last bits."""
 JUMP = 0.02
 """Relative depth difference of neighbouring pixels from which they belong to two surfaces."""
@@ -98,7 +98,7 @@ def steep_incidence_at(
     fx, fy, cx, cy = intrinsics
     x, y = (u - cx) / fx, (v - cy) / fy
     along = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2])
-    if depth[v, u] > 0.0 and along > 0.0 and along * along > _SURELY_FLAT * (x * x + y * y + 1.0):
+    if depth[v, u] > 0.0 and along > 0.0 and along * along > SURELY_FLAT * (x * x + y * y + 1.0):
         return 0.0
     return incidence_at(depth, normal, intrinsics, v, u)
 
@@ -107,33 +107,40 @@ def steep_incidence_at(
 def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
     height, width = depth.shape
     for v in range(height):
-        for u in range(width):
-            z = depth[v, u]
-            if z <= 0.0:
-                continue
-            for k in range(-radius, radius + 1):
-                across = depth[v, min(max(u + k, 0), width - 1)]
-                along = depth[min(max(v + k, 0), height - 1), u]
-                if abs(across - z) > jump * z or abs(along - z) > jump * z:
-                    out[v, u] = True
-                    break
+        row, found = depth[v], out[v]
+        for k in range(1, radius + 1):
+            above, below = depth[max(v - k, 0)], depth[min(v + k, height - 1)]
+            # Without branches, so that the compiler makes vectors of it.
+            for u in range(width):
+                z = row[u]
+                far = (abs(above[u] - z) > jump * z) | (abs(below[u] - z) > jump * z)
+                found[u] |= (z > 0.0) & far
+            for u in range(k, width):
+                found[u] |= (row[u] > 0.0) & (abs(row[u - k] - row[u]) > jump * row[u])
+            for u in range(width - k):
+                found[u] |= (row[u] > 0.0) & (abs(row[u + k] - row[u]) > jump * row[u])
+            # Columns beyond the border repeat it.
+            for u in range(min(k, width)):
+                found[u] |= (row[u] > 0.0) & (abs(row[0] - row[u]) > jump * row[u])
+            for u in range(max(width - k, 0), width):
+                found[u] |= (row[u] > 0.0) & (abs(row[width - 1] - row[u]) > jump * row[u])
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None:
     height, width = depth.shape
     inverse, place = np.empty(width), np.empty(width)
     for v in range(height):
-        inverse[:] = 0.0
+        row = depth[v]
         for u in range(width):
-            place[u] = u - focal_baseline / depth[v, u] if depth[v, u] > 0.0 else 0.0
+            inverse[u], place[u] = 0.0, u - focal_baseline / row[u] if row[u] > 0.0 else 0.0
         for u in range(width):
-            z = depth[v, u]
+            z = row[u]
             if z <= 0.0:
                 continue
             here = place[u]
             # The segment ends at the right neighbour; an isolated pixel covers its own width.
-            z_next = depth[v, u + 1] if u + 1 < width else 0.0
+            z_next = row[u + 1] if u + 1 < width else 0.0
             continues = abs(z_next - z) <= jump * z
             if not continues:
                 z_next = z
