@@ -1,16 +1,17 @@
 """Compilation of kernels ahead of their first use, in several processes.
 
 `kernels.json` lists the kernels that trackers, searches for layouts and calibration call, with the types of their
-arguments. Those that take longest come first. Each process compiles one after the other into the folder of
-`compilation`. A kernel that is not listed, or whose process fails, is compiled at its first use.
+arguments. Each process compiles one after the other into the folder of `compilation`, parts of others first. A kernel
+that is not listed, or whose process fails, is compiled at its first use.
 """
 
 import re
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from os import environ, pathsep
 from pathlib import Path
@@ -18,6 +19,7 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple
 
 from numba import types
+from numba.core.dispatcher import Dispatcher
 
 from depthtrack.compilation import cache_folder
 from depthtrack.machine import usable_cores
@@ -107,6 +109,58 @@ def absent_kernels(kernels: Sequence[Kernel]) -> list[Kernel]:
     return [] if cache_folder() is None else [kernel for kernel in kernels if not kernel.is_kept]
 
 
+class PartsFirst:
+    """Kernels in an order in which each one follows the others that it calls.
+
+    Otherwise two processes would compile the same parts at a time. Parts of the longest kernels come first.
+    """
+
+    def __init__(self, kernels: Sequence[Kernel]) -> None:
+        called = [_parts_of(kernel.dispatcher) for kernel in kernels]
+        parts = [{n for n, each in enumerate(kernels) if each.dispatcher in found} for found in called]
+        wholes = [[n for n, inside in enumerate(parts) if number in inside] for number in range(len(kernels))]
+        longest = [max(kernels[n].seconds for n in (number, *wholes[number])) for number in range(len(kernels))]
+        order = range(len(kernels))
+        self._kernels, self._parts = kernels, parts
+        self._waiting = sorted(order, key=lambda n: (-longest[n], -len(wholes[n]), -kernels[n].seconds))
+        self._unfinished, self._changed = set(order), threading.Condition()
+
+    def take(self) -> int | None:
+        """Return the number of the next kernel whose parts are finished, once there is one; None after the last."""
+        with self._changed:
+            while self._waiting:
+                for number in self._waiting:
+                    if not self._parts[number] & self._unfinished:
+                        self._waiting.remove(number)
+                        return number
+                self._changed.wait()
+            return None
+
+    def finish(self, number: int) -> None:
+        """State that a kernel was compiled, or never will be."""
+        with self._changed:
+            self._unfinished.discard(number)
+            self._changed.notify_all()
+
+    def stop(self) -> None:
+        """Leave out the kernels that wait."""
+        with self._changed:
+            self._waiting.clear()
+            self._changed.notify_all()
+
+
+def _parts_of(kernel: Any) -> set[Any]:
+    """Return the compiled functions that a kernel calls by a global name, directly or not."""
+    found, unread = set[Any](), [kernel]
+    while unread:
+        function = unread.pop().py_func
+        named = [function.__globals__.get(name) for name in function.__code__.co_names]
+        new = {each for each in named if isinstance(each, Dispatcher)} - found - {kernel}
+        found |= new
+        unread += new
+    return found
+
+
 def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None] = lambda kernel: None) -> int:
     """Compile kernels into the folder for compiled code; return the number of processes.
 
@@ -116,24 +170,33 @@ def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None
     """
     count = min(usable_cores(), len(kernels))
     children = [_start() for _ in range(count)]
-    free: SimpleQueue[subprocess.Popen[str]] = SimpleQueue()
-    for child in children:
-        free.put(child)
+    waiting, finished = PartsFirst(kernels), SimpleQueue[Kernel | None]()
 
-    def compile_one(kernel: Kernel) -> Kernel:
-        child = free.get()
-        if not _request(child, kernel) and not is_over:
-            child = _start()  # the other one has failed: its kernel is compiled at its first use
-            children.append(child)
-        free.put(child)
-        return kernel
+    def work(child: "subprocess.Popen[str]") -> None:
+        try:
+            while (number := waiting.take()) is not None:
+                if not _request(child, kernels[number]) and not is_over:
+                    child = _start()  # the other one has failed: its kernel is compiled at its first use
+                    children.append(child)
+                waiting.finish(number)
+                finished.put(kernels[number])
+        finally:
+            finished.put(None)
 
-    is_over, pool = False, ThreadPoolExecutor(max(count, 1))
+    is_over, pool, working = False, ThreadPoolExecutor(max(count, 1)), count
     try:
-        for future in as_completed([pool.submit(compile_one, kernel) for kernel in kernels]):
-            compiled(future.result())
+        threads = [pool.submit(work, child) for child in tuple(children)]
+        while working:
+            kernel = finished.get()
+            if kernel is None:
+                working -= 1
+            else:
+                compiled(kernel)
+        for thread in threads:
+            thread.result()
     finally:
         is_over = True
+        waiting.stop()
         pool.shutdown(wait=False, cancel_futures=True)
         for child in children:
             child.kill()

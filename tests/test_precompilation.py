@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from numba.core.dispatcher import Dispatcher
 
 from depthtrack import precompilation
 from depthtrack.compilation import _Files
-from depthtrack.precompilation import Kernel, compile_kernels, listed_kernels, text_of, type_of
+from depthtrack.precompilation import Kernel, PartsFirst, compile_kernels, listed_kernels, text_of, type_of
 
 ROOT = Path(__file__).parents[1]
 SMALL = """
@@ -56,6 +57,35 @@ def test_processes_that_fail_leave_their_kernels_to_the_first_use(monkeypatch: p
     shown: list[Kernel] = []
     compile_kernels(listed_kernels()[:3], shown.append)
     assert len(shown) == 3
+
+
+def test_each_kernel_follows_its_parts() -> None:
+    kernels = listed_kernels()
+    waiting, names, running = PartsFirst(kernels), list[str](), list[int]()
+    while (number := waiting.take()) is not None:
+        names.append(kernels[number].name)
+        waiting.finish(number)
+    assert sorted(names) == sorted(kernel.name for kernel in kernels)
+    place = {name: n for n, name in enumerate(names)}
+    assert place["forward_kinematics"] < place["solve"] < place["fit_rounds"]
+    assert place["match_points"] < place["fit_rounds"]
+    assert place["fit_rounds"] < place["score_poses"]
+    # While a part is compiled, other processes take kernels without it.
+    waiting = PartsFirst([kernel for kernel in kernels if kernel.name in {"match_points", "fit_rounds", "submit"}])
+    running = [number for _ in range(2) if (number := waiting.take()) is not None]
+    assert len(running) == 2
+    waiter = threading.Thread(target=lambda: running.append(waiting.take() or 0))
+    waiter.start()
+    for number in running[:2]:
+        waiting.finish(number)
+    waiter.join(10)
+    assert len(set(running)) == 3
+
+
+def test_no_kernel_is_taken_after_a_stop() -> None:
+    waiting = PartsFirst(listed_kernels())
+    waiting.stop()
+    assert waiting.take() is None
 
 
 def test_signatures_that_two_processes_save_at_once_stay_apart(tmp_path: Path) -> None:
