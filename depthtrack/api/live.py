@@ -66,7 +66,7 @@ class HandTracker(Closing):
             the average one if `hand` is absent.
         segmentation: how the hand is found in a frame.
         start_pose: (27,) pose in the first frame, metres, quaternion and radians, camera frame; searched if absent.
-        threads: threads of the renderer, one per core if absent; poses do not depend on it.
+        threads: threads of renderer and fits, one per core if absent; poses do not depend on it.
         deadline: milliseconds after the call of `update` at which its searches end; None for none. A configuration
             states its own.
 

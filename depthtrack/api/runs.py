@@ -85,7 +85,7 @@ def track(
     start: "auto" searches the hand, "truth" starts from the recording's true pose of its first frame.
     frames: number of frames to track; all if absent.
     segmentation: how the hand is found in a frame.
-    threads: threads of the renderer, one per core if absent; poses do not depend on it.
+    threads: threads of renderer and fits, one per core if absent; poses do not depend on it.
     keypoints: path of a file of 2D keypoints from another detector (docs/keypoints.md).
 
     Returns:

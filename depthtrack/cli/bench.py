@@ -128,7 +128,7 @@ class Pipeline:
     frames: Annotated[int | None, number(2, 10**9), stated_default(metavar="N")] = None
     """Track only the first N frames (default: all)."""
     threads: Annotated[int | None, number(1, 256), stated_default(metavar="N")] = None
-    """Threads of the renderer (default: one per core)."""
+    """Threads of renderer and fits (default: one per core)."""
     deadline: Annotated[float | None, number(0, 3_600_000), stated_default(metavar="MS")] = None
     """Time after a frame arrives at which searches end, of `hybrid` and `ik` (default: none)."""
     json: bool = False

@@ -63,7 +63,7 @@ class Command:
     """Nominal camera of a sensor, in place of the recording's own."""
     reading: tyro.conf.OmitArgPrefixes[ReadingArguments] = field(default_factory=ReadingArguments)
     threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
-    """Threads of the renderer (default: one per core)."""
+    """Threads of renderer and fits (default: one per core)."""
 
     def run(self) -> None:
         from depthtrack.live.tracking import LiveReport

@@ -54,7 +54,7 @@ class TrackCommand:
     resume: bool = False
     """Continue the run that the folder holds."""
     threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
-    """Threads of the renderer (default: one per core). Poses do not depend on it."""
+    """Threads of renderer and fits (default: one per core). Poses do not depend on it."""
     segmentation_shortcuts: tyro.conf.OmitArgPrefixes[SegmentationShortcuts] = dataclasses.field(
         default_factory=SegmentationShortcuts
     )

@@ -48,7 +48,7 @@ def create_tracker(
 ) -> StageTracker:
     """Return a tracker of a hand.
 
-    threads: threads of the renderer; poses do not depend on it.
+    threads: threads of renderer and fits; poses do not depend on it.
     synergies: synergies in place of those that the configuration names.
 
     Raises:

@@ -55,7 +55,7 @@ def configure(
 class TrackingRun(Closing):
     """Run of a tracker on a recording; equal configurations give equal bits.
 
-    threads: threads of the renderer; poses do not depend on it.
+    threads: threads of renderer and fits; poses do not depend on it.
     wrap: returns the tracker to use in place of the one that the configuration describes, to time it for example.
     clock: seconds, for the time of the segmentation.
 
