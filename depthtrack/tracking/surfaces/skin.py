@@ -1,22 +1,46 @@
 """The skin mesh as a surface to fit."""
 
+from dataclasses import replace
+
 import numpy as np
+from trimesh.remesh import subdivide
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver.surface_points import SurfacePoints
 from depthtrack.tracking.surfaces.points import subsample_evenly
 
+_MOST_VERTICES = 25_000
+"""Number of vertices from which on a skin is not divided."""
+
 
 def skin_points(shape: HandShape, spacing: float) -> SurfacePoints:
-    """Return vertices of the hand's skin at least `spacing` palm lengths apart.
+    """Return points on the hand's skin at least `spacing` palm lengths apart.
 
-    All vertices, 1.8 mm apart, cost half as much again as at 2.4 mm and reduce the error by 0.05 degrees.
+    The faces of a rig are divided before. All vertices, 1.8 mm apart, cost half as much again as at 2.4 mm and reduce
+    the error by 0.05 degrees.
 
     Raises:
         InputError: if no skin fits the sizes of the hand.
     """
-    return mesh_points(Skin.of(shape), spacing * shape.palm_length * shape.scale)
+    skin, apart = Skin.of(shape), spacing * shape.palm_length * shape.scale
+    return mesh_points(skin if shape.rig is None else divided(skin, apart / 2), apart)
+
+
+def divided(skin: Skin, longest: float) -> Skin:
+    """Return the skin with its faces divided in four until the median edge is at most `longest` (m).
+
+    New vertices halve the edges; their weights are the means of both ends.
+    """
+    while _median_edge(skin) > longest and len(skin.rest) < _MOST_VERTICES:
+        rest, faces, attributes = subdivide(skin.rest, skin.faces, vertex_attributes={"weights": skin.weights})
+        skin = replace(skin, rest=rest, faces=np.ascontiguousarray(faces), weights=attributes["weights"])
+    return skin
+
+
+def _median_edge(skin: Skin) -> float:
+    corners = skin.rest[skin.faces]
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
 def mesh_points(skin: Skin, spacing: float = 0.0) -> SurfacePoints:
