@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from depthtrack.calibration.first_scale import first_scale
 from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin, prepared
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions
@@ -93,12 +94,14 @@ def calibrate(
     frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
+    scale: float | None = None,
 ) -> Calibration:
     """Return the calibration of the hand of a recording.
 
-    views: poses of the average hand of this side; without them, it is tracked first.
+    views: poses of the hand of average proportions; without them, it is tracked first.
     frames: number of first frames to use; all if None.
     progress: called with a description of the current stage, and the completed share.
+    scale: of the hand of average proportions to begin with; None to find it first.
 
     Equal recordings and seeds give an equal hand, for any number of threads.
 
@@ -107,7 +110,9 @@ def calibrate(
     """
     source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
     report = progress or (lambda stage, share: None)
-    sizes = fit_sizes(source, side, views, lambda stage, share: report(stage, 0.6 * share))
+    report("size of the hand", 0.0)
+    begun = first_scale(source, side) if scale is None else scale
+    sizes = fit_sizes(source, side, begun, views, lambda stage, share: report(stage, 0.6 * share))
     skin = fit_skin(source, sizes, lambda stage, share: report(stage, 0.6 + 0.35 * share))
     report("confidence", 0.95)
     found = calibration_of(source, skin)

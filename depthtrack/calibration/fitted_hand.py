@@ -1,10 +1,10 @@
 """Sizes of a hand, and displacement of its skin, fitted to the views of a recording.
 
-The average hand is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of these sizes is
-tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay. Every second
-hand is not tracked: its poses are fitted from those of the views. The alternation follows Tkach et al., "Online
-generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording. At last the displacement of
-the skin is fitted with the sizes.
+A hand of average proportions is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of
+these sizes is tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay.
+Every second hand is not tracked: its poses are fitted from those of the views. The alternation follows Tkach et al.,
+"Online generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording. At last the
+displacement of the skin is fitted with the sizes.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, THUMB_BASE, WIDTHS, hand_of
+from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, SCALE, THUMB_BASE, WIDTHS, hand_of
 from depthtrack.tracking.stretches import TrackedView
 from depthtrack.types import Array
 
@@ -44,16 +44,20 @@ class FittedHand:
     energies: Array
 
 
-def fit_sizes(source: CalibrationSource, side: Side, views: Sequence[TrackedView], report: Progress) -> FittedHand:
+def fit_sizes(
+    source: CalibrationSource, side: Side, scale: float, views: Sequence[TrackedView], report: Progress
+) -> FittedHand:
     """Return the sizes of the hand of a recording. Tracking and joint optimisation alternate.
 
-    views: poses of the average hand of this side; without them, it is tracked first.
+    scale: of the hand of average proportions to begin with.
+    views: its poses; without them, it is tracked first.
 
     Raises:
         InputError: as `calibrate` does.
     """
     options, threads = source.options, source.threads
     values, rounds, joint, energies = np.zeros(COUNT), options.rounds, options.joint, np.zeros(0)
+    values[SCALE] = np.log(scale)
     for number in range(rounds):
         hand = hand_of(values, side)
         if number % 2 == 1 or not views:

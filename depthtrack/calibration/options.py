@@ -70,6 +70,11 @@ class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
     stretches: StretchOptions = option(StretchOptions(), "Frames that the hand is tracked in")
+    first_scales: tuple[float, ...] = option(
+        (0.72, 0.8, 0.9, 1.0, 1.1, 1.22),
+        "Sizes of the whole hand, of the average one's, that are compared at first; empty: begin with the average",
+    )
+    scale_frames: int = option(8, "Frames that they are compared in", unit="frames")
     rounds: int = option(4, "Rounds of joint optimisation, at most; every second hand is tracked")
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
     exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")

@@ -9,6 +9,7 @@ from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import sequence as recording
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, refine_views, track_stretches
 
 
@@ -33,12 +34,16 @@ class CalibrationSource:
 
     def refined(self, views: Sequence[TrackedView], hand: HandShape) -> Sequence[TrackedView]:
         """Return views with the poses of another hand, fitted from theirs."""
-        return refine_views(views, hand, self._stretches.tracker, self.threads)
+        return refine_views(views, hand, self.tracker, self.threads)
+
+    @property
+    def tracker(self) -> TrackerConfig:
+        """The tracker with the seed of the calibration."""
+        return replace(self.options.stretches.tracker, seed=self.seed)
 
     @property
     def _stretches(self) -> StretchOptions:
-        stretches = self.options.stretches
-        return replace(stretches, tracker=replace(stretches.tracker, seed=self.seed))
+        return replace(self.options.stretches, tracker=self.tracker)
 
     def check(self, views: Sequence[TrackedView]) -> None:
         """Check that enough views show a hand.

@@ -1,14 +1,15 @@
 """Calibration of a hand whose side is unknown.
 
-The average hands of both sides are tracked over the recording. If that leaves the side open, hands of both sides are
-calibrated. The energies of the last hands tracked for that are compared. A few views alone leave the side open often: a
-hand of adapted sizes fits them from its back as well.
+Hands of average proportions of both sides are tracked over the recording. If that leaves the side open, hands of both
+sides are calibrated. The energies of the last hands tracked for that are compared. A few views alone leave the side
+open often: a hand of adapted sizes fits them from its back as well.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 
 from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
+from depthtrack.calibration.first_scale import first_scale
 from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
@@ -38,21 +39,21 @@ def calibrate_either_side(
     """
     report = progress or (lambda stage, share: None)
     side_options = SideOptions()
-    choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.0, 0.25))
-    options = options or CalibrationOptions()
-
+    source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
+    report("size of the hand", 0.0)
+    scale = first_scale(source)
+    choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.05, 0.2), scale)
     if choice.sure:
         views, part = choice.views.get(choice.side, ()), _part(report, 0.25, 0.75)
-        found = calibrate(sequence, choice.side, views, segmentation, seed, threads, frames, part, options)
+        found = calibrate(sequence, choice.side, views, segmentation, seed, threads, frames, part, options, scale)
         return replace(found, side_margin=choice.margin, sure_margin=side_options.sure_margin)
-    source = CalibrationSource(sequence, segmentation, seed, threads, frames, options)
     sized: dict[Side, FittedHand] = {}
     failure: InputError | None = None
     sides: tuple[Side, ...] = ("right", "left")
     for n, side in enumerate(sides):
         try:
             part = _part(report, 0.25 + 0.25 * n, 0.25)
-            sized[side] = fit_sizes(source, side, choice.views.get(side, ()), part)
+            sized[side] = fit_sizes(source, side, scale, choice.views.get(side, ()), part)
         except InputError as error:
             failure = error
     if failure is not None:

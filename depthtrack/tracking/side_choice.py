@@ -35,7 +35,7 @@ class SideChoice:
     margin: share by which the mean energy of the other side is higher.
     sure: whether that is enough.
     frames: number of frames that both were tracked in.
-    views: poses of the average hand of each side.
+    views: poses of the tracked hand of each side.
     """
 
     side: Side
@@ -52,13 +52,16 @@ def choose_side(
     frames: int | None = None,
     options: SideOptions = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
+    scale: float = 1.0,
 ) -> SideChoice:
-    """Return the side of the hand in a recording, with the average hand of both sides.
+    """Return the side of the hand in a recording, by hands of average proportions.
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
+    scale: of these hands.
     """
-    hands: dict[Side, HandShape] = {"right": HandShape(), "left": HandShape(side="left")}
+    sides: tuple[Side, ...] = ("right", "left")
+    hands = {side: HandShape(side=side, scale=scale) for side in sides}
     tracked = track_sides(sequence, hands, segmentation, threads, frames, options.stretches, progress)
     views = {side: each.views for side, each in tracked.items()}
     means, count = mean_energies({side: each.energies for side, each in tracked.items()})

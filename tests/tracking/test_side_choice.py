@@ -113,6 +113,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side], energies[side])
 
     monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
+    monkeypatch.setattr(sides, "first_scale", lambda source: 1.0)
     monkeypatch.setattr(sides, "fit_sizes", fit_sizes)
     monkeypatch.setattr(sides, "fit_skin", fit_skin)
     monkeypatch.setattr(sides, "calibration_of", calibration_of)

@@ -49,7 +49,7 @@ def test_no_place_of_a_divided_skin_is_far_from_a_point() -> None:
     coarse, spacing = coarse_skin(), 0.005
     sampled = coarse.to_trimesh(coarse.rest).sample(2000, seed=1)
     far = [
-        cKDTree(mesh_points(skin, spacing).rest).query(sampled)[0].max()
+        np.max(cKDTree(mesh_points(skin, spacing).rest).query(sampled)[0])
         for skin in (coarse, divided(coarse, spacing / 2))
     ]
     assert far[0] > 2 * spacing

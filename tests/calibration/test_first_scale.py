@@ -1,0 +1,48 @@
+"""The size of a whole hand from single frames."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from depthtrack.calibration.first_scale import first_scale, lowest_of_parabola
+from depthtrack.calibration.options import CalibrationOptions
+from depthtrack.calibration.recorded_views import CalibrationSource
+from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording import open_sequence
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+
+
+@given(
+    place=st.floats(-0.9, 0.9),
+    curvature=st.floats(0.1, 100),
+    samples=st.lists(st.floats(-1, 1), min_size=3, max_size=8, unique_by=lambda x: round(x, 2)),
+)
+def test_the_lowest_place_of_a_parabola(place: float, curvature: float, samples: list[float]) -> None:
+    x = np.sort(samples)
+    y = curvature * (x - place) ** 2
+    lowest = int(np.argmin(y))
+    found = lowest_of_parabola(x, y)
+    if 0 < lowest < len(x) - 1:
+        assert found == pytest.approx(place, abs=1e-6)
+    else:
+        assert found == x[lowest]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scale", "side", "assumed"), [(0.78, "left", "right"), (1.15, "right", "right")])
+def test_the_scale_of_a_recorded_hand(tmp_path: Path, scale: float, side: Side, assumed: Side) -> None:
+    hand = HandShape(side=side, scale=scale)
+    options = Synthesis("everyday", hand=hand, model="skin", background="room", frames=60, rate=15.0)
+    write_recording(Synthesiser(options), tmp_path / "recording")
+    source = CalibrationSource(open_sequence(tmp_path / "recording"), None, 0, 1, None, CalibrationOptions())
+    assert first_scale(source, assumed) == pytest.approx(scale, rel=0.06)
+
+
+def test_without_scales_to_compare_the_hand_is_the_average_one() -> None:
+    options = replace(CalibrationOptions(), first_scales=())
+    source = CalibrationSource(None, None, 0, 1, None, options)  # type: ignore[arg-type]
+    assert first_scale(source) == 1.0
