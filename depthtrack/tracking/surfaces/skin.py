@@ -28,7 +28,9 @@ def skin_points(shape: HandShape, spacing: float) -> SurfacePoints:
 
 
 def divided(skin: Skin, longest: float) -> Skin:
-    """Return the skin with its faces divided in four until the median edge is at most `longest` (m).
+    """Return the skin with faces divided in four until the median edge is at most `longest`.
+
+    longest: metres.
 
     New vertices halve the edges; their weights are the means of both ends.
     """
