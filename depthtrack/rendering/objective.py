@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from depthtrack.hand.common_postures import add_posture_costs, common_postures
 from depthtrack.hand.pose import ANGLES
 from depthtrack.rendering.options import Objective
 from depthtrack.types import Array, Mask
@@ -14,7 +15,7 @@ from depthtrack.types import Array, Mask
 class Terms:
     """Energies of Eq. (1) and their terms.
 
-    energy: (B,) of Eq. (1).
+    energy: (B,) of Eq. (1), and the term of postures.
     depth: (B,) first term of Eq. (2), in `Objective.depth_unit`.
     silhouette: (B,) second term of Eq. (2) before lambda, 0 to 1.
     kinematic: (B,) kc of Eq. (1) before lambda_k, radians.
@@ -43,7 +44,16 @@ class Terms:
         depth = clamped / objective.depth_unit / (union + objective.epsilon)
         silhouette = silhouette_disagreement(matched_silhouette, union)
         kinematic = finger_crossing(poses)
-        return cls(objective.combine(depth, silhouette, kinematic), depth, silhouette, kinematic)
+        energy = np.asarray(objective.combine(depth, silhouette, kinematic), dtype=np.float64)
+        add_posture_terms(objective, poses, energy)
+        return cls(energy, depth, silhouette, kinematic)
+
+
+def add_posture_terms(objective: Objective, poses: ArrayLike, energies: Array) -> None:
+    """Add the term of postures of poses (B, 27) to their energies (B,) of Eq. (1)."""
+    if objective.posture_weight > 0:
+        batch = np.ascontiguousarray(poses, dtype=np.float64)
+        add_posture_costs(batch, *common_postures(), objective.posture_weight, energies)
 
 
 def silhouette_disagreement(matched: Array, union: Array) -> Array:

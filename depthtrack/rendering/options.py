@@ -26,6 +26,11 @@ class Objective:
     )
     silhouette_weight: float = option(20.0, "lambda: weight of the silhouette term", source=_OIKONOMIDIS, most=10000)
     kinematic_weight: float = option(10.0, "lambda_k: weight of crossing fingers", source=_OIKONOMIDIS, most=10000)
+    posture_weight: float = option(
+        0.0,
+        "Weight of the squared distance from common postures, in their standard deviations; not in Eq. (1)",
+        most=100,
+    )
     depth_unit: float = option(
         0.001,
         "Unit of the depth term; in millimetres its clamp of 40 is of the size of lambda = 20",
@@ -56,7 +61,7 @@ class Objective:
         return self.clamp_depth / self.depth_unit
 
     def combine(self, depth: Any, silhouette: Any, kinematic: Any) -> Any:
-        """Return the energies of Eq. (1) from its separate terms."""
+        """Return the energies of Eq. (1) from its separate terms, without the term of postures."""
         return depth + self.silhouette_weight * silhouette + self.kinematic_weight * kinematic
 
 

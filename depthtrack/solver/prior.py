@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from depthtrack.compilation import compiled
+from depthtrack.hand.common_postures import PostureDistribution
 from depthtrack.hand.synergies import Synergies
 from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.types import Array
@@ -36,16 +37,11 @@ class Prior(NamedTuple):
     def from_synergies(synergies: Synergies, strength: float, residual_spread: float = np.radians(2.0)) -> "Prior":
         """Return the prior towards postures that are common among those of the synergies.
 
-        The synergies are probabilistic principal components (Tipping and Bishop, 1999): a normal distribution along
-        each, and a small variance in all other directions.
-
         strength: variance of a residual for which the minimum is the likeliest pose, m^2.
         residual_spread: standard deviation of an angle from its reconstruction by a few synergies, rad.
         """
-        C = synergies.components
-        along = C * (1 / (synergies.variances + residual_spread**2)) @ C.T
-        across = (np.eye(20) - C @ C.T) / residual_spread**2
-        return Prior(strength * (along + across), synergies.mean.copy())
+        mean, precision = PostureDistribution.of(synergies, residual_spread)
+        return Prior(strength * precision, mean)
 
     def scaled(self, factor: float) -> "Prior":
         """Return the prior with its precision times `factor`."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 from depthtrack.errors import InputError
 from depthtrack.options import check_ranges, option
 from depthtrack.ranges import MOST_SEED
-from depthtrack.rendering.options import ScoringOptions
+from depthtrack.rendering.options import Objective, ScoringOptions
 from depthtrack.solver.options import PAPER_ICP, IcpOptions, LiftOptions, SurfaceFitOptions, SurfaceName, SwarmOptions
 from depthtrack.tracking.options import (
     BranchOptions,
@@ -78,6 +78,10 @@ _ROUTINE_SWARMS = SwarmSearchOptions(
 """Swarms of its routine local search."""
 
 
+_LIKELY_POSTURES = ScoringOptions(objective=Objective(posture_weight=0.04))
+"""Scoring that prefers common postures where the images leave a finger open."""
+
+
 def _check_predictions(shares: tuple[float, ...]) -> None:
     if not shares:
         raise InputError("predictions must be one or more numbers, such as 0 0.5 1, found none")
@@ -110,7 +114,7 @@ class PsoConfig:
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
@@ -123,7 +127,7 @@ class IkConfig:
 
     name: ClassVar[str] = "ik"
 
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of each frame")
     predictions: tuple[float, ...] = option(
         (0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions", least=-10, most=10
     )
@@ -158,7 +162,7 @@ class IkConfig:
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
     deadline: float | None = option(
         None,
         "Time after a frame arrives at which its pose is due: searches end before, to go on in the next frames. "
@@ -187,7 +191,7 @@ class HybridConfig:
     name: ClassVar[str] = "hybrid"
 
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=1e-4)), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of each frame")
     search_points: int = option(
         3500, "Most points that the fits of searches use; 0: no limit", unit="points", advanced=True
     )
@@ -223,7 +227,7 @@ class HybridConfig:
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
     deadline: float | None = option(
         None,
         "Time after a frame arrives at which its pose is due: searches end before, to go on in the next frames. "
@@ -307,7 +311,7 @@ class LiftConfig:
     refine: bool = option(True, "Fit the lifted pose to the surface, and keep the one with the lower energy")
     fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the lifted pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers, which the lift does not use", most=MOST_SEED)
 
     def __post_init__(self) -> None:

@@ -6,21 +6,17 @@ Sec. V), and return slowly to the mean posture. The points of visible fingers ou
 
 from functools import cache
 
-import numpy as np
-
-from depthtrack.hand.synergies import load_synergies
+from depthtrack.hand.common_postures import common_postures
 from depthtrack.solver.options import IcpOptions
 from depthtrack.solver.prior import Prior
 from depthtrack.types import Array
 
-POSTURE_SPREAD = np.radians(14.0)
-"""Standard deviation of an angle from its reconstruction by the synergies, rad."""
-
 
 @cache
-def common_postures() -> Prior:
-    """Return the normal distribution of the finger angles."""
-    return Prior.from_synergies(load_synergies(), 1.0, POSTURE_SPREAD)
+def posture_prior() -> Prior:
+    """Return the prior of the common postures, of strength 1 m^2."""
+    mean, precision = common_postures()
+    return Prior(precision, mean)
 
 
 def prior_near(angles: Array, kept: float, options: IcpOptions) -> Prior:
@@ -32,5 +28,5 @@ def prior_near(angles: Array, kept: float, options: IcpOptions) -> Prior:
     """
     if options.posture_weight == 0:
         return Prior.towards(angles, options.temporal_weight)
-    common = common_postures()
+    common = posture_prior()
     return Prior(options.posture_weight * common.precision, common.mean + kept * (angles - common.mean))

@@ -18,7 +18,7 @@ from depthtrack.rendering.target import Target
 from depthtrack.rendering.visibility import FLESH, points_in_view
 from depthtrack.solver.point_spread import point_spread
 from depthtrack.solver.prior import prior_energy
-from depthtrack.tracking.posture_prior import common_postures
+from depthtrack.tracking.posture_prior import posture_prior
 from depthtrack.types import Array, Depth, Mask
 
 LEAST = 0.0004
@@ -80,7 +80,7 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
         # Bones lie inside the fingers: none is behind an object that does not hide its finger.
         visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
     measured = visible & own & (differences < AGREES)
-    posture, uncertainty = float(np.sqrt(2 * prior_energy(pose, common_postures()))), model.shape.uncertainty
+    posture, uncertainty = float(np.sqrt(2 * prior_energy(pose, posture_prior()))), model.shape.uncertainty
     deviations = (CALIBRATED,) if uncertainty == CALIBRATED else (CALIBRATED, max(LEAST, uncertainty))
     usual, *others = keypoint_spreads(model, bodies, ends, points, measured, deviations)
     spread = others[0] if others else usual
@@ -113,7 +113,7 @@ def keypoint_spreads(
     seen = measured.reshape(-1)
     at = np.concatenate([points.reshape(-1, 3)[seen], keypoints[_PALM]])
     fixed_to = np.append(_BODIES[seen], KEYPOINT_BODIES[_PALM])
-    measurements, precision = (fixed_to, at, KEYPOINT_BODIES, keypoints), common_postures().precision
+    measurements, precision = (fixed_to, at, KEYPOINT_BODIES, keypoints), posture_prior().precision
     return [point_spread(bodies, precision, each, *measurements) for each in uncertainties]
 
 

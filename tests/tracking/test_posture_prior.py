@@ -14,7 +14,7 @@ from depthtrack.solver.options import IcpOptions, SurfaceFitOptions
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
-from depthtrack.tracking.posture_prior import common_postures, prior_near
+from depthtrack.tracking.posture_prior import posture_prior, prior_near
 from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
 
@@ -23,7 +23,7 @@ FINGERS = [slice(4 * finger, 4 * finger + 4) for finger in range(5)]
 
 
 def test_the_prior_keeps_a_share_of_the_distance_from_the_mean_posture() -> None:
-    mean, options = common_postures().mean, IcpOptions(posture_weight=1e-4)
+    mean, options = posture_prior().mean, IcpOptions(posture_weight=1e-4)
     assert prior_near(FLAT, 1.0, options).mean == pytest.approx(FLAT, abs=1e-12)
     assert prior_near(FLAT, 0.0, options).mean == pytest.approx(mean)
     assert prior_near(FLAT, 0.25, options).mean == pytest.approx(0.75 * mean)
@@ -72,7 +72,7 @@ def test_visible_fingers_are_hardly_moved() -> None:
     with closing(Toolkit(HandShape(), ScoringOptions())) as tools:
         fitter = tools.fitter(SurfaceFitOptions(surface="primitives"), observe(made, 0))
         free, held = (
-            fitter.fit(pose, prior=prior_near(common_postures().mean, 1.0, IcpOptions(posture_weight=weight)))
+            fitter.fit(pose, prior=prior_near(posture_prior().mean, 1.0, IcpOptions(posture_weight=weight)))
             for weight in (1e-9, 1e-4)
         )
     keypoints = tools.model.keypoints(np.stack([free, held]))

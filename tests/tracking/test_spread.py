@@ -14,7 +14,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.target import Target
 from depthtrack.rendering.visibility import FLESH, points_in_view
 from depthtrack.synthesis.generate import Synthesiser
-from depthtrack.tracking.posture_prior import common_postures
+from depthtrack.tracking.posture_prior import posture_prior
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.spread import (
     CLIPPED,
@@ -108,7 +108,7 @@ def test_the_spread_is_that_of_sampled_poses() -> None:
     pose, measured = posed("open"), np.ones((5, 3, 2), dtype=np.bool_)
     measured[2] = False
     spread = spread_of(pose, measured)
-    prior, draw = common_postures(), np.random.default_rng(5)
+    prior, draw = posture_prior(), np.random.default_rng(5)
     covariance = np.linalg.inv(prior.precision)
     steps = np.zeros((4000, 26))
     # Of a finger that nothing measures, the prior given the other angles remains.
@@ -149,7 +149,7 @@ def test_the_spread_is_that_of_the_dense_precision() -> None:
     bones = MODEL.point_jacobian(pose, bodies, points_of(pose).reshape(-1, 3))
     J = np.concatenate([bones[measured.ravel()], joints[[0, 1, 5, 9, 13, 17]]]).reshape(-1, 26)
     precision = J.T @ J / HAND.uncertainty**2
-    precision[6:, 6:] += common_postures().precision
+    precision[6:, 6:] += posture_prior().precision
     expected = np.sqrt(np.einsum("nki,ij,nkj->n", joints, np.linalg.inv(precision), joints))
     np.testing.assert_allclose(spread_of(pose, measured), expected, rtol=1e-9)
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
-from depthtrack.rendering.objective import Terms
+from depthtrack.rendering.objective import Terms, add_posture_terms
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raster import kernel, tiles
 from depthtrack.rendering.raster.arrays import KernelArrays
@@ -109,4 +109,5 @@ class RasterScorer(ScorerBase):
             arrays.allocate_poses(count)
         arrays.poses[:count] = poses
         self._workers.run(count, wake=count > 1 and count * (height * width + _SETUP_PIXELS) >= _WAKE_PIXELS)
+        add_posture_terms(self._objective, arrays.poses[:count], arrays.energies[:count])
         return count
