@@ -47,9 +47,11 @@ def common_postures() -> PostureDistribution:
 
 @compiled(nogil=True)
 def add_posture_costs(poses: Array, mean: Array, precision: Array, weight: float, energies: Array) -> None:
-    """Add `weight` times the squared distance of poses (B, 27) from common postures to energies (B,).
+    """Add `weight` times the squared distance of poses from common postures to energies.
 
     The distance is that of Mahalanobis, in standard deviations.
+
+    poses, energies: (B, 27) and (B,).
 
     mean, precision: (20,) and (20, 20) of `PostureDistribution`.
     """

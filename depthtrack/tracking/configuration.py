@@ -79,7 +79,7 @@ _ROUTINE_SWARMS = SwarmSearchOptions(
 
 
 _LIKELY_POSTURES = ScoringOptions(objective=Objective(posture_weight=0.04))
-"""Scoring that prefers common postures where the images leave a finger open."""
+"""Scoring of the trackers that fit surfaces: prefers common postures where the images leave a finger open."""
 
 
 def _check_predictions(shares: tuple[float, ...]) -> None:
@@ -102,7 +102,9 @@ class PsoConfig:
     widen: float = option(0.5, "Share of the last motion that widens the first generation", advanced=True)
     refine: bool = option(True, "Fit the swarm's best pose to the surface that the points lie on")
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of that surface", advanced=True)
-    final_fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the swarm's best pose", advanced=True)
+    final_fit: SurfaceFitOptions = option(
+        SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of the swarm's best pose", advanced=True
+    )
     search: GlobalSearchOptions = option(GlobalSearchOptions(resolution=64), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(), "Swarms of a search", advanced=True)
     doubt_search: SwarmSearchOptions = option(_DOUBT_SWARMS, "Swarms of the search of a doubtful frame", advanced=True)
@@ -114,7 +116,7 @@ class PsoConfig:
     keypoints: KeypointOptions = option(KeypointOptions(), "Keypoints from elsewhere", advanced=True)
     branches: BranchOptions = option(BranchOptions(), "Alternatives followed beside the pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
@@ -311,7 +313,7 @@ class LiftConfig:
     refine: bool = option(True, "Fit the lifted pose to the surface, and keep the one with the lower energy")
     fit: SurfaceFitOptions = option(SurfaceFitOptions(), "Surface fit of the lifted pose", advanced=True)
     thresholds: TrackingThresholds = option(TrackingThresholds(), "Trust in a pose", advanced=True)
-    scoring: ScoringOptions = option(_LIKELY_POSTURES, "Rendering and scoring")
+    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers, which the lift does not use", most=MOST_SEED)
 
     def __post_init__(self) -> None:
