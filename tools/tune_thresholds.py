@@ -39,6 +39,8 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
     "recovery.accept_local": (0.88, 0.93, 0.97),
     "recovery.accept_global": (0.65, 0.75, 0.85),
     "recovery.accept_finger": (0.95, 0.98, 0.99),
+    "recovery.accept_hidden": (0.7, 0.8, 0.9, 0.98),
+    "recovery.accept_shift": (0.8, 0.9, 0.98),
     "recovery.doubt_energy": (0.25, 0.3, 0.4),
     "fit.icp.posture_weight": (1e-4, 3e-4, 1e-3),
     "scoring.objective.posture_weight": (0.0, 0.02, 0.04, 0.08),

@@ -78,6 +78,8 @@ _ROUTINE_SWARMS = SwarmSearchOptions(
 """Swarms of its routine local search."""
 
 
+_POSTURE_ICP = IcpOptions(posture_weight=3e-4, keypoint_weight=0.3)
+"""Fits with a prior on the posture; keypoints weigh as much more as the prior, which they compete with."""
 _LIKELY_POSTURES = ScoringOptions(objective=Objective(posture_weight=0.04))
 """Scoring of the trackers that fit surfaces: prefers common postures where the images leave a finger open."""
 
@@ -103,7 +105,7 @@ class PsoConfig:
     refine: bool = option(True, "Fit the swarm's best pose to the surface that the points lie on")
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of that surface", advanced=True)
     final_fit: SurfaceFitOptions = option(
-        SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of the swarm's best pose", advanced=True
+        SurfaceFitOptions(icp=_POSTURE_ICP), "Surface fit of the swarm's best pose", advanced=True
     )
     search: GlobalSearchOptions = option(GlobalSearchOptions(resolution=64), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(), "Swarms of a search", advanced=True)
@@ -129,7 +131,7 @@ class IkConfig:
 
     name: ClassVar[str] = "ik"
 
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=_POSTURE_ICP), "Surface fit of each frame")
     predictions: tuple[float, ...] = option(
         (0.0, 0.5, 1.0), "Shares of the last motion that are tried as predictions", least=-10, most=10
     )
@@ -193,7 +195,7 @@ class HybridConfig:
     name: ClassVar[str] = "hybrid"
 
     surface_choice: SurfaceChoiceOptions = option(SurfaceChoiceOptions(), "Choice of the surface")
-    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4)), "Surface fit of each frame")
+    fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=_POSTURE_ICP), "Surface fit of each frame")
     search_points: int = option(
         3500, "Most points that the fits of searches use; 0: no limit", unit="points", advanced=True
     )

@@ -20,6 +20,7 @@ from depthtrack.solver.options import IcpOptions, LiftOptions, SurfaceFitOptions
 from depthtrack.solver.parallel_fits import ParallelFits
 from depthtrack.tracking.candidate import Candidate, evaluate
 from depthtrack.tracking.random import frame_generator
+from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.surfaces.registry import make_surface
 from depthtrack.tracking.timing import Deadline
@@ -133,7 +134,12 @@ class FrameContext:
         return self.state.motion_until(self.observation.timestamp)
 
     def posture_kept(self, options: IcpOptions) -> float:
-        """Return the share of the last posture's distance from the mean one that a prior keeps."""
+        """Return the share of the last posture's distance from the mean one that a prior keeps.
+
+        It keeps the posture of a given pose.
+        """
+        if self.start_pose is not None:
+            return 1.0
         if self.state.pose is None:
             return options.search_share
         return math.exp(-max(self.observation.timestamp - self.state.time, 0.0) / options.posture_memory)
@@ -159,6 +165,11 @@ class FrameContext:
         resolution: longest side in pixels; None for that of the main scorer.
         """
         return evaluate(self.tools.scorer_at(resolution, self.observation), poses)
+
+    def finger_visibility(self, pose: Array) -> Array:
+        """Return the visible share (5,) of each finger in a pose (27,)."""
+        scorer = self.tools.scorer
+        return bones_in_view(self.tools.model, pose, scorer.render(pose), scorer.target).finger_visibility
 
     def fitter(self, options: SurfaceFitOptions) -> IcpFitter:
         """Return a surface fitter for this frame.

@@ -192,7 +192,11 @@ class RecoveryOptions:
     min_angle: float = option(0.1, "Least angle between the orientations that continue; 0 for any", unit="rad")
     accept_local: float = option(0.93, "Energy ratio below which a pose of a routine local search is accepted")
     accept_global: float = option(0.75, "Energy ratio below which a pose from elsewhere is accepted")
-    accept_finger: float = option(0.98, "Energy ratio below which another finger posture is accepted; 0 tries none")
+    accept_finger: float = option(
+        0.98, "Energy ratio below which another posture of a visible finger is accepted; 0 tries none"
+    )
+    accept_hidden: float = option(0.8, "The same of a finger that is hidden but for less than `fingers.seen_share`")
+    accept_shift: float = option(0.9, "Energy ratio below which fingers shifted by one place are accepted")
     doubt_agreement: float = option(0.6, "A lower agreement triggers a local search", most=1)
     doubt_energy: float = option(0.3, "A higher energy triggers a local search", unit="clamp", most=math.inf)
 
@@ -213,6 +217,7 @@ class FingerOptions:
         None, "Longest side at which they are rendered; that of the scorer if absent", least=1
     )
     stop_early: bool = option(True, "Stop as soon as the energy is good")
+    seen_share: float = option(0.3, "Visible share of a finger from which on its posture can be seen", most=1)
     shift_iterations: int = option(
         0, "Rounds of a first, coarse fit of shifted fingers; 0: one full fit at once", most=1000
     )
@@ -286,7 +291,7 @@ class KeypointOptions:
         0.25, "Robust cost of the keypoints above which they are lifted to other poses", most=1
     )
     finger: float = option(0.5, "Robust cost of a finger's keypoints above which its lifted angles are tried", most=1)
-    accept: float = option(0.97, "Energy ratio below which a lifted pose is accepted")
+    accept: float = option(0.75, "Energy ratio below which a lifted pose is accepted")
     tie: float = option(0.1, "Share of its energy that the robust cost of 1 adds to a pose that is compared")
 
 

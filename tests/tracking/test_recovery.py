@@ -174,6 +174,37 @@ def test_fingers_take_turns(
     assert {fingers.count(finger) for finger in range(5)} == {6 // turns}
 
 
+@pytest.mark.parametrize(
+    ("visible", "energy", "accepted"),
+    [(1.0, 97.0, True), (1.0, 99.0, False), (0.1, 97.0, False), (0.1, 81.0, False), (0.1, 79.0, True)],
+)
+def test_a_hidden_finger_needs_more_evidence_for_another_posture(
+    made: Synthesiser, visible: float, energy: float, accepted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = made.poses[1]
+    monkeypatch.setattr(recover, "search_one_finger", lambda *_: Candidate(other, energy, 0.9))
+    monkeypatch.setattr(FrameContext, "finger_visibility", lambda self, pose: np.full(5, visible))
+    config, tools = HybridConfig(), Toolkit(HandShape(), HybridConfig().scoring)
+    observation = observe(made, 0)
+    tools.set_target(observation)
+    stage = recover.RefineFingers(SwarmSearch(SwarmSearchOptions(refine=False)), RecoveryOptions(), FingerOptions())
+    frame = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0)
+    found = stage(frame, [Candidate(made.poses[0], 100.0, 0.9)])[0]
+    np.testing.assert_array_equal(found.pose, other if accepted else made.poses[0])
+
+
+def test_the_visibility_of_fingers_follows_the_pose(made: Synthesiser) -> None:
+    config, tools = HybridConfig(), Toolkit(HandShape(), HybridConfig().scoring)
+    observation = observe(made, 0)
+    tools.set_target(observation)
+    frame = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0)
+    pose = made.poses[0]
+    np.testing.assert_array_equal(frame.finger_visibility(pose), 1)
+    fist = pose.copy()
+    fist[7:] = POSTURES["fist"]
+    assert frame.finger_visibility(fist).min() <= 0.5
+
+
 class _Repeated:
     """Search that returns the same energy again and again."""
 

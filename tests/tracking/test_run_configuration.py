@@ -146,6 +146,7 @@ def test_runs_of_earlier_versions_are_read() -> None:
     found = RunConfiguration.from_fields(earlier, "run.json")
     assert found.surfaces == ("skin",)
     named = {"particles": 16, "seed": 3, "interval": 0.0, "refine": True, "surface_choice.surfaces": ("skin",)}
+    named["final_fit.icp.posture_weight"] = 0.0
     expected = with_options(CONFIGURATIONS["pso"](), named)
     assert found.tracker == expected
     assert found.segmentation.skin_model == "skin.json"

@@ -59,13 +59,16 @@ class RefineFingers:
         due = self._due_turns(frame, best)
         fitter = self.search.fitter(frame)
         if fitter is not None and _SHIFTS in due:
-            best = self._accepted(best, self._shifted(frame, best, fitter))
+            shifted = self._shifted(frame, best, fitter)
+            best = shifted if shifted.energy < self.recovery.accept_shift * best.energy else best
         scorer, generator = frame.tools.scorer_at(self.options.resolution, frame.observation), self.search.random(frame)
         for finger in sorted(due - {_SHIFTS}):
             if frame.deadline.is_over or (self.options.stop_early and best.energy <= good):
                 break
             found = search_one_finger(scorer, best.pose, finger, generator, self.options)
-            best = self._accepted(best, found) if self.refit is None else self._refitted(frame, scorer, best, found)
+            if self.refit is not None:
+                found = self._refitted(frame, self.refit, scorer, best, found)
+            best = self._accepted(frame, best, found, finger)
         return [best]
 
     def _shifted(self, frame: FrameContext, best: Candidate, fitter: IcpFitter) -> Candidate:
@@ -86,21 +89,27 @@ class RefineFingers:
         turns = self.options.turns if elevated else self.options.usual_turns
         return {turn for turn in range(_SHIFTS + 1) if turn % turns == frame.observation.frame_index % turns}
 
-    def _refitted(self, frame: FrameContext, scorer: Scorer, best: Candidate, found: Candidate) -> Candidate:
-        """Return the surface fit of `found` if its energy is low enough, else `best`.
-
-        The energy of `found` at low resolution is compared first.
-        """
-        assert self.refit is not None
+    def _refitted(
+        self, frame: FrameContext, refit: SurfaceFitOptions, scorer: Scorer, best: Candidate, found: Candidate
+    ) -> Candidate:
+        """Return the surface fit of `found` if its energy is low at low resolution, else `best`."""
         if found.energy >= self.recovery.accept_finger * scorer.score(best.pose[None])[0]:
             return best
         # The prior holds the angles that no correspondence constrains near where the search found them.
-        prior = prior_near(found.pose[ANGLES], frame.posture_kept(self.refit.icp), self.refit.icp)
-        fitted = frame.fitter(self.refit).fit(found.pose, prior=prior)
-        return self._accepted(best, frame.evaluate(fitted[None])[0])
+        prior = prior_near(found.pose[ANGLES], frame.posture_kept(refit.icp), refit.icp)
+        fitted = frame.fitter(refit).fit(found.pose, prior=prior)
+        return frame.evaluate(fitted[None])[0]
 
-    def _accepted(self, best: Candidate, other: Candidate) -> Candidate:
-        return other if other.energy < self.recovery.accept_finger * best.energy else best
+    def _accepted(self, frame: FrameContext, best: Candidate, other: Candidate, finger: int) -> Candidate:
+        """Return `other` if its energy is low enough, else `best`.
+
+        A hidden finger costs nearly the same in any posture: a little less is no evidence of another one.
+        """
+        if other.energy >= self.recovery.accept_finger * best.energy:
+            return best
+        if other.energy < self.recovery.accept_hidden * best.energy:
+            return other
+        return other if frame.finger_visibility(other.pose)[finger] >= self.options.seen_share else best
 
 
 @dataclass(frozen=True)

@@ -60,5 +60,5 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
                 start=start,
             )
         ],
-        refine=[GivenPose(), replace(chosen, fit=replace(fit, hold_last=False, effort=2))],
+        refine=[GivenPose(), replace(chosen, fit=replace(fit, effort=2))],
     )

@@ -51,7 +51,7 @@ def _all_angles(config: IkConfig) -> Stages:
             CarryBranches(config.branches, config.fit),
         ],
         start=[Reinitialise(routine, config.recovery.routine, config.search, [keypoints, fingers], elsewhere, start)],
-        refine=[GivenPose(), replace(fit, hold_last=False, effort=2)],
+        refine=[GivenPose(), replace(fit, effort=2)],
     )
 
 
