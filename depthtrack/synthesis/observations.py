@@ -36,8 +36,8 @@ class ObservedMotion:
 
     @property
     def hand(self) -> HandShape:
-        """Return the true hand."""
-        return self.recording.hand
+        """Return the true hand, whose sizes are exact."""
+        return self.recording.hand.with_(uncertainty=0.0)
 
     @property
     def poses(self) -> Array:

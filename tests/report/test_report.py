@@ -146,10 +146,10 @@ def test_runs_without_labels_are_named_by_their_options(recording: Path, tmp_pat
     ]
     results = tracker_results([evaluate_run(run, residuals=False) for run in runs])
     assert [(result.label, len(result.evaluations)) for result in results] == [
-        ("PSO refine=False interval=0.0", 1),
+        ("PSO refine=False final_fit.icp.posture_weight=0.0 interval=0.0", 1),
         ("OIKONOMIDIS2011", 2),
-        ("IK interval=0.0, ik_a", 1),
-        ("IK interval=0.0, ik_b", 1),
+        ("IK posture_weight=0.0 interval=0.0 scoring.objective.posture_weight=0.0, ik_a", 1),
+        ("IK posture_weight=0.0 interval=0.0 scoring.objective.posture_weight=0.0, ik_b", 1),
     ]
 
 

@@ -14,7 +14,7 @@ from depthtrack.solver.options import IcpOptions, SurfaceFitOptions
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
-from depthtrack.tracking.posture_prior import posture_prior, prior_near
+from depthtrack.tracking.posture_prior import for_hand, posture_prior, prior_near
 from depthtrack.tracking.state import TrackState
 from tests.support.observations import observe
 
@@ -78,3 +78,13 @@ def test_visible_fingers_are_hardly_moved() -> None:
     keypoints = tools.model.keypoints(np.stack([free, held]))
     assert np.median(np.linalg.norm(keypoints[0] - keypoints[1], axis=1)) < 0.001
     assert np.isfinite(held[ANGLES]).all()
+
+
+@pytest.mark.parametrize(("uncertainty", "share"), [(0.0, 1 / 3), (0.002, 0.5), (0.004, 1.0), (0.02, 1.0)])
+def test_points_count_more_beside_the_prior_for_exact_sizes(uncertainty: float, share: float) -> None:
+    options = SurfaceFitOptions(icp=IcpOptions(posture_weight=3e-4, keypoint_weight=0.3))
+    found = for_hand(options, HandShape(uncertainty=uncertainty))
+    assert found.icp.posture_weight == pytest.approx(3e-4 * share)
+    assert found.icp.keypoint_weight == pytest.approx(0.3 * share)
+    without = SurfaceFitOptions()
+    assert for_hand(without, HandShape(uncertainty=uncertainty)) == without

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.posture_prior import for_hand
 from depthtrack.tracking.stage_tracker import Stages
 from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
@@ -26,6 +27,7 @@ def hybrid(config: HybridConfig, tools: Toolkit) -> Stages:
     The surface that the observed points lie on is chosen in each frame. The best prediction is fitted to it, then the
     best particles of a small swarm; rendering decides. Frames that fit poorly trigger searches. Branches are followed.
     """
+    config = replace(config, fit=for_hand(config.fit, tools.hand))
     fit = SurfaceFit(config.fit)
     chosen = FitChosenSurface(config.surface_choice, fit)
     limits = [limit for limit in (config.fit.max_points, config.search_points) if limit > 0]

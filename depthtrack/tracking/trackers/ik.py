@@ -6,6 +6,7 @@ from depthtrack.solver.prior import Prior
 from depthtrack.solver.subspace import PostureSubspace
 from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.posture_prior import for_hand
 from depthtrack.tracking.stage_tracker import Stages
 from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
@@ -22,6 +23,7 @@ def ik(config: IkConfig, tools: Toolkit) -> Stages:
 
     They fit all angles, all angles with a synergy prior, or synergies alone.
     """
+    config = replace(config, fit=for_hand(config.fit, tools.hand))
     if config.synergies.synergies is None:
         return _all_angles(config)
     return _synergy_prior(config, tools) if config.synergies.synergy_prior else _synergies_alone(config, tools)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from depthtrack.tracking.configuration import PsoConfig
 from depthtrack.tracking.frame import Toolkit
+from depthtrack.tracking.posture_prior import for_hand
 from depthtrack.tracking.stage_tracker import Stages
 from depthtrack.tracking.stages.branches import CarryBranches
 from depthtrack.tracking.stages.keypoint_proposals import KeypointProposals
@@ -22,6 +23,7 @@ def pso(config: PsoConfig, tools: Toolkit) -> Stages:
     The swarm starts from the last pose, its linear prediction and the observed hand. Frames that fit poorly trigger a
     search near the pose, then of single fingers; searches fit surfaces between their rounds. Branches are followed.
     """
+    config = replace(config, final_fit=for_hand(config.final_fit, tools.hand))
     search = SwarmSearch(config.swarm_search)
     fingers = RefineFingers(search, config.recovery, config.fingers)
     keypoints = KeypointProposals(config.keypoints, config.final_fit)
