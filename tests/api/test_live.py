@@ -28,8 +28,8 @@ def blind(**options: Any) -> dt.HandTracker:
 
 @pytest.mark.parametrize("name", [name for name in CONFIGURATIONS if name != "lift"])
 def test_pushed_frames_give_the_bits_of_the_command(path: Path, tmp_path: Path, name: str) -> None:
-    command = ["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1", "--hand", "truth"]
-    assert main(command) == 0
+    command = ["track", str(path), "-o", str(tmp_path / "run"), "--tracker", name, "--threads", "1"]
+    assert main([*command, "--hand", "average", "--side", "right"]) == 0
     run = dt.read_run(tmp_path / "run")
     recording = dt.open_recording(path)
     with dt.HandTracker(recording.camera, "average", name, deadline=None) as tracker:
