@@ -77,6 +77,8 @@ def _of_rows(kernel: Callable[[Array, Array, Array], None], first: ArrayLike, se
     batch = a.shape[:-1] if a.shape[:-1] == b.shape[:-1] else np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
     out = np.empty((*batch, size))
     # Copies are contiguous and writable, so that one compiled kernel takes them all.
-    a, b = (np.array(np.broadcast_to(x, (*batch, x.shape[-1])), order="C") for x in (a, b))
+    a, b = (
+        np.array(x if x.shape[:-1] == batch else np.broadcast_to(x, (*batch, x.shape[-1])), order="C") for x in (a, b)
+    )
     kernel(a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1]), out.reshape(-1, size))
     return out

@@ -30,6 +30,10 @@ from depthtrack.solver.subspace import FULL, PostureSubspace
 from depthtrack.solver.surface import Surface
 from depthtrack.types import Array
 
+_FREE = Prior.none()
+_ONE_POSTURE = PostureSubspace(np.zeros((20, 1)), np.zeros(20), np.array([-1.0]), np.array([1.0]), False)
+"""Subspace that is one posture, its mean."""
+
 
 class IcpFitter:
     """Fits one hand to observations, and holds the working memory for it.
@@ -46,7 +50,7 @@ class IcpFitter:
         self._local = local_keypoints(HandModel(shape))
         self._sight: LinesOfSight | None = None
         self._bodies, self._equations = BodyPoses.empty(), NormalEquations.empty()
-        self._twins = dict[int, Self]()
+        self._twins, self._schedules = dict[int, Self](), dict[tuple[float, ...], Schedule]()
 
     def twin(self, number: int) -> Self | None:
         """Return a fitter to the same target with its own memory; None if it has to share some.
@@ -101,7 +105,7 @@ class IcpFitter:
         options = self.options
         cloud, correspondences = (self._coarse, self._coarse_matches) if coarse else (self._cloud, self._matches)
         share = len(cloud.points) / options.reference_count
-        pull = (prior or Prior.none()).scaled(share)
+        pull = _FREE if prior is None else prior.scaled(share)
         pose = pose.copy()
         coordinates = subspace.project(pose[ANGLES])
         pose[ANGLES] = subspace.angles(coordinates)
@@ -113,7 +117,7 @@ class IcpFitter:
             options.gn_iterations, options.damping * share, options.pose_damping, options.avoid_limits
         )
         iterations = options.icp_iterations if iterations is None else iterations
-        progress = [k / max(iterations - 1, 1) for k in range(iterations)]
+        progress = tuple(k / max(iterations - 1, 1) for k in range(iterations))
         self.solution = self._solve(problem, solver, state, cloud, correspondences, progress)
         return pose
 
@@ -157,7 +161,7 @@ class IcpFitter:
         state: SolverState,
         cloud: PointCloud,
         correspondences: Correspondences,
-        progress: list[float],
+        progress: tuple[float, ...],
     ) -> Solution | None:
         """Move `state` by rounds of correspondences and Gauss-Newton.
 
@@ -169,14 +173,20 @@ class IcpFitter:
         if not progress:
             return None
         if search is not None and self._sight is None:
-            scales, cosines = np.array([self.options.annealed(share) for share in progress]).T
-            schedule = Schedule(KINDS[self.options.residual], scales, cosines)
+            schedule = self._schedule(progress)
             outcome = fit_rounds(search, correspondences, problem, solver, schedule, self._bodies, state, trace)
         else:
             for share in progress:
                 self._match(state.pose, cloud, correspondences, share)
                 outcome = solve(problem, solver, self._bodies, state, trace)
         return Solution.of(state.pose, outcome, trace)
+
+    def _schedule(self, progress: tuple[float, ...]) -> Schedule:
+        """Return the options of the rounds at some progress, made once."""
+        if progress not in self._schedules:
+            scales, cosines = np.array([self.options.annealed(share) for share in progress]).T
+            self._schedules[progress] = Schedule(KINDS[self.options.residual], scales, cosines)
+        return self._schedules[progress]
 
     def _match(self, pose: Array, cloud: PointCloud, correspondences: Correspondences, progress: float) -> None:
         """Find the correspondences of a pose (27,), and accumulate their residuals."""
@@ -197,10 +207,10 @@ class IcpFitter:
         """
         options = self.options
         if options.residual != "point":
-            fixed = PostureSubspace(np.zeros((20, 1)), pose[ANGLES].copy(), np.array([-1.0]), np.array([1.0]), False)
-            problem = Problem(self._chain, self._equations, self._points, Prior.none(), fixed)
+            fixed = _ONE_POSTURE._replace(mean=pose[ANGLES].copy())
+            problem = Problem(self._chain, self._equations, self._points, _FREE, fixed)
             solver = SolverOptions(options.gn_iterations, options.align_damping, options.pose_damping)
-            state, progress = SolverState(pose, np.zeros(1), np.zeros(1)), [0.0] * options.rigid_iterations
+            state, progress = SolverState(pose, np.zeros(1), np.zeros(1)), (0.0,) * options.rigid_iterations
             self._solve(problem, solver, state, self._coarse, self._coarse_matches, progress)
             return
         for _ in range(options.rigid_iterations):

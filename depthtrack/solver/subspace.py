@@ -44,11 +44,12 @@ class PostureSubspace(NamedTuple):
 
     def project(self, angles: Array) -> Array:
         """Return the coordinates (l,) of angles (20,), projected to the subspace and its limits."""
-        return np.clip((angles - self.mean) @ self.basis, self.lower, self.upper)
+        coordinates = angles if self.full else (angles - self.mean) @ self.basis
+        return np.minimum(np.maximum(coordinates, self.lower), self.upper)
 
     def angles(self, coordinates: Array) -> Array:
         """Return the angles (20,), rad, at coordinates (l,)."""
-        return self.mean + self.basis @ coordinates
+        return coordinates.copy() if self.full else self.mean + self.basis @ coordinates
 
 
 FULL = PostureSubspace(np.eye(20), np.zeros(20), np.array(LOWER), np.array(UPPER), True)

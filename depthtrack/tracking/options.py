@@ -239,8 +239,10 @@ class BranchOptions:
     )
     turned: int = option(32, "Postures in which the tracked hand is turned over", most=100000)
     fits: FitSearchOptions = option(
-        FitSearchOptions((FitRound(12, None, 3, coarse=True), FitRound(4, None, 6))), "Surface fits of such a search"
+        FitSearchOptions((FitRound(16, None, 2, coarse=True), FitRound(2, None, 6))), "Surface fits of such a search"
     )
+    coarse_every: int = option(16, "The coarse fits of such a search use every n-th point", least=1, most=1000)
+    hopeless: float = option(3.0, "Energy ratio to the tracked pose above which a coarse fit is not continued", least=1)
     least_distance: float = option(0.015, "Least mean distance of its joints from those of the tracked pose", unit="m")
     carried: int = option(2, "Alternatives that are followed, at most", most=1000)
     admit: float = option(1.3, "Energy ratio to the tracked pose below which an alternative is followed")

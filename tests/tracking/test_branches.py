@@ -1,5 +1,6 @@
 """Branches: a hand on a wrong branch gives way to a better one."""
 
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -14,13 +15,16 @@ from depthtrack.recording.branches import BRANCH_COLUMNS, Branch, branch_rows, r
 from depthtrack.recording.run_folder import RunWriter
 from depthtrack.recording.run_rows import RunRow, read_rows
 from depthtrack.recording.run_tables import rewrite_table
+from depthtrack.rendering.scorer import Scores
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesiser
+from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, PsoConfig
-from depthtrack.tracking.options import BranchOptions
+from depthtrack.tracking.options import BranchOptions, FitRound
 from depthtrack.tracking.pipeline import estimates_of
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stages.branches import PALM_AND_BACK, moved_along, turned
+from depthtrack.tracking.stages.coarse_to_fine import run_rounds
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 from tests.support.hands import random_pose
@@ -75,7 +79,7 @@ def test_a_tracker_goes_on_with_the_branches_of_a_run_folder(
     made: Synthesiser, observations: list[Observation], tmp_path: Path
 ) -> None:
     """All alternatives are followed, and none is accepted."""
-    kept = BranchOptions(admit=100, give_up=100, accept_late=100, accept=0, accept_at_once=0)
+    kept = BranchOptions(hopeless=100, admit=100, give_up=100, accept_late=100, accept=0, accept_at_once=0)
     hand, config = made.options.hand, HybridConfig(branches=kept)
     with closing(create_tracker(config, hand)) as whole, closing(create_tracker(config, hand)) as cut:
         estimates = [whole.start(observations[0], made.poses[FIRST]), *map(whole.track, observations[1:])]
@@ -123,6 +127,34 @@ def test_moving_along_keeps_one_pose_relative_to_the_other() -> None:
     moved = moved_along(pose, before, after)
     assert np.allclose(np.linalg.inv(palm(before)) @ palm(pose), np.linalg.inv(palm(after)) @ palm(moved))
     assert np.allclose(moved_along(pose, before, before), pose)
+
+
+class FitToPosition:
+    """A fitter and a scorer: fits add 1 to the first number of a pose, which is its energy."""
+
+    def __init__(self) -> None:
+        self.fitted = list[float]()
+
+    def fit_each(self, fitter: object, poses: list[Array], *others: object) -> list[Array]:
+        self.fitted += [float(pose[0]) for pose in poses]
+        return [pose + np.eye(27)[0] for pose in poses]
+
+    def evaluate(self, poses: Array) -> Scores:
+        return Scores(poses[:, 0], np.ones(len(poses)))
+
+
+def test_a_search_fits_no_pose_again_that_does_not_go_on() -> None:
+    starts = [Candidate(energy * np.eye(27)[0], energy, 1.0) for energy in (1.0, 2.0, 3.0)]
+    double = FitToPosition()
+    rounds = FitRound(3, None, 1, coarse=True), FitRound(2, None, 1)
+
+    def search(goes_on: Callable[[Candidate], bool]) -> list[float]:
+        found = run_rounds(double, double, double, starts, None, rounds, 1.0, goes_on=goes_on)  # type: ignore[arg-type]
+        return [each.energy for each in found]
+
+    assert search(lambda found: found.energy >= 3) == [4, 5]
+    assert double.fitted == [1, 2, 3, 3, 4]
+    assert search(lambda found: False) == []
 
 
 def test_branches_are_read_as_written(tmp_path: Path) -> None:

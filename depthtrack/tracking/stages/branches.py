@@ -5,7 +5,7 @@ start, and then once per `interval`, a search proposes other hands. Those that f
 are followed beside it, and their energies over time decide.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,8 +91,13 @@ class CarryBranches:
         arm = observation.arm_direction if options.search.follow_arm else None
         anywhere = orientation_proposals(observation.centre, angles, generator, arm, options.search)
         poses = np.concatenate([turned(best.pose, angles[: options.turned]), anywhere])
-        search = FitSearch(options.fits, self.fit)
-        chosen = [best]
+        fit = replace(self.fit, icp=replace(self.fit.icp, coarse_every=options.coarse_every))
+        limit = options.hopeless * best.energy
+
+        def goes_on(found: Candidate) -> bool:
+            return found.energy <= limit and self._is_distinct(frame, found, best)
+
+        search, chosen = FitSearch(options.fits, fit, goes_on), [best]
         for found in search.improve(frame, frame.evaluate(poses, options.search.resolution), options.search.min_angle):
             near = found.energy <= options.admit * best.energy
             if near and all(self._is_distinct(frame, found, other) for other in chosen):

@@ -4,7 +4,7 @@ A single descent depends on its start. Several postures therefore continue from 
 rendered energy decides which.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -92,11 +92,13 @@ def run_rounds(
     rounds: Sequence[FitRound],
     kept: float,
     deadline: Deadline | None = None,
+    goes_on: Callable[[Candidate], bool] | None = None,
 ) -> list[Candidate]:
     """Return candidates, best first, after all rounds from `starts`, best first.
 
     kept: share of a posture's distance from the mean one that the prior of a round keeps.
     deadline: time at which the rounds end; candidates that were not fitted by then stay as they are.
+    goes_on: whether a fitted candidate is worth another round; the others are left out. None for all.
 
     A round of all angles holds the angles that the observation does not constrain near where the synergies led.
     """
@@ -108,6 +110,7 @@ def run_rounds(
         if not poses:
             break
         starts = by_energy([*evaluate(scorer, np.stack(poses)), *chosen[len(poses) :]])
+        starts = starts if goes_on is None else list(filter(goes_on, starts))
     return starts
 
 

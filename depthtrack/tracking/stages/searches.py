@@ -1,5 +1,6 @@
 """Searches that improve many start poses: by swarms, or by surface fits from coarse to fine."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -83,10 +84,14 @@ def swarm_search(
 
 @dataclass(frozen=True)
 class FitSearch:
-    """Search by rounds of surface fits of fewer poses."""
+    """Search by rounds of surface fits of fewer poses.
+
+    goes_on: whether a fitted pose is worth another round; None for all.
+    """
 
     options: FitSearchOptions
     surface: SurfaceFitOptions
+    goes_on: Callable[[Candidate], bool] | None = None
 
     def improve(self, frame: FrameContext, starts: list[Candidate], min_angle: float) -> list[Candidate]:
         keep = self.options.rounds[0].keep
@@ -94,7 +99,9 @@ class FitSearch:
             starts = [starts[i] for i in distinct_orientations(poses_of(starts), min_angle, keep)]
         tools, kept = frame.tools, frame.posture_kept(self.surface.icp)
         fitter, rounds = frame.fitter(self.surface), self.options.rounds
-        return run_rounds(fitter, tools.fits, tools.scorer, starts, tools.synergies, rounds, kept, frame.deadline)
+        return run_rounds(
+            fitter, tools.fits, tools.scorer, starts, tools.synergies, rounds, kept, frame.deadline, self.goes_on
+        )
 
     def fitter(self, frame: FrameContext) -> IcpFitter | None:
         return frame.fitter(self.surface)
