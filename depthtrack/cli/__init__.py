@@ -1,5 +1,6 @@
 """Command line: parse, call, print. Each command is one module, imported on its call."""
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -57,6 +58,8 @@ COMMANDS = {
 }
 
 _HELP = ("-h", "--help", "help")
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Variables of the libraries that numpy and scipy multiply matrices with; read when numpy is imported."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,6 +130,7 @@ def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, argumen
     if name not in commands:
         raise DepthtrackError(f"there is no command '{name}': choose one of {', '.join(commands)}")
     entry, prog = commands[name], f"{prog} {name}"
+    _multiply_in_one_thread()
     module = import_module(entry.module)
     if not hasattr(module, "COMMANDS"):
         from depthtrack.cli.argument_checks import check_arguments
@@ -140,6 +144,16 @@ def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, argumen
         print(_overview(f"{prog}: {entry.summary}", prog, module.COMMANDS))
     else:
         _run_one(module.COMMANDS, prog, arguments[0], arguments[1:])
+
+
+def _multiply_in_one_thread() -> None:
+    """Let numpy and scipy multiply matrices in the calling thread, unless the user chose a number of threads.
+
+    Matrices here are small. The threads of a BLAS wait for each other longer than they compute, and without sleep.
+    """
+    if "numpy" not in sys.modules:
+        for variable in _BLAS_THREADS:
+            os.environ.setdefault(variable, "1")
 
 
 def _parse(module: ModuleType, prog: str, arguments: list[str]) -> "RunnableCommand":

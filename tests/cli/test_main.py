@@ -1,5 +1,6 @@
 """Test the command line as a whole: overview, help, errors in one sentence, exit codes."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -126,3 +127,18 @@ def test_control_characters_are_escaped(capsys: pytest.CaptureFixture[str]) -> N
     error = capsys.readouterr().err
     assert "\\x1b[31mname\\x07" in error
     assert "\x1b" not in error
+
+
+@pytest.mark.parametrize("chosen", [None, "3"])
+def test_matrices_are_multiplied_in_one_thread_unless_the_user_chose(chosen: str | None) -> None:
+    variable = "OPENBLAS_NUM_THREADS"
+    others = {name: value for name, value in os.environ.items() if name != variable}
+    code = f"import os; from depthtrack.cli import main; main(['info', 'absent']); print(os.environ['{variable}'])"
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env=others if chosen is None else {**others, variable: chosen},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split() == [chosen or "1"]
