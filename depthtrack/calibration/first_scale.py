@@ -5,6 +5,7 @@ in a few frames. Hands of other sizes are fitted from its poses. The median ener
 for hands of both sides.
 """
 
+from collections.abc import Callable
 from contextlib import closing
 
 import numpy as np
@@ -31,8 +32,27 @@ def first_scale(source: CalibrationSource, side: Side = "right") -> float:
     started = _starts(source, HandShape(side=side))
     if len(started) < source.options.fewest:
         return 1.0
-    energies = [_median_energy(source, HandShape(side=side, scale=scale), started) for scale in scales]
-    return float(np.exp(lowest_of_parabola(np.log(scales), np.array(energies))))
+    energies = around_lowest(
+        len(scales),
+        int(np.argmin(np.abs(np.log(scales)))),
+        lambda number: _median_energy(source, HandShape(side=side, scale=scales[number]), started),
+    )
+    tried = sorted(energies)
+    return float(np.exp(lowest_of_parabola(np.log(scales)[tried], np.array([energies[n] for n in tried]))))
+
+
+def around_lowest(count: int, first: int, energy: Callable[[int], float]) -> dict[int, float]:
+    """Return the energies of some of the numbers 0 to `count` - 1: of a minimum and of both its neighbours.
+
+    first: number near which the minimum is; the search goes downhill from it.
+    """
+    energies = {number: energy(number) for number in range(max(first - 1, 0), min(first + 2, count))}
+    while True:
+        lowest = min(energies, key=energies.__getitem__)
+        absent = [n for n in (lowest - 1, lowest + 1) if 0 <= n < count and n not in energies]
+        if not absent:
+            return energies
+        energies |= {number: energy(number) for number in absent}
 
 
 def lowest_of_parabola(x: Array, y: Array) -> float:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.calibration.first_scale import first_scale, lowest_of_parabola
+from depthtrack.calibration.first_scale import around_lowest, first_scale, lowest_of_parabola
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.hand.shape import HandShape, Side
@@ -30,6 +30,19 @@ def test_the_lowest_place_of_a_parabola(place: float, curvature: float, samples:
         assert found == pytest.approx(place, abs=1e-6)
     else:
         assert found == x[lowest]
+
+
+@given(energies=st.lists(st.floats(0, 1), min_size=2, max_size=8, unique=True), data=st.data())
+def test_a_minimum_is_compared_with_its_neighbours(energies: list[float], data: st.DataObject) -> None:
+    count, place = len(energies), data.draw(st.integers(0, len(energies) - 1))
+    valley = sorted(energies[:place], reverse=True) + sorted(energies[place:])  # falls, then rises
+    first = data.draw(st.integers(0, count - 1))
+    for y in (energies, valley):
+        found = around_lowest(count, first, y.__getitem__)
+        lowest = min(found, key=y.__getitem__)
+        assert {lowest - 1, lowest, lowest + 1} & set(range(count)) <= set(found)
+        assert found == {number: y[number] for number in found}
+    assert valley[lowest] == min(valley)
 
 
 @pytest.mark.slow
