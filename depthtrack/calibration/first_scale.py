@@ -42,7 +42,9 @@ def first_scale(source: CalibrationSource, side: Side = "right") -> float:
 
 
 def around_lowest(count: int, first: int, energy: Callable[[int], float]) -> dict[int, float]:
-    """Return the energies of some of the numbers 0 to `count` - 1: of a minimum and of both its neighbours.
+    """Return the energies of a minimum, its neighbours and others on the way to it.
+
+    They have the numbers 0 to `count` - 1.
 
     first: number near which the minimum is; the search goes downhill from it.
     """
