@@ -147,7 +147,7 @@ def _run_one(commands: Mapping[str, CommandEntry], prog: str, name: str, argumen
 
 
 def _multiply_in_one_thread() -> None:
-    """Let numpy and scipy multiply matrices in the calling thread, unless the user chose a number of threads.
+    """Set one thread for the products of numpy and scipy, unless the user chose a number.
 
     Matrices here are small. The threads of a BLAS wait for each other longer than they compute, and without sleep.
     """
