@@ -109,7 +109,7 @@ def as_batch(poses: ArrayLike) -> Array:
     batch = np.ascontiguousarray(poses, dtype=np.float64)
     if batch.ndim != 2 or batch.shape[1] != POSE_SIZE:
         raise ValueError(f"poses must be (B, {POSE_SIZE}), found {batch.shape}")
-    # Squares add to a finite number unless one is not finite, or huge.
-    if not math.isfinite(np.dot(batch.ravel(), batch.ravel())) and not np.isfinite(batch).all():
+    # Numbers add to a finite one unless one is not finite, or huge. A product would wake the threads of a BLAS.
+    if not math.isfinite(batch.sum()) and not np.isfinite(batch).all():
         raise ValueError("poses must be finite numbers")
     return batch
