@@ -229,6 +229,7 @@ class TrackState:
         limits = self._thresholds
         if self.pose is None or self._agreement < limits.guide_agreement or self.is_stale(timestamp):
             return None
-        if self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy:
+        high = self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy
+        if high and not self._confidence >= limits.guide_confidence:
             return None
         return retract(self.pose, self.motion_until(timestamp))
