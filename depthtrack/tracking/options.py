@@ -67,7 +67,7 @@ class TrackingThresholds:
         most=math.inf,
     )
     start_confidence: float = option(
-        0.6,
+        0.4,
         "A start with a lower confidence tries other places of the hand; 0: never",
         source="single frames of the tuning seeds 0 to 5 of the cross-model benchmark",
         most=1,
