@@ -45,8 +45,8 @@ class TrackingThresholds:
     lost_ratio: float = option(2.0, "Multiple of the median energy that a trusted pose may have")
     guide_agreement: float = option(0.6, "Least agreement of a pose that guides the segmentation", most=1)
     guide_ratio: float = option(1.3, "Multiple of the median energy that a guiding pose may have")
-    guide_confidence: float = option(
-        0.5, "Confidence from which on a pose guides the segmentation whatever its energy", most=1
+    sure_confidence: float = option(
+        0.3, "Confidence from which on a pose is trusted, and guides the segmentation, whatever its energy", most=1
     )
     median_frames: int = option(30, "Trusted frames that the median energy is taken over", unit="frames", least=1)
     memory: float = option(0.5, "Time after a loss in which the hand is searched near its last pose", unit="s")

@@ -84,9 +84,11 @@ class TrackState:
 
         confidence: NaN if unknown.
         """
-        if confidence < self._thresholds.confidence:
+        limits = self._thresholds
+        if confidence < limits.confidence:
             return True
-        return self.is_beyond(energy, agreement, self._thresholds.energy, self._thresholds.agreement)
+        most_energy = math.inf if confidence >= limits.sure_confidence else limits.energy
+        return self.is_beyond(energy, agreement, most_energy, limits.agreement)
 
     def is_beyond(self, energy: float, agreement: float, most_energy: float, least_agreement: float) -> bool:
         """Return whether the agreement is too low or the energy too high.
@@ -230,6 +232,6 @@ class TrackState:
         if self.pose is None or self._agreement < limits.guide_agreement or self.is_stale(timestamp):
             return None
         high = self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy
-        if high and not self._confidence >= limits.guide_confidence:
+        if high and not self._confidence >= limits.sure_confidence:
             return None
         return retract(self.pose, self.motion_until(timestamp))

@@ -89,6 +89,30 @@ def test_a_track_is_lost_by_the_confidence_of_two_frames(first: float, second: f
     assert state.commit(pose, 4.0, 0.9, Status.TRACKED, {}, 0.03, second).status is status
 
 
+@pytest.mark.parametrize(
+    ("energy", "confidence", "status", "guides"),
+    [
+        (7.9, 0.1, Status.TRACKED, True),
+        (30.0, 0.1, Status.TRACKED, False),
+        (30.0, 0.3, Status.TRACKED, True),
+        (41.0, 0.1, Status.LOST, False),
+        (41.0, 0.3, Status.TRACKED, True),
+        (30.0, math.nan, Status.TRACKED, False),
+        (41.0, math.nan, Status.LOST, False),
+    ],
+)
+def test_a_confident_pose_is_trusted_and_guides_whatever_its_energy(
+    energy: float, confidence: float, status: Status, guides: bool
+) -> None:
+    """The energy of a hand that is partly hidden exceeds twice its median in right poses."""
+    thresholds = TrackingThresholds(energy=0.4, lost_ratio=2.0, guide_ratio=1.3, sure_confidence=0.3)
+    state, pose = TrackState(thresholds, 40.0), make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
+    for frame in range(3):
+        state.commit(pose, 20.0, 0.9, Status.TRACKED, {}, frame / 30, confidence)
+    assert state.commit(pose, energy, 0.9, Status.TRACKED, {}, 0.1, confidence).status is status
+    assert (state.predicted_pose(0.13) is not None) == guides
+
+
 def test_a_start_of_low_confidence_is_lost() -> None:
     state, pose = TrackState(TrackingThresholds(), 40.0), make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
     assert state.commit(pose, 4.0, 0.9, Status.STARTED, {}, 0.0, 0.02).status is Status.LOST
