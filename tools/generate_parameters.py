@@ -26,6 +26,7 @@ from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.reconstruction import ReconstructionOptions
 from depthtrack.options import Parameter, parameters
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.backward_pass import BackwardOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER
 
 ROOT = Path(__file__).parents[1]
@@ -58,6 +59,10 @@ def page() -> str:
         "Entries of `segmentation` in `run.json`, and options of `track` and `segment`. The short forms are\n"
         "`--skin-model`, `--skin-from` and `--wrist-margin` (in millimetres).\n",
         _table(parameters(SegmentationOptions()), flag=True, prefix="segmentation."),
+        "## Backward pass\n",
+        "Entries of `backward` in `run.json`. `track --backward yes` or `no` choose whether there is one; its options\n"
+        "are fields of `BackwardOptions` in Python.\n",
+        _table(parameters(BackwardOptions()), flag=False),
         "## Labelling of optical markers\n",
         "Options of `markers label` and `markers solve` with `--method offline`, in `markers.json` under `labelling`;\n"
         "fields of `LabellingOptions` in Python. `online` and `paper` are other defaults of the same options.\n",

@@ -24,6 +24,7 @@ from depthtrack.hand.one_euro import OneEuroOptions
 from depthtrack.machine import usable_cores
 from depthtrack.recording.run_folder import Run
 from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.tracking.backward_pass import BackwardOptions, chosen_backward
 from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
 from depthtrack.tracking.pipeline import TrackedFrame
 from depthtrack.tracking.run import TrackingRun, check_run, configure
@@ -43,6 +44,7 @@ def track(
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
     keypoints: Path | str | None = None,
+    backward: bool | BackwardOptions | None = None,
 ) -> Iterator[TrackedFrame]: ...
 
 
@@ -59,6 +61,7 @@ def track(
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
     keypoints: Path | str | None = None,
+    backward: bool | BackwardOptions | None = None,
 ) -> Run: ...
 
 
@@ -74,6 +77,7 @@ def track(
     segmentation: SegmentationOptions | None = None,
     threads: int | None = None,
     keypoints: Path | str | None = None,
+    backward: bool | BackwardOptions | None = None,
 ) -> Iterator[TrackedFrame] | Run:
     """Track the hand of a recording; the poses are those of `depthtrack track`.
 
@@ -87,6 +91,9 @@ def track(
     segmentation: how the hand is found in a frame.
     threads: threads of renderer and fits, one per core if absent; poses do not depend on it.
     keypoints: path of a file of 2D keypoints from another detector (docs/keypoints.md).
+    backward: track doubtful stretches of the written run backwards as well, from the confident pose after them, or
+        the options of that. The default is yes, but not with a deadline or a tracker of the papers. Yielded frames are
+        tracked forward alone.
 
     Returns:
         The run if `out` is given, else an iterator over tracked frames. Poses (27,) are metres, quaternion and radians
@@ -100,17 +107,18 @@ def track(
             print(each.frame.timestamp, each.estimate.status, each.estimate.pose)
         run = depthtrack.track("my-hand", "hand.json", out="my-run")
     """
-    sequence, threads = to_track(recording), threads or usable_cores()
+    sequence, threads, config = to_track(recording), threads or usable_cores(), as_config(tracker)
     configuration = configure(
         path_of(sequence),
         sequence,
-        as_config(tracker),
+        config,
         open_hand(hand, sequence),
         segmentation,
         start=start,
         frames=frames,
         on_damage=on_damage_of(sequence),
         keypoints=None if keypoints is None else str(Path(keypoints).resolve()),
+        backward=chosen_backward(backward, config),
     )
     if hand is None:
         check_run(configuration, sequence, None if out is None else Path(out), resume)

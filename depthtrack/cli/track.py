@@ -24,6 +24,7 @@ from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
     from depthtrack.recording.sequence import Sequence as Recording
+    from depthtrack.tracking.backward_pass import BackwardOptions
     from depthtrack.tracking.run_configuration import RunConfiguration
 
 
@@ -51,6 +52,9 @@ class TrackCommand:
     """Track only the first N frames."""
     keypoints: Annotated[Path | None, stated_default(metavar="FILE.csv")] = None
     """2D keypoints of the hand from another detector (docs/keypoints.md)."""
+    backward: Literal["auto", "yes", "no"] = "auto"
+    """Track doubtful stretches backwards as well, from the confident pose after them. `auto` does so, but not with a
+    deadline or a tracker of the papers; with --config it does as that run did."""
     resume: bool = False
     """Continue the run that the folder holds."""
     threads: Annotated[int | None, number(1, 1024, metavar="N")] = None
@@ -85,7 +89,11 @@ class TrackCommand:
         ):
             shown.set_postfix_str("the first use compiles kernels")
             times = []
-            for each in run.write(self.out, resume=self.resume):
+            for each in run.write(
+                self.out,
+                self.resume,
+                lambda done, total: shown.set_postfix_str(f"backwards {done} of {total} doubtful frames"),
+            ):
                 times.append(perf_counter())
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
@@ -137,11 +145,22 @@ class TrackCommand:
             frames=self.frames,
             on_damage=self.recording.on_damage,
             keypoints=None if self.keypoints is None else str(self.keypoints.resolve()),
+            backward=self._backward(tracker),
         )
         # To measure the hand takes long, so everything else is checked before.
         check_run(configuration, sequence, self.out, self.resume)
         compile_for_first_use()
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
+
+    def _backward(self, tracker: TrackerConfig) -> "BackwardOptions | None":
+        """Return the options of the backward pass: of the run that is repeated, or the usual ones."""
+        from depthtrack.tracking.backward_pass import chosen_backward
+
+        stored = None if self.config is None else _load(self.config).backward
+        if self.backward == "auto" and self.config is not None:
+            return stored
+        choice = {"auto": None, "yes": stored or True, "no": False}[self.backward]
+        return chosen_backward(choice, tracker)
 
     def _report(self, sequence: "Recording", rate: str) -> None:
         import numpy as np

@@ -3,12 +3,13 @@
 `run.json` holds the configuration of the run. `poses.csv` has a row a frame: index, timestamp, status, energy,
 agreement, confidence, visibility of each finger, the pose, and the spread of each keypoint. The cells of a pose are
 empty if there is none. `timings.csv` has the milliseconds of each stage, `branches.csv` the alternatives to the pose.
-`failures.csv` lists frames in which something failed unexpectedly, if there are any.
+`failures.csv` lists frames in which something failed unexpectedly, if there are any. If poses of the backward pass
+replace some of the forward ones, `forward.csv` holds the rows before that.
 Poses of a resumed run are bitwise those of an uninterrupted one.
 """
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,15 +26,22 @@ from depthtrack.number_text import parse_numbers
 from depthtrack.outputs import locked
 from depthtrack.recording.branches import BRANCH_COLUMNS, branch_rows
 from depthtrack.recording.frame_failures import append_failure, keep_failures, read_failures
-from depthtrack.recording.run_rows import ROW_COLUMNS, RunRow, read_rows, row_cells
+from depthtrack.recording.run_rows import FORWARD_FILE, ROW_COLUMNS, RunRow, read_rows, row_cells
 from depthtrack.recording.run_tables import read_table, rewrite_table
 from depthtrack.recording.status import Status
 from depthtrack.strict_data import exact_json_text, parse_json
 from depthtrack.types import Array, Index
 
+BACKWARD_STAGE = "backward"
+"""Column of the milliseconds of the backward pass."""
+
 
 class RunWriter(Closing):
-    """Appends frames to a run folder; every row is complete on disk before the next is written."""
+    """Appends frames to a run folder; every row is complete on disk before the next is written.
+
+    rows: of the frames so far, tracked forward.
+    revised: whether poses of the backward pass have replaced some of them in `poses.csv`.
+    """
 
     def __init__(
         self, folder: Path, configuration: dict[str, Any], stages: Sequence[str], resume: bool = False
@@ -49,6 +57,7 @@ class RunWriter(Closing):
         self.folder = folder
         self._stages = tuple(stages)
         self.rows: list[RunRow] = []
+        self.revised = False
         check_unused(folder, resume)
         folder.mkdir(parents=True, exist_ok=True)
         with ExitStack() as stack:
@@ -70,12 +79,16 @@ class RunWriter(Closing):
             if before.get("on_damage") != configuration.get("on_damage"):
                 write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
+            if (folder / FORWARD_FILE).exists():
+                forward = read_rows(folder, FORWARD_FILE)
+                self.revised = list(map(row_cells, forward)) != list(map(row_cells, self.rows))
+                if self.revised:
+                    return
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
             kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
             rewrite_table(folder / "timings.csv", ("index", *self._stages), kept)
             keep_failures(folder, frozenset(row.index for row in self.rows))
-            branches = [cells for row in self.rows for cells in branch_rows(row.index, row.branches)]
-            rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, branches)
+            rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, _branches(self.rows))
         else:
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, ())
             rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
@@ -98,6 +111,26 @@ class RunWriter(Closing):
         csv.writer(self._poses).writerow(row_cells(row))
         self._poses.flush()
         self.rows.append(row)
+
+    def revise(self, rows: Mapping[int, RunRow], milliseconds: Mapping[int, float]) -> None:
+        """Replace rows of the complete run by those of the backward pass, by their place.
+
+        milliseconds: of the frames that were tracked backwards, by their place.
+        """
+        if not milliseconds:
+            return
+        timings = read_table(self.folder / "timings.csv", ("index", *self._stages))
+        for place, duration in milliseconds.items():
+            timings[place][1 + self._stages.index(BACKWARD_STAGE)] = f"{duration:.3f}"
+        rewrite_table(self.folder / "timings.csv", ("index", *self._stages), timings)
+        if not rows:
+            return
+        revised = [rows.get(place, row) for place, row in enumerate(self.rows)]
+        # The poses last: until then, a resumed run begins the backward pass anew.
+        rewrite_table(self.folder / FORWARD_FILE, ROW_COLUMNS, map(row_cells, self.rows))
+        rewrite_table(self.folder / "branches.csv", BRANCH_COLUMNS, _branches(revised))
+        rewrite_table(self.folder / "poses.csv", ROW_COLUMNS, map(row_cells, revised))
+        self.revised = True
 
     def close(self) -> None:
         """Close the files, and free the folder for other processes."""
@@ -156,6 +189,11 @@ class Run:
             _read_timings(folder / "timings.csv", len(rows)),
             read_failures(folder),
         )
+
+
+def _branches(rows: Iterable[RunRow]) -> list[list[str]]:
+    """Return the cells of the branches of rows."""
+    return [cells for row in rows for cells in branch_rows(row.index, row.branches)]
 
 
 def read_configuration(folder: Path) -> dict[str, Any]:

@@ -23,6 +23,8 @@ VISIBILITY_COLUMNS = tuple(f"{finger}_visible" for finger in FINGERS)
 SPREAD_COLUMNS = tuple(f"{point}_spread" for point in KEYPOINT_NAMES)
 _COLUMNS_WITHOUT_SPREAD = (*_EARLIER_COLUMNS[:4], "agreement", "confidence", *VISIBILITY_COLUMNS, *POSE_NAMES)
 ROW_COLUMNS = (*_COLUMNS_WITHOUT_SPREAD, *SPREAD_COLUMNS)
+FORWARD_FILE = "forward.csv"
+"""The rows before poses of the backward pass replaced some of them."""
 UNKNOWN_VISIBILITY = (math.nan,) * len(FINGERS)
 UNKNOWN_SPREAD = (math.nan,) * len(KEYPOINT_NAMES)
 _LARGEST = 100.0
@@ -58,13 +60,13 @@ class RunRow:
     branches: tuple[Branch, ...] = ()
 
 
-def read_rows(folder: Path) -> list[RunRow]:
-    """Return the complete rows of `poses.csv`; a truncated last row is left out.
+def read_rows(folder: Path, name: str = "poses.csv") -> list[RunRow]:
+    """Return the complete rows of a table of poses; a truncated last row is left out.
 
     Raises:
         InputError: if a row is malformed, or holds values that no tracker writes.
     """
-    path = folder / "poses.csv"
+    path = folder / name
     header = header_of(path)
     columns = header if header in (_EARLIER_COLUMNS, _COLUMNS_WITHOUT_SPREAD) else ROW_COLUMNS
     branches, rows = read_branches(folder / "branches.csv"), list[RunRow]()

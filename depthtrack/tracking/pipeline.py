@@ -147,21 +147,25 @@ def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[Track
     for number, each in enumerate(tracked):
         if number < held:
             continue
-        frame, estimate = each.frame, each.estimate
-        row = RunRow(
-            frame.index,
-            frame.timestamp,
-            estimate.status,
-            estimate.energy,
-            estimate.agreement,
-            estimate.pose,
-            estimate.confidence,
-            estimate.visibility,
-            estimate.spread,
-            estimate.branches,
-        )
-        run.append(row, {"segment": each.segment_ms, **estimate.stage_ms}, each.failure)
+        row = row_of(each.frame.index, replace(each.estimate, timestamp=each.frame.timestamp))
+        run.append(row, {"segment": each.segment_ms, **each.estimate.stage_ms}, each.failure)
         yield each
+
+
+def row_of(index: int, estimate: Estimate) -> RunRow:
+    """Return the row of a frame in a run folder."""
+    return RunRow(
+        index,
+        estimate.timestamp,
+        estimate.status,
+        estimate.energy,
+        estimate.agreement,
+        estimate.pose,
+        estimate.confidence,
+        estimate.visibility,
+        estimate.spread,
+        estimate.branches,
+    )
 
 
 def estimates_of(rows: Iterable[RunRow]) -> list[Estimate]:

@@ -1,7 +1,8 @@
 """One run: a recording, its configuration, and the pipeline that tracks it."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
 from depthtrack.recording.registry import reading_of
-from depthtrack.recording.run_folder import RunWriter, check_unused
+from depthtrack.recording.run_folder import BACKWARD_STAGE, RunWriter, check_unused
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.strict_data import parse_json
-from depthtrack.tracking.configuration import LiftConfig, TrackerConfig
-from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, track_frames, write_run
+from depthtrack.tracking.backward_pass import BackwardOptions, doubtful_stretches, track_backwards
+from depthtrack.tracking.configuration import LiftConfig, MarkersConfig, TrackerConfig
+from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, row_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.run_configuration import RunConfiguration, camera_fields, versions
 from depthtrack.tracking.tracker import Tracker
@@ -35,7 +37,7 @@ def configure(
 ) -> RunConfiguration:
     """Return the configuration of a run of the recording at `path`, read as `sequence` was.
 
-    entries: `start`, `frames`, `on_damage` and `keypoints` of `RunConfiguration`, if not the defaults.
+    entries: `start`, `frames`, `on_damage`, `keypoints` and `backward` of `RunConfiguration`, if not the defaults.
     """
     place = str(path.resolve())
     if not is_text(place):
@@ -79,7 +81,8 @@ class TrackingRun(Closing):
         if named is None and isinstance(configuration.tracker, LiftConfig):
             raise InputError("the tracker lift must have keypoints, found none: give --keypoints FILE.csv")
         self._keypoints = None if named is None else read_keypoints(Path(named))
-        self.tracker = wrap(create_tracker(configuration.tracker, self.hand, threads))
+        self._create: Callable[[], Tracker] = lambda: wrap(create_tracker(configuration.tracker, self.hand, threads))
+        self.tracker = self._create()
 
     def __len__(self) -> int:
         """Return the number of frames to track."""
@@ -87,33 +90,62 @@ class TrackingRun(Closing):
         return length if frames is None else min(frames, length)
 
     def track(self) -> Iterator[TrackedFrame]:
-        """Yield each frame as it is tracked."""
+        """Yield each frame as it is tracked, forward alone."""
         return track_frames(self._frames(), self._pipeline(self._start_pose))
 
-    def write(self, folder: Path, resume: bool = False) -> Iterator[TrackedFrame]:
-        """Yield each frame after it is tracked and appended to a run folder.
+    def write(
+        self, folder: Path, resume: bool = False, progress: Callable[[int, int], None] | None = None
+    ) -> Iterator[TrackedFrame]:
+        """Yield each frame after it is tracked and appended to a run folder; then track backwards.
 
         resume: track only the frames that the folder lacks.
+        progress: called with the numbers of frames that are tracked backwards, and that will be.
 
         Raises:
             InputError: if the folder holds another run, or a run and `resume` is false.
         """
-        fields = self.configuration.to_fields()
-        with RunWriter(folder, fields, ("segment", *self.tracker.stages), resume) as run:
+        fields, backward = self.configuration.to_fields(), self.configuration.backward
+        stages = ("segment", *self.tracker.stages, *(() if backward is None else (BACKWARD_STAGE,)))
+        with RunWriter(folder, fields, stages, resume) as run:
+            if run.revised:
+                return
             known = estimates_of(run.rows)
             awaiting = all(estimate.pose is None for estimate in known)
             pipeline = self._pipeline(self._start_pose if awaiting else None)
             yield from write_run(track_frames(self._frames(), pipeline, known), run)
+            if backward is not None:
+                self._track_backwards(run, backward, progress)
 
-    def _frames(self) -> Iterator[Frame]:
-        frames: Iterator[Frame] = islice(self.sequence, len(self))
+    def _track_backwards(
+        self, run: RunWriter, options: BackwardOptions, progress: Callable[[int, int], None] | None
+    ) -> None:
+        """Track the doubtful stretches of a run backwards, and write what is better so."""
+        tracking = self.configuration.tracker
+        assert not isinstance(tracking, MarkersConfig)  # has no tracker
+        forward = estimates_of(run.rows)
+        if not doubtful_stretches(forward, options):
+            return
+        with closing(self._create()) as tracker:
+            better, milliseconds = track_backwards(
+                forward,
+                lambda places: self._frames([run.rows[place].index for place in places]),
+                lambda: self._pipeline(None, tracker),
+                tracking.scoring.objective.clamp,
+                options,
+                progress,
+            )
+        run.revise({place: row_of(run.rows[place].index, each) for place, each in better.items()}, milliseconds)
+
+    def _frames(self, indices: Iterable[int] | None = None) -> Iterator[Frame]:
+        """Yield some frames, or all that are tracked, with their keypoints."""
+        frames: Iterator[Frame] = islice(self.sequence, len(self)) if indices is None else self.sequence.frames(indices)
         if self._keypoints is not None:
             frames = self._keypoints.attach(frames, self.sequence.timestamps)
         return read_ahead(frames, self._ahead)
 
-    def _pipeline(self, start_pose: Array | None) -> Pipeline:
+    def _pipeline(self, start_pose: Array | None, tracker: Tracker | None = None) -> Pipeline:
         segmenter = Segmenter.for_sequence(self.sequence, self.configuration.segmentation)
-        return Pipeline(self.tracker, segmenter, self.hand, start_pose, self._clock)
+        return Pipeline(tracker or self.tracker, segmenter, self.hand, start_pose, self._clock)
 
     def close(self) -> None:
         """Free the tracker."""

@@ -26,6 +26,7 @@ from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.skin_colour import MAX_BYTES as MAX_SKIN_BYTES
 from depthtrack.solver.options import SurfaceName
+from depthtrack.tracking.backward_pass import BackwardOptions
 from depthtrack.tracking.configuration import (
     RUN_CONFIGURATIONS,
     HybridConfig,
@@ -52,6 +53,7 @@ class RunConfiguration:
     sequence: path of the recording, absolute or from the run folder.
     camera, hand: contents of `camera.json` and `hand.json`.
     keypoints: path of a file of keypoints, see `recording.keypoints`; None for none.
+    backward: how doubtful stretches are tracked backwards; None for not at all.
     frames: number of frames to track; None for all.
     context: entries that do not change poses or only describe the run: label, seed of a comparison, machine, ...
     """
@@ -65,6 +67,7 @@ class RunConfiguration:
     frames: int | None = None
     on_damage: OnDamage = "refuse"
     keypoints: str | None = None
+    backward: BackwardOptions | None = None
     reading: ReadingOptions = field(default_factory=ReadingOptions)
     context: Mapping[str, Any] = field(default_factory=dict)
 
@@ -105,6 +108,7 @@ class RunConfiguration:
             "frames": self.frames,
             "on_damage": self.on_damage,
             "keypoints": self.keypoints,
+            **({} if self.backward is None else {"backward": to_data(self.backward)}),
             **({} if self.reading == ReadingOptions() else {"reading": to_data(self.reading)}),
             "camera": dict(self.camera),
             "hand": dict(self.hand),
@@ -128,7 +132,7 @@ class RunConfiguration:
         for entry, kind in (("sequence", str), ("camera", dict), ("hand", dict)):
             if not isinstance(fields.get(entry), kind):
                 raise InputError(f"{where}: expected an entry '{entry}', found {fields.get(entry)!r:.40}")
-        own = ("format", "tracker", "options", "digests", "segmentation", "reading")
+        own = ("format", "tracker", "options", "digests", "segmentation", "reading", "backward")
         rest = {name: value for name, value in fields.items() if name not in own}
         known = {entry: rest.pop(entry) for entry in ("sequence", "camera", "hand")}
         known |= {entry: rest.pop(entry) for entry in ("start", "frames", "on_damage", "keypoints") if entry in rest}
@@ -142,6 +146,11 @@ class RunConfiguration:
             **known,
             tracker=from_data(RUN_CONFIGURATIONS[name], fields.get("options", {}), f"{where}: options"),
             segmentation=from_data(SegmentationOptions, fields.get("segmentation", {}), f"{where}: segmentation"),
+            backward=(
+                None
+                if fields.get("backward") is None
+                else from_data(BackwardOptions, fields["backward"], f"{where}: backward")
+            ),
             reading=from_data(ReadingOptions, fields.get("reading", {}), f"{where}: reading"),
             context=rest,
         )

@@ -1,0 +1,191 @@
+"""The backward pass: stretches of doubtful poses are tracked again, backwards in time.
+
+A start at a hand that is hard to see, or a loss, leaves doubtful poses until a clearer view. The first confident pose
+after them is followed back through the stretch. There the poses of both directions are known. At one frame the
+estimates change from the forward to the backward ones, so that their costs are least.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from depthtrack.options import check_ranges, option
+from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
+from depthtrack.tracking.configuration import HybridConfig, IkConfig, PsoConfig, TrackerConfig
+from depthtrack.tracking.pipeline import Pipeline
+from depthtrack.tracking.tracker import Estimate
+
+_READ_AT_ONCE = 16
+"""Frames that are held in memory to be tracked in reverse order."""
+
+
+@dataclass(frozen=True)
+class BackwardOptions:
+    """Stretches that are tracked backwards, and the choice between both directions."""
+
+    doubtful: float = option(0.3, "A stretch with a pose of lower confidence is tracked backwards", most=1)
+    confident: float = option(0.5, "Confidence of the poses before and after a stretch", most=1)
+    confidence_weight: float = option(
+        0.5,
+        "Energy that a confidence of 1 makes up for",
+        unit="clamp",
+        source="tools/tune_backward.py on the tuning seeds 0 to 3 of the cross-model benchmark",
+        most=100,
+    )
+    gain: float = option(
+        0.1, "Energy by which a backward pose must be better", unit="clamp", source="as `confidence_weight`", most=100
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
+def chosen_backward(choice: bool | BackwardOptions | None, tracker: TrackerConfig) -> BackwardOptions | None:
+    """Return the options of the backward pass; None for none.
+
+    choice: whether there is one, or its options. By default, the trackers of papers go forward alone, and so does one
+        with a deadline. A lift has no direction.
+    """
+    if isinstance(choice, BackwardOptions):
+        return choice
+    if choice is None:
+        choice = isinstance(tracker, HybridConfig | IkConfig | PsoConfig)
+        choice = choice and getattr(tracker, "deadline", None) is None
+    return BackwardOptions() if choice else None
+
+
+class Stretch(NamedTuple):
+    """Frames `first` to `anchor - 1`; the pose of the frame `anchor` is confident."""
+
+    first: int
+    anchor: int
+
+
+class Frames(Protocol):
+    """The frames of a recording."""
+
+    def __call__(self, places: Sequence[int]) -> Iterable[Frame]:
+        """Return the frames at some places of the estimates."""
+        ...
+
+
+def track_backwards(
+    forward: Sequence[Estimate],
+    frames: Frames,
+    pipeline: Callable[[], Pipeline],
+    clamp: float,
+    options: BackwardOptions,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[dict[int, Estimate], dict[int, float]]:
+    """Return the backward estimates that replace forward ones, by their places.
+
+    The milliseconds of all frames that were tracked backwards follow, by their places too.
+
+    forward: estimates of all frames.
+    pipeline: returns a new pipeline, each time with the same tracker, which has tracked nothing before.
+    clamp: energy of a pixel that disagrees completely, `Objective.clamp`.
+    progress: called with the numbers of frames that are tracked backwards, and that will be.
+    """
+    stretches = doubtful_stretches(forward, options)
+    total = sum(anchor - first for first, anchor in stretches)
+    better, milliseconds = dict[int, Estimate](), dict[int, float]()
+    # The last one first, so that the tracker's time goes on backwards.
+    for first, anchor in reversed(stretches):
+        found, times = track_stretch(Stretch(first, anchor), forward, frames, pipeline())
+        milliseconds |= dict(enumerate(times, first))
+        change = change_of_direction(forward[first:anchor], found, clamp, options)
+        better |= dict(enumerate(found[change:], first + change))
+        if progress is not None:
+            progress(len(milliseconds), total)
+    return in_order(forward, better), milliseconds
+
+
+def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) -> list[Stretch]:
+    """Return the stretches between confident poses that hold a doubtful one.
+
+    The last stretch counts only if a confident pose follows it. A frame without a trusted pose is doubtful.
+    """
+    confidences = [_confidence(each) for each in estimates]
+    anchors = [index for index, value in enumerate(confidences) if value >= options.confident]
+    stretches = [Stretch(before + 1, anchor) for before, anchor in pairwise([-1, *anchors])]
+    return [each for each in stretches if min(confidences[slice(*each)], default=1.0) < options.doubtful]
+
+
+def track_stretch(
+    stretch: Stretch, forward: Sequence[Estimate], frames: Frames, pipeline: Pipeline
+) -> tuple[list[Estimate], list[float]]:
+    """Return the backward estimates of a stretch, in forward order, and their milliseconds.
+
+    forward: estimates of all frames.
+    pipeline: of a tracker that has followed later stretches at most.
+    """
+    first, anchor = stretch
+    begin = replace(forward[anchor], status=Status.STARTED, timestamp=-forward[anchor].timestamp, branches=())
+    found, milliseconds = list[Estimate](), list[float]()
+    for frame in _reversed(frames, first, anchor):
+        begun = time.perf_counter()
+        # Time runs backwards: speeds and pauses are those of a hand that moves so.
+        known = None if found else begin
+        estimate = pipeline.step(replace(frame, timestamp=-frame.timestamp), known).estimate
+        milliseconds.append(1e3 * (time.perf_counter() - begun))
+        # Branches hold times of this direction, and nothing continues them.
+        found.append(replace(estimate, timestamp=frame.timestamp, branches=()))
+    return found[:0:-1], milliseconds[:0:-1]
+
+
+def change_of_direction(
+    forward: Sequence[Estimate], backward: Sequence[Estimate], clamp: float, options: BackwardOptions
+) -> int:
+    """Return the number of forward estimates to keep, so that the sum of the costs is least.
+
+    The cost of an estimate is its energy, less a share for its confidence. Backward ones cost `gain` more: they must be
+    clearly better.
+
+    clamp: energy of a pixel that disagrees completely, `Objective.clamp`.
+    """
+    ahead = np.array([_cost(each, clamp, options) for each in forward])
+    back = np.array([_cost(each, clamp, options) + options.gain for each in backward])
+    before = np.concatenate([[0.0], np.cumsum(ahead)])
+    after = np.concatenate([np.cumsum(back[::-1])[::-1], [0.0]])
+    # Of equal sums the last one, which keeps most of the forward estimates.
+    return len(forward) - int(np.argmin((before + after)[::-1]))
+
+
+def in_order(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
+    """Return the backward estimates, by their places, with the status of a forward track.
+
+    A trusted pose after a frame without one starts the track.
+    """
+    ordered = dict[int, Estimate]()
+    for place, estimate in sorted(backward.items()):
+        follows = place > 0 and ordered.get(place - 1, forward[place - 1]).status.is_trusted
+        status = Status.TRACKED if follows else Status.STARTED
+        ordered[place] = replace(estimate, status=status) if estimate.status.is_trusted else estimate
+    return ordered
+
+
+def _confidence(estimate: Estimate) -> float:
+    """Return the confidence of a trusted pose; 0 without one, and 1 if it is unknown."""
+    if estimate.pose is None or not estimate.status.is_trusted:
+        return 0.0
+    return 1.0 if math.isnan(estimate.confidence) else estimate.confidence
+
+
+def _cost(estimate: Estimate, clamp: float, options: BackwardOptions) -> float:
+    """Return the cost of an estimate, in multiples of `clamp`; 1 without a pose."""
+    if estimate.pose is None:
+        return 1.0
+    confidence = 0.0 if math.isnan(estimate.confidence) else estimate.confidence
+    return min(estimate.energy / clamp, 1.0) - options.confidence_weight * confidence
+
+
+def _reversed(frames: Frames, first: int, last: int) -> Iterator[Frame]:
+    """Yield the frames `last` to `first`; few are in memory at once."""
+    for stop in range(last + 1, first, -_READ_AT_ONCE):
+        yield from reversed(list(frames(range(max(first, stop - _READ_AT_ONCE), stop))))

@@ -1,0 +1,191 @@
+"""The backward pass: its stretches, the direction, and the same bits after an interruption."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+
+from depthtrack.errors import InputError
+from depthtrack.hand.shape import HandShape
+from depthtrack.recording.registry import open_sequence
+from depthtrack.recording.run_folder import Run
+from depthtrack.recording.status import Status
+from depthtrack.segmentation.observation import Observation
+from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking.backward_pass import (
+    BackwardOptions,
+    change_of_direction,
+    chosen_backward,
+    doubtful_stretches,
+    in_order,
+)
+from depthtrack.tracking.configuration import HybridConfig, IkConfig, Oikonomidis2011Config
+from depthtrack.tracking.run import TrackingRun, configure
+from depthtrack.tracking.run_configuration import RunConfiguration
+from depthtrack.tracking.tracker import ABSENT, Estimate, Tracker
+from depthtrack.types import Array
+from tests.support.recordings import pose_at
+
+OPTIONS = BackwardOptions()
+CLAMP = 40.0
+FRAMES, CLEAR = 40, 25
+
+
+def estimate(confidence: float, energy: float = 10.0, status: Status = Status.TRACKED) -> Estimate:
+    return Estimate(pose_at(0), energy, 0.9, status, {}, 0.0, confidence)
+
+
+def test_stretches_lie_between_confident_poses_and_hold_a_doubtful_one() -> None:
+    confidences = [0.1, 0.4, 0.6, 0.4, 0.7, 0.2, 0.9, 0.9, 0.1]
+    found = doubtful_stretches([estimate(each) for each in confidences], OPTIONS)
+    assert [tuple(each) for each in found] == [
+        (0, 2),
+        (5, 6),
+    ]  # 0.4 is not doubtful, nothing follows the last
+
+
+def test_frames_without_a_trusted_pose_are_doubtful_and_unknown_confidences_are_not() -> None:
+    lost = estimate(0.9, status=Status.LOST)
+    assert [tuple(each) for each in doubtful_stretches([ABSENT, lost, estimate(0.8)], OPTIONS)] == [(0, 2)]
+    assert doubtful_stretches([estimate(math.nan)] * 3, OPTIONS) == []
+
+
+_ESTIMATES = st.builds(estimate, st.floats(0, 1), st.floats(0, 60)) | st.just(ABSENT)
+
+
+@given(st.lists(st.tuples(_ESTIMATES, _ESTIMATES), max_size=8))
+def test_the_change_of_direction_has_the_least_sum_of_costs(pairs: list[tuple[Estimate, Estimate]]) -> None:
+    ahead, back = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+
+    def cost(each: Estimate) -> float:
+        return 1.0 if each.pose is None else min(each.energy / CLAMP, 1.0) - 0.5 * each.confidence
+
+    def total(change: int) -> float:
+        return sum(map(cost, ahead[:change])) + sum(cost(each) + 0.1 for each in back[change:])
+
+    options = replace(OPTIONS, confidence_weight=0.5, gain=0.1)
+    change = change_of_direction(ahead, back, CLAMP, options)
+    assert total(change) == pytest.approx(min(map(total, range(len(pairs) + 1))))
+
+
+def test_equal_estimates_of_both_directions_stay_forward() -> None:
+    same = [estimate(0.2), estimate(0.1)]
+    assert change_of_direction(same, same, CLAMP, replace(OPTIONS, gain=0.0)) == 2
+
+
+def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
+    lost = estimate(0.0, status=Status.LOST)
+    ordered = in_order([ABSENT, lost, lost, estimate(0.9)], {1: estimate(0.4), 2: estimate(0.4, status=Status.STARTED)})
+    assert [each.status for each in ordered.values()] == [Status.STARTED, Status.TRACKED]
+
+
+def test_trackers_of_papers_and_those_with_a_deadline_go_forward_alone() -> None:
+    assert chosen_backward(None, HybridConfig()) == OPTIONS
+    assert chosen_backward(None, IkConfig(deadline=33.0)) is None
+    assert chosen_backward(None, Oikonomidis2011Config()) is None
+    assert chosen_backward(True, Oikonomidis2011Config()) == OPTIONS
+    assert chosen_backward(False, HybridConfig()) is None
+    assert chosen_backward(replace(OPTIONS, gain=0.2), HybridConfig()) == replace(OPTIONS, gain=0.2)
+
+
+class BadStart:
+    """The given tracker, but its first forward poses are wrong and doubtful."""
+
+    def __init__(self, tracker: Tracker, pose: Array) -> None:
+        self._tracker, self._pose, self.name, self.stages = tracker, pose, tracker.name, tracker.stages
+
+    def predicted_pose(self, timestamp: float) -> Array | None:
+        return self._tracker.predicted_pose(timestamp)
+
+    def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
+        return self._tracker.start(observation, pose)
+
+    def track(self, observation: Observation) -> Estimate:
+        found = self._tracker.track(observation)
+        backwards = math.copysign(1.0, observation.timestamp) < 0  # also at the time 0
+        if backwards or observation.timestamp >= CLEAR / 30 - 1e-6:
+            return found
+        return replace(found, pose=self._pose, energy=30.0, confidence=0.05)
+
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        self._tracker.restore(estimates)
+
+    def close(self) -> None:
+        self._tracker.close()
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("backward") / "everyday"
+    write_recording(Synthesiser(Synthesis("everyday", frames=FRAMES, model="skin")), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def tracking(recording: Path) -> Iterator[TrackingRun]:
+    sequence = open_sequence(recording)
+    configuration = configure(recording, sequence, HybridConfig(), HandShape(), backward=OPTIONS)
+    with TrackingRun(configuration, sequence, wrap=lambda each: BadStart(each, pose_at(0))) as run:
+        yield run
+
+
+@pytest.fixture(scope="module")
+def run(tracking: TrackingRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, shown = tmp_path_factory.mktemp("backward-run") / "run", list[tuple[int, int]]()
+    assert len(list(tracking.write(folder, progress=lambda done, total: shown.append((done, total))))) == FRAMES
+    assert shown == [(CLEAR, CLEAR)]
+    return folder
+
+
+def test_doubtful_poses_at_the_start_are_replaced(run: Path, recording: Path) -> None:
+    found, truth = Run.load(run), open_sequence(recording).ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    assert np.linalg.norm(found.poses[:, :3] - truth.poses[:, :3], axis=1).max() < 0.005
+    assert found.status == (Status.STARTED,) + (Status.TRACKED,) * (FRAMES - 1)
+    assert (np.diff(found.timestamps) > 0).all()
+    assert (found.stage_ms["backward"] > 0).tolist() == [True] * CLEAR + [False] * (FRAMES - CLEAR)
+
+
+def test_the_forward_poses_are_kept_beside_them(run: Path) -> None:
+    lines = [(run / name).read_text().splitlines() for name in ("forward.csv", "poses.csv")]
+    assert [before == after for before, after in zip(*lines, strict=True)] == (
+        [True] + [False] * CLEAR + [True] * (FRAMES - CLEAR)
+    )
+
+
+@pytest.mark.parametrize("kept", ["frames", "forward"])
+def test_an_interrupted_run_ends_with_the_same_poses(
+    kept: str, run: Path, tracking: TrackingRun, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for file in run.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    forward = (folder / "forward.csv").read_text()
+    if kept == "frames":  # killed before the backward pass
+        (folder / "forward.csv").unlink()
+    (folder / "poses.csv").write_text(forward)
+    list(tracking.write(folder, resume=True))
+    assert (folder / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+    assert (folder / "branches.csv").read_bytes() == (run / "branches.csv").read_bytes()
+
+
+def test_a_complete_run_is_left_as_it_is(run: Path, tracking: TrackingRun) -> None:
+    before = {file.name: file.read_bytes() for file in run.iterdir()}
+    assert list(tracking.write(run, resume=True)) == []
+    assert {file.name: file.read_bytes() for file in run.iterdir()} == before
+
+
+def test_run_json_holds_the_options(run: Path) -> None:
+    assert RunConfiguration.load(run).backward == OPTIONS
+    fields = Run.load(run).configuration
+    assert RunConfiguration.from_fields({**fields, "backward": None}, "run.json").backward is None
+    with pytest.raises(InputError, match="gain must be"):
+        RunConfiguration.from_fields({**fields, "backward": {"gain": -1}}, "run.json")
