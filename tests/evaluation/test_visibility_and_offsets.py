@@ -3,6 +3,7 @@
 import numpy as np
 
 from depthtrack.evaluation.metrics import joint_errors, visible_and_hidden, within_spread, without_offsets
+from depthtrack.evaluation.metrics.offsets import joint_offsets
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
@@ -68,3 +69,12 @@ def test_joints_of_another_hand_differ_by_constant_offsets_alone() -> None:
 def test_a_hand_that_is_never_known_stays_unknown() -> None:
     unknown = np.full((3, 27), np.nan)
     assert np.isnan(without_offsets(HandModel(HandShape()), unknown, np.zeros((3, 21, 3)))).all()
+
+
+def test_joints_that_do_not_count_leave_the_offsets_as_they_are() -> None:
+    made, ours = Synthesiser(Synthesis(motion="signs", frames=20)), HandModel(HandShape())
+    joints, counted = ours.keypoints(made.poses), np.ones((20, 21), dtype=np.bool_)
+    joints[:15, 8] += 0.05
+    counted[:15, 8], counted[:, 3] = False, False
+    np.testing.assert_allclose(joint_offsets(ours, made.poses, joints, counted), 0, atol=1e-12)
+    assert np.linalg.norm(joint_offsets(ours, made.poses, joints)[8]) > 0.04

@@ -11,15 +11,19 @@ import numpy as np
 from depthtrack.benchmarks.crossmodel.measure import TRACKERS, true_joints, visible_joints
 from depthtrack.benchmarks.crossmodel.recordings import made_recording
 from depthtrack.calibration.calibrate import calibrate
-from depthtrack.evaluation.metrics import without_offsets
+from depthtrack.evaluation.metrics.offsets import corrected_keypoints, joint_offsets
 from depthtrack.evaluation.sweep.rows import Cell, Row
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, Side, other_side
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.solver.keypoints import fit_poses
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.types import Array, Mask
+
+OFTEN = 0.1
+"""Share of the frames from which on a joint is visible often enough for an offset of its own."""
 
 
 def measure_evidence(cell: Cell) -> Row:
@@ -30,7 +34,8 @@ def measure_evidence(cell: Cell) -> Row:
 
     cell: arguments of `made_recording`.
 
-    Constant offsets of the joints are removed from the errors of hands of the right side.
+    Constant offsets of the joints are removed from the errors of hands of the right side. They are those of the frames
+    in which the camera sees the joint: wrong hidden fingers do not change them.
     """
     with made_recording(**cell) as sequence:
         side: Side = cell["side"]
@@ -70,9 +75,22 @@ def _tracked(
     if not evidence:
         return []
     known = sorted(evidence)
-    points = without_offsets(model, poses, joints)[known] if aligned else model.keypoints(poses[known])
+    points = model.keypoints(poses[known])
+    if aligned:
+        points = corrected_keypoints(model, poses[known], _offsets(model, poses, joints, visible))
     errors = np.linalg.norm(points - joints[known], axis=2)
     within, shown = errors < spread[known], visible[known]
     counts = np.column_stack([part.sum(axis=1) for part in (shown, shown & within, ~shown, ~shown & within)]).tolist()
     largest = (1e3 * errors.max(axis=1)).round(2).tolist()
     return [(evidence[index], *row) for index, *row in zip(known, largest, *zip(*counts, strict=True), strict=True)]
+
+
+def _offsets(model: HandModel, poses: Array, joints: Array, visible: Mask) -> Array:
+    """Return the constant offsets (21, 3), metres, in the frames in which each joint is visible.
+
+    A joint that is rarely visible has the offset of poses fitted to the true joints.
+    """
+    seen = joint_offsets(model, poses, joints, visible)
+    fitted = joint_offsets(model, fit_poses(model, joints).poses, joints)
+    often = visible.sum(axis=0) >= OFTEN * len(joints)
+    return np.where(often[:, None], seen, fitted)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel
-from depthtrack.types import Array
+from depthtrack.types import Array, Mask
 
 
 def without_offsets(model: HandModel, poses: Array, joints: Array) -> Array:
@@ -15,20 +15,22 @@ def without_offsets(model: HandModel, poses: Array, joints: Array) -> Array:
     return corrected_keypoints(model, poses, joint_offsets(model, poses, joints))
 
 
-def joint_offsets(model: HandModel, poses: Array, joints: Array) -> Array:
+def joint_offsets(model: HandModel, poses: Array, joints: Array, counted: Mask | None = None) -> Array:
     """Return the constant offsets (21, 3) of poses, metres.
 
     Each is in the frame of the bone that moves the joint.
 
     poses, joints: as in `without_offsets`.
+    counted: (T, 21) joints that count; all if None.
 
     Models of different make place joints differently within the same flesh. The offset of a joint is its median
     difference over all frames; zero without any.
     """
     keypoints, R = _keypoints_and_bones(model, poses)
     local = np.einsum("tjab,tja->tjb", R, keypoints - joints)
-    usable = np.isfinite(local).all(axis=(1, 2))
-    return np.asarray(np.median(local[usable], axis=0)) if usable.any() else np.zeros((21, 3))
+    usable = np.isfinite(local).all(axis=(1, 2))[:, None] & (np.ones((1, 21), np.bool_) if counted is None else counted)
+    medians = [np.median(local[usable[:, j], j], axis=0) if usable[:, j].any() else np.zeros(3) for j in range(21)]
+    return np.array(medians)
 
 
 def corrected_keypoints(model: HandModel, poses: Array, offsets: Array) -> Array:
