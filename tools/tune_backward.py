@@ -2,8 +2,9 @@
 
 Usage: tune_backward.py FOLDER --rig RIG.glb [...] [--seeds N] [--frames N]
 
-The recordings are those of the tuning seeds of the cross-model benchmark. `hybrid` and `ik` track each with two hands:
-one with the joints of the rig, and the average one. Each pair of
+The recordings are those of the tuning seeds of the cross-model benchmark. Clips of them begin every half second, so
+that some begin at a view that is hard to start from. `hybrid` tracks each with two hands: one with the joints of the
+rig, and the average one. Each pair of
 `confidence_weight` and `gain` is tried. Printed is the mean joint error of the doubtful stretches. Numbers of stretches
 follow that improve, and that get worse, by 1 mm. An error counts as at most 40 mm, and so does a missing pose. The
 folder holds the estimates, from which an interrupted choice continues.
@@ -17,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.benchmarks.crossmodel.measure import TRACKERS, WRONG, true_joints
+from depthtrack.benchmarks.crossmodel.measure import WRONG, true_joints
 from depthtrack.benchmarks.crossmodel.recordings import made_recording, recording_cells
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.evaluation.metrics.offsets import corrected_keypoints, joint_offsets
@@ -45,6 +46,8 @@ from depthtrack.types import Array
 WEIGHTS, GAINS = (0.0, 0.25, 0.5, 1.0, 2.0), (0.0, 0.025, 0.05, 0.1, 0.15, 0.2)
 WORST = 2e3 * WRONG
 """Millimetres: largest error of a frame."""
+CLIP, EVERY = 45, 15
+"""Frames of a clip, and between the beginnings of two."""
 POSE = np.eye(27)[3]
 """Stands for any pose: the choice depends on energy and confidence alone."""
 
@@ -96,12 +99,13 @@ def measure_stretches(cell: Cell) -> Row:
     with made_recording(**cell) as sequence:
         rig = load_hand(Path(cell["rig"]), cell["side"])
         hands = (replace(rig, scale=rig.scale * cell["scale"], rig=None), HandShape(side=rig.side))
-        found = [each for hand in hands for name in TRACKERS for each in _stretches(sequence, hand, name)]
-    return {"stretches": found}
+        clips = [range(first, first + CLIP) for first in range(0, len(sequence) - CLIP + 1, EVERY)]
+        return {"stretches": [each for hand in hands for clip in clips for each in _stretches(sequence, hand, clip)]}
 
 
-def _stretches(sequence: Sequence, hand: HandShape, name: str) -> list[Any]:
-    model, config, options = HandModel(hand), tracker_config(name), BackwardOptions()
+def _stretches(sequence: Sequence, hand: HandShape, clip: range) -> list[Any]:
+    """Return the stretches of a clip, frame by frame."""
+    model, config, options = HandModel(hand), tracker_config("hybrid"), BackwardOptions()
     joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
     offsets, clamp = joint_offsets(model, fit_poses(model, joints).poses, joints), config.scoring.objective.clamp
 
@@ -116,14 +120,16 @@ def _stretches(sequence: Sequence, hand: HandShape, name: str) -> list[Any]:
         return Pipeline(tracker, Segmenter.for_sequence(sequence), hand)
 
     with closing(create_tracker(config, hand)) as tracker:
-        forward = [each.estimate for each in track_frames(sequence, pipeline())]
+        forward = [each.estimate for each in track_frames(sequence.frames(clip), pipeline())]
     stretches = doubtful_stretches(forward, options)
     rows = []
     with closing(create_tracker(config, hand)) as tracker:
         for stretch in reversed(stretches):
-            backward, _ = track_stretch(stretch, forward, sequence.frames, pipeline())
+            backward, _ = track_stretch(
+                stretch, forward, lambda places: sequence.frames(clip[i] for i in places), pipeline()
+            )
             pairs = zip(range(*stretch), backward, strict=True)
-            rows.append([[*row(forward[index], index), *row(each, index)] for index, each in pairs])
+            rows.append([[*row(forward[place], clip[place]), *row(each, clip[place])] for place, each in pairs])
     return rows
 
 

@@ -39,7 +39,7 @@ class BackwardOptions:
         most=100,
     )
     gain: float = option(
-        0.1, "Energy by which a backward pose must be better", unit="clamp", source="as `confidence_weight`", most=100
+        0.05, "Energy by which a backward pose must be better", unit="clamp", source="as `confidence_weight`", most=100
     )
 
     def __post_init__(self) -> None:
