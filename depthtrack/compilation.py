@@ -34,7 +34,8 @@ _IMPORT = re.compile(rb"^\s*(?:from|import)\s+(depthtrack[\w.]*)(?:\s+import\s+(
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles a function of a module on its first call.
 
-    options: those of `numba.njit`.
+    options: those of `numba.njit`; the kernel lets other threads run. Functions with equal options share the code that
+        numba makes of its own functions.
 
     Raises:
         DepthtrackError: if the environment turns the compiler off, or numba is newer than tried.
@@ -44,7 +45,7 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
         raise DepthtrackError("the kernels need numba's compiler: unset the environment variable NUMBA_DISABLE_JIT")
 
     def compile_lazily(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(no_cfunc_wrapper=True, **options)(function)  # C code calls no kernel
+        dispatcher = numba.njit(no_cfunc_wrapper=True, **{"nogil": True, **options})(function)  # C code calls no kernel
         if cache_folder() is not None:
             dispatcher._cache = KernelCache(function)
         return dispatcher
@@ -209,6 +210,11 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
 
     _impl_class = _Code
 
+    @staticmethod
+    def is_part(function: Callable[..., Any], types: Any) -> bool:
+        """Return whether code of these types lacks an entry from Python; `ahead_compiler` makes such code."""
+        return False
+
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         locator = self._impl.locator
@@ -235,6 +241,10 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
         except Exception:
             self._discard()
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        key = super()._index_key(sig, codegen)
+        return (*key, "part") if self.is_part(self._py_func, sig) else key
 
     def _discard(self) -> None:
         try:

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 from numba import types
 from numba.core.dispatcher import Dispatcher
 
+from depthtrack.ahead_compiler import take_shortcuts
 from depthtrack.compilation import cache_folder
 from depthtrack.machine import usable_cores
 from depthtrack.strict_data import json_text, parse_json
@@ -169,14 +170,14 @@ def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None
     At most one process per core compiles. They end with this call, also if it is interrupted.
     """
     count = min(usable_cores(), len(kernels))
-    children = [_start() for _ in range(count)]
+    children = [_start_for(kernels) for _ in range(count)]
     waiting, finished = PartsFirst(kernels), SimpleQueue[Kernel | None]()
 
     def work(child: "subprocess.Popen[str]") -> None:
         try:
             while (number := waiting.take()) is not None:
                 if not _request(child, kernels[number]) and not is_over:
-                    child = _start()  # the other one has failed: its kernel is compiled at its first use
+                    child = _start_for(kernels)  # the other one has failed: its kernel is compiled at its first use
                     children.append(child)
                 waiting.finish(number)
                 finished.put(kernels[number])
@@ -207,14 +208,26 @@ def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None
 
 def _request(child: "subprocess.Popen[str]", kernel: Kernel) -> bool:
     """Return whether a process has answered the request to compile a kernel."""
-    assert child.stdin is not None
     assert child.stdout is not None
+    return _send(child, kernel._asdict()) and bool(child.stdout.readline())
+
+
+def _send(child: "subprocess.Popen[str]", content: Any) -> bool:
+    """Write a line to a process; return whether it can be written."""
+    assert child.stdin is not None
     try:
-        child.stdin.write(json_text(kernel._asdict()) + "\n")
+        child.stdin.write(json_text(content) + "\n")
         child.stdin.flush()
     except OSError:
         return False
-    return bool(child.stdout.readline())
+    return True
+
+
+def _start_for(kernels: Sequence[Kernel]) -> "subprocess.Popen[str]":
+    """Start a process that compiles these kernels on request, and their parts without an entry from Python."""
+    child = _start()
+    _send(child, [kernel._asdict() for kernel in kernels])
+    return child
 
 
 def _start() -> "subprocess.Popen[str]":
@@ -231,8 +244,13 @@ def _start() -> "subprocess.Popen[str]":
 
 
 def _serve() -> None:
-    """Compile the kernels that the input describes, a line each, and answer each with a line."""
+    """Compile the kernels that the input describes, a line each, and answer each with a line.
+
+    The first line lists all of them.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
+    listed = [Kernel(**each) for each in parse_json(sys.stdin.readline() or "[]")]
+    take_shortcuts({(kernel.module, kernel.name, kernel.signature) for kernel in listed})
     for line in sys.stdin:
         kernel = Kernel(**parse_json(line))
         kernel.dispatcher.compile(kernel.signature)

@@ -16,6 +16,7 @@ LAYERS = (
     ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine", "memory"),
     ("compilation",),
+    ("ahead_compiler",),
     ("precompilation",),
     ("geometry",),
     ("simd",),

@@ -28,6 +28,22 @@ assert not absent_kernels(kernels)
 kernels[0].dispatcher.compile(kernels[0].signature)
 assert sum(kernels[0].dispatcher.stats.cache_hits.values()) == 1
 """
+POSES = """
+import sys
+import numpy as np
+from depthtrack.hand.compiled_tangent import retract, retract_rows
+from depthtrack.precompilation import compile_kernels, listed_kernels
+if "ahead" in sys.argv:
+    compile_kernels([kernel for kernel in listed_kernels() if kernel.name == "retract_rows"])
+poses, steps = np.random.default_rng(0).normal(size=(2, 50, 27))
+moved = np.empty_like(poses)
+retract_rows(poses, np.ascontiguousarray(steps[:, :26]), moved)
+assert sum(retract_rows.stats.cache_hits.values()) == ("ahead" in sys.argv)
+row = np.empty(27)
+retract(poses[0], steps[0, :26], row)  # a part of the kernel, whose code has no entry from Python
+assert np.array_equal(row, moved[0])
+sys.stdout.buffer.write(moved.tobytes())
+"""
 
 
 @pytest.mark.parametrize("kernel", listed_kernels(), ids=lambda kernel: kernel.name)
@@ -47,6 +63,16 @@ def test_processes_compile_what_is_absent(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", SMALL], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_kernels_that_are_compiled_ahead_return_the_same_bits(tmp_path: Path) -> None:
+    moved = []
+    for when in ("ahead", "here"):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / when), "PYTHONPATH": str(ROOT)}
+        done = subprocess.run([sys.executable, "-c", POSES, when], env=environment, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        moved.append(done.stdout)
+    assert moved[0] == moved[1]
 
 
 def test_processes_that_fail_leave_their_kernels_to_the_first_use(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -149,7 +149,7 @@ class TrackCommand:
         )
         # To measure the hand takes long, so everything else is checked before.
         check_run(configuration, sequence, self.out, self.resume)
-        compile_for_first_use()
+        compile_for_first_use(tracker.name)
         return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
 
     def _backward(self, tracker: TrackerConfig) -> "BackwardOptions | None":

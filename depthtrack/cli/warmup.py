@@ -8,6 +8,16 @@ if TYPE_CHECKING:
 
 _FEW = 3.0
 """Seconds of compilation that start no processes: they take a second or two to load the program."""
+_OTHER_COMMANDS = ("depthtrack.calibration", "depthtrack.synthesis", "depthtrack.markers")
+"""Packages that no tracker calls."""
+_OTHER_TRACKERS = (
+    "depthtrack.solver.gauss_newton",
+    "depthtrack.solver.linear_algebra",
+    "depthtrack.tracking.surfaces.capsules",
+    "depthtrack.tracking.visible_centroid",
+)
+"""Modules whose kernels trackers of the skin do not call: of cylinders, swarms alone, and keypoints."""
+_SKIN_TRACKERS = ("hybrid", "ik")
 
 
 @dataclass(frozen=True)
@@ -54,10 +64,13 @@ def compile_absent(few: float = 0.0, without: tuple[str, ...] = ()) -> int:
         return compile_kernels(absent, show)
 
 
-def compile_for_first_use() -> None:
-    """Compile absent kernels of trackers in several processes, if there are cores."""
+def compile_for_first_use(tracker: str = "") -> None:
+    """Compile the absent kernels of a tracker in several processes, if there are cores.
+
+    tracker: its name; the kernels of all if it is empty.
+    """
     from depthtrack.compilation import cache_folder
     from depthtrack.machine import usable_cores
 
     if usable_cores() > 1 and cache_folder() is not None:
-        compile_absent(_FEW, without=("depthtrack.calibration", "depthtrack.synthesis", "depthtrack.markers"))
+        compile_absent(_FEW, _OTHER_COMMANDS + (_OTHER_TRACKERS if tracker in _SKIN_TRACKERS else ()))

@@ -111,7 +111,8 @@ def _unfilter(kind: int, row: NDArray[np.uint8], above: NDArray[np.uint8], here:
     """
     count = len(row)
     if kind == 0:
-        here[:] = row
+        for i in range(count):
+            here[i] = row[i]
     elif kind == 1:
         for byte in range(2):
             left = np.uint8(0)

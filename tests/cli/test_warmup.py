@@ -52,6 +52,17 @@ def test_the_first_use_compiles_in_processes_where_that_helps(
     assert "_incidence" not in compiled  # of synthetic sensors
 
 
+def test_trackers_of_the_skin_leave_out_what_they_do_not_call(
+    monkeypatch: pytest.MonkeyPatch, compiled: list[str]
+) -> None:
+    monkeypatch.setattr("depthtrack.machine.usable_cores", lambda: 2)
+    warmup.compile_for_first_use("hybrid")
+    assert {"fit_rounds", "score_poses"} <= set(compiled)
+    assert not {"solve", "solve_each", "choose", "visible_centroid"} & set(compiled)
+    warmup.compile_for_first_use("pso")
+    assert {"solve", "solve_each", "choose", "visible_centroid"} <= set(compiled)
+
+
 def test_a_few_absent_kernels_start_no_process(monkeypatch: pytest.MonkeyPatch, compiled: list[str]) -> None:
     monkeypatch.setattr(precompilation, "absent_kernels", lambda kernels: [k for k in kernels if k.seconds < 0.2])
     warmup.compile_for_first_use()
