@@ -20,6 +20,7 @@ from typing import Any, ClassVar
 
 import numba
 from numba.core import caching, config, event
+from numba.core.runtime import rtsys
 
 from depthtrack.errors import DepthtrackError
 
@@ -228,9 +229,14 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             return False
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled code of a signature, or None if there is none that can be read."""
+        """Return the compiled code of a signature, or None if there is none that can be read.
+
+        numba would load the implementations of all its functions before, which compilation alone needs: 0.2 s.
+        """
+        rtsys.initialize(target_context)
         try:
-            return super().load_overload(sig, target_context)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except Exception:  # a damaged pickle raises errors of any kind
             self._discard()
             return None
