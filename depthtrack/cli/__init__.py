@@ -1,5 +1,7 @@
 """Command line: parse, call, print. Each command is one module, imported on its call."""
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -68,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     The code is 0 on success, and 2 for an error that the user can correct. It is 130 after an interrupt (Ctrl-C), and
     143 after SIGTERM. It is 141 if the reader of the output closes it before the end of the work.
     """
+    atexit.register(gc.freeze)  # at its end Python would look for garbage among all objects: a quarter of a second
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     name = arguments[0] if arguments else "--help"
     try:
