@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
-import trimesh
 
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
@@ -124,6 +123,8 @@ class HeldObject:
     @cached_property
     def _mesh(self) -> tuple[Array, Array]:
         """Corners and normals (3 F, 3) of the triangles, palm frame."""
+        import trimesh
+
         if self.kind == "sphere":
             mesh = trimesh.creation.icosphere(subdivisions=4, radius=self.half[0])
         elif self.kind == "box":

@@ -5,12 +5,12 @@ Source: Schroeder et al. 2014, Sec. III.
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
-from trimesh import Trimesh
 
 from depthtrack.errors import InputError
 from depthtrack.geometry.isosurface import neighbour_average, polygonise
@@ -23,6 +23,9 @@ from depthtrack.hand.skin.displacement import displacement_basis
 from depthtrack.hand.skin.implicit import ImplicitHand, rest_pose
 from depthtrack.hand.skin.weights import skin_weights
 from depthtrack.types import Array, Faces, Index
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 _VERTICES = 7000
 """Approximate number of vertices of a built hand of usual proportions."""
@@ -87,8 +90,10 @@ class Skin:
         total = np.moveaxis((self._faces_around @ flat).reshape(-1, *of_faces.shape[:-2], 3), 0, -2)
         return np.asarray(total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30))
 
-    def to_trimesh(self, vertices: Array) -> Trimesh:
+    def to_trimesh(self, vertices: Array) -> "Trimesh":
         """Return the trimesh of posed vertices (V, 3), for queries and export."""
+        from trimesh import Trimesh
+
         return Trimesh(vertices, self.faces, process=False)
 
     @cached_property

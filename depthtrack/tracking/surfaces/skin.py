@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from trimesh.remesh import subdivide
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
@@ -34,6 +33,8 @@ def divided(skin: Skin, longest: float) -> Skin:
 
     New vertices halve the edges; their weights are the means of both ends.
     """
+    from trimesh.remesh import subdivide
+
     while _median_edge(skin) > longest and len(skin.rest) < _MOST_VERTICES:
         attributes = {"weights": skin.weights}
         rest, faces, attributes = subdivide(skin.rest, skin.faces, vertex_attributes=attributes)  # type: ignore[no-untyped-call]
