@@ -241,5 +241,9 @@ class SequenceWriter:
 
 def _stored(depth: NDArray[Any], scale: float) -> NDArray[np.uint16]:
     """Return depth (h, w) in units of `scale` metres; 0 if it is not finite or exceeds 16 bits."""
-    units = np.rint(depth / np.float64(scale))
-    return np.where((units >= 0) & (units <= np.iinfo(np.uint16).max), units, 0).astype(np.uint16)
+    units = depth / np.float64(scale)
+    np.rint(units, out=units)
+    is_stored = (units >= 0) & (units <= np.iinfo(np.uint16).max)
+    if not is_stored.all():
+        units[~is_stored] = 0
+    return units.astype(np.uint16)

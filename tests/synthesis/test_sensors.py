@@ -258,9 +258,9 @@ def test_kinect1_reads_plain_pixels_like_the_others() -> None:
         lens,
         nowhere,
         nowhere,
-        np.zeros((2, *SMALL.shape), np.float32),
+        (np.zeros((2, *SMALL.shape), np.uint8), np.zeros(256, np.float32)),
         error,
-        np.ones(SMALL.shape, np.float32),
+        np.full(SMALL.shape, 0xFFFFFFFF, np.uint32),
         limits,
         out,
     )

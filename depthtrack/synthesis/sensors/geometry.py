@@ -52,7 +52,7 @@ def shadow(depth: Array, camera: Camera, baseline: float) -> Mask:
     return out
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def dropout_probability(
     is_edge: bool, incidence: float, at_edges: float, grazing_start: float, grazing_end: float
 ) -> float:
@@ -72,7 +72,7 @@ def _incidence(depth: Array, normal: Array, intrinsics: tuple[float, float, floa
             out[v, u] = incidence_at(depth, normal, intrinsics, v, u)
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def incidence_at(depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], v: int, u: int) -> float:
     """Return the `incidence` of a pixel, radians.
 
@@ -87,7 +87,7 @@ def incidence_at(depth: Array, normal: Array, intrinsics: tuple[float, float, fl
     return math.acos(min(max(cosine, 0.0), 1.0))
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def steep_incidence_at(
     depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], v: int, u: int
 ) -> float:

@@ -18,11 +18,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from depthtrack.compilation import compiled
 from depthtrack.geometry.camera import PRESETS, Camera
 from depthtrack.rendering.rendered_surface import RenderedSurface
-from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise
+from depthtrack.synthesis.randomness import coarse_normal_noise, normal_noise, uniform_of, uniform_words
 from depthtrack.synthesis.sensors.geometry import (
     JUMP,
     SURELY_FLAT,
@@ -67,14 +68,14 @@ class Kinect1:
             shadow(surface.depth, self.camera, BASELINE),
             coarse_normal_noise(rng, (2, *shape)),
             normal_noise(rng, shape),
-            rng.random(shape, dtype=np.float32),
+            uniform_words(rng, shape),
             (self.nearest, self.farthest),
             out,
         )
         return out
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def axial_noise(z: float, theta: float) -> float:
     """Return the axial standard deviation, metres, at depth z (m) and incidence theta (rad).
 
@@ -86,7 +87,7 @@ def axial_noise(z: float, theta: float) -> float:
     return sigma
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def lateral_noise(theta: float) -> float:
     """Return the lateral standard deviation of a silhouette, pixels, at incidence theta (rad).
 
@@ -95,20 +96,21 @@ def lateral_noise(theta: float) -> float:
     return 0.8 + 0.035 * theta / (math.pi / 2 - min(theta, 1.5))
 
 
-@compiled(nogil=True)
+@compiled(nogil=True, error_model="numpy")
 def _read(
     depth: Array,
     normal: Array,
     lens: tuple[float, float, float, float],
     edge: Mask,
     dark: Mask,
-    wander: Array32,
+    wander: tuple[NDArray[np.uint8], Array32],
     error: Array32,
-    uniform: Array32,
+    words: NDArray[np.uint32],
     limits: tuple[float, float],
     out: Array,
 ) -> None:
     height, width = depth.shape
+    places, quantiles = wander
     plain = np.empty(width, np.bool_)
     for v in range(height):
         _read_plain(depth[v], normal[v], v, lens, edge[v], dark[v], error[v], limits, plain, out[v])
@@ -119,14 +121,15 @@ def _read(
             # Lateral noise: near a silhouette, a pixel may read the surface beside it.
             if edge[v, u] or z <= 0.0:
                 sigma = lateral_noise(incidence_at(depth, normal, lens, v, u) if z > 0.0 else 0.0)
-                us = min(max(u + round(sigma * wander[0, v, u]), 0), width - 1)
-                vs = min(max(v + round(sigma * wander[1, v, u]), 0), height - 1)
+                us = min(max(u + round(sigma * quantiles[places[0, v, u]]), 0), width - 1)
+                vs = min(max(v + round(sigma * quantiles[places[1, v, u]]), 0), height - 1)
                 if abs(depth[vs, us] - z) > JUMP * z:
                     z, row, column = depth[vs, us], vs, us
             if z <= 0.0 or dark[row, column]:
                 continue
             angle = steep_incidence_at(depth, normal, lens, row, column)
-            if uniform[v, u] < dropout_probability(edge[v, u], angle, _EDGE_DROPOUT, _GRAZING[0], _GRAZING[1]):
+            dropout = dropout_probability(edge[v, u], angle, _EDGE_DROPOUT, _GRAZING[0], _GRAZING[1])
+            if uniform_of(words[v, u]) < dropout:
                 continue
             z = _quantised(z, axial_noise(z, angle), error[v, u])
             if limits[0] <= z <= limits[1]:
