@@ -102,6 +102,19 @@ class Skin:
         return np.asarray(self.weights[self.faces].sum(axis=1).argmax(axis=-1), dtype=np.int64)
 
     @cached_property
+    def displacement_basis(self) -> tuple[csr_array, Array]:
+        """The displacements (V, NODES) of vertices by those of nodes, and normals (V, 3) at rest.
+
+        The displacements are those of scale 1.
+        """
+        shape, mirror = self.shape, np.diag([self.shape.mirror, 1, 1, 1])
+        T_body_rest = mirror @ self.T_body_rest @ mirror
+        T_body_rest[:, :3, 3] /= shape.scale
+        right = self.rest @ mirror[:3, :3] / shape.scale
+        basis = displacement_basis(shape.with_(scale=1.0, side="right"), right, self.weights, T_body_rest)
+        return basis, self.normals(self.rest)
+
+    @cached_property
     def _sparse_weights(self) -> csr_array:
         return csr_array(self.weights)
 
@@ -124,13 +137,9 @@ def _skin_of(shape: HandShape) -> Skin:
 
 def _displaced(skin: Skin, shape: HandShape, displacement: Array) -> Skin:
     """Return a skin whose vertices are moved along their normals."""
-    mirror = np.diag([shape.mirror, 1, 1, 1])
-    T_body_rest = mirror @ skin.T_body_rest @ mirror
-    T_body_rest[:, :3, 3] /= shape.scale
-    right = skin.rest @ mirror[:3, :3] / shape.scale
-    basis = displacement_basis(shape.with_(scale=1.0, side="right"), right, skin.weights, T_body_rest)
+    basis, normals = skin.displacement_basis
     along = shape.scale * (basis @ displacement)
-    return replace(skin, shape=shape, rest=skin.rest + along[:, None] * skin.normals(skin.rest))
+    return replace(skin, shape=shape, rest=skin.rest + along[:, None] * normals)
 
 
 def _rigged(shape: HandShape, rigged: RiggedHand) -> Skin:
@@ -154,17 +163,23 @@ def _rigged(shape: HandShape, rigged: RiggedHand) -> Skin:
 
 
 def _built(shape: HandShape) -> Skin:
-    solid = ImplicitHand.of(shape)
-    low, high = solid.bounds()
-    vertices, faces = polygonise(solid.distance, low, high, _cell(shape, high - low))
-    _check_closed(vertices, faces)
-    weights = skin_weights(solid, vertices, faces)
     # The solid is a right hand of scale 1. A left hand is its mirror image, with reversed faces.
+    vertices, faces, weights = _solid_mesh(shape.with_(scale=1.0, side="right"))
     rest = vertices * np.array([shape.mirror, 1, 1]) * shape.scale
     if shape.side == "left":
         faces = np.ascontiguousarray(faces[:, ::-1])
     T_palm_body = reference_transforms(Chain.of(shape), rest_pose(shape))
     return Skin(shape, rest, faces, weights, np.asarray(np.linalg.inv(T_palm_body), dtype=np.float64))
+
+
+@lru_cache(maxsize=4)
+def _solid_mesh(shape: HandShape) -> tuple[Array, Faces, Array]:
+    """Return vertices (V, 3), faces (F, 3) and weights (V, 16) of a right hand of scale 1."""
+    solid = ImplicitHand.of(shape)
+    low, high = solid.bounds()
+    vertices, faces = polygonise(solid.distance, low, high, _cell(shape, high - low))
+    _check_closed(vertices, faces)
+    return vertices, faces, skin_weights(solid, vertices, faces)
 
 
 def _cell(shape: HandShape, box: Array) -> float:
