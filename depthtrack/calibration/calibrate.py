@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from depthtrack.calibration.first_scale import first_scale
-from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin, prepared
+from depthtrack.calibration.first_scale import FirstHand, first_hand
+from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin, prepared, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
@@ -21,8 +21,8 @@ from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.stretches import TrackedView
 from depthtrack.types import Array
 
-_POSE_ITERATIONS = 8
-"""Iterations of the poses alone, for the hands before and after calibration."""
+_POSE_ITERATIONS = 4, 2
+"""Iterations of the poses alone, for the hands before and after calibration; the latter's are nearly there."""
 _USUAL_LENGTHS = (110, 240)
 """Length of the hand of children at school and of adults, mm, with a margin for its error."""
 
@@ -94,14 +94,14 @@ def calibrate(
     frames: int | None = None,
     progress: Progress | None = None,
     options: CalibrationOptions | None = None,
-    scale: float | None = None,
+    first: FirstHand | None = None,
 ) -> Calibration:
     """Return the calibration of the hand of a recording.
 
     views: poses of the hand of average proportions; without them, it is tracked first.
     frames: number of first frames to use; all if None.
     progress: called with a description of the current stage, and the completed share.
-    scale: of the hand of average proportions to begin with; None to find it first.
+    first: hand of average proportions to begin with; None to find it first.
 
     Equal recordings and seeds give an equal hand, for any number of threads.
 
@@ -111,7 +111,7 @@ def calibrate(
     source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
     report = progress or (lambda stage, share: None)
     report("size of the hand", 0.0)
-    begun = first_scale(source, side) if scale is None else scale
+    begun = first_hand(source, side) if first is None else first
     sizes = fit_sizes(source, side, begun, views, lambda stage, share: report(stage, 0.6 * share))
     skin = fit_skin(source, sizes, lambda stage, share: report(stage, 0.6 + 0.35 * share))
     report("confidence", 0.95)
@@ -130,16 +130,16 @@ def calibration_of(source: CalibrationSource, fitted: FittedHand) -> Calibration
             fitted.poses,
             values,
             side,
-            _POSE_ITERATIONS,
+            iterations,
             slice(0, 0),
             exact=len(values) > COUNT,
             options=joint,
             threads=threads,
         )
-        for values in (np.zeros(COUNT), fitted.values)
+        for values, iterations in zip((np.zeros(COUNT), fitted.values), _POSE_ITERATIONS, strict=True)
     )
     return Calibration(
-        hand_of(fitted.values, side, f"calibrated on {source.sequence.name}"),
+        hand_of(with_usual_proportions(fitted.values), side, f"calibrated on {source.sequence.name}"),
         measured_sizes(fitted.values[:COUNT], fitted.covariance, size_covariance(joint)),
         None,
         1000 * float(np.median(before.distances)),

@@ -5,40 +5,73 @@ in a few frames. Hands of other sizes are fitted from its poses. The median ener
 for hands of both sides.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.registry import create_tracker
-from depthtrack.tracking.tracker import Tracker
+from depthtrack.tracking.stretches import Starts
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
 
-def first_scale(source: CalibrationSource, side: Side = "right") -> float:
-    """Return the scale of the hand of average proportions that fits single frames best.
+class FirstHand(NamedTuple):
+    """Hand of average proportions, before it is tracked.
 
-    It is 1 if fewer than `CalibrationOptions.fewest` frames show a hand, or `first_scales` is empty.
+    scale: of the hand.
+    starts: estimates in single frames, of a hand of about this scale, that are not in doubt.
+    """
+
+    scale: float
+    starts: Starts
+
+
+def first_hand(source: CalibrationSource, side: Side = "right") -> FirstHand:
+    """Return the hand of average proportions whose scale fits single frames best.
+
+    Its scale is 1 if fewer than `CalibrationOptions.fewest` frames show a hand, or `first_scales` is empty.
 
     side: of the average hand; the scale hardly depends on it.
     """
     scales = sorted(source.options.first_scales)
     if len(scales) < 2:
-        return scales[0] if scales else 1.0
-    started = _starts(source, HandShape(side=side))
-    if len(started) < source.options.fewest:
-        return 1.0
-    energies = around_lowest(
-        len(scales),
-        int(np.argmin(np.abs(np.log(scales)))),
-        lambda number: _median_energy(source, HandShape(side=side, scale=scales[number]), started),
-    )
+        return FirstHand(scales[0] if scales else 1.0, {})
+    with ThreadPoolExecutor(source.threads, "starts") as pool:
+        started = _starts(source, HandShape(side=side), pool)
+        if len(started) < source.options.fewest:
+            return FirstHand(1.0, {})
+        scale, estimates = best_scale(
+            scales, lambda each: list(pool.map(partial(_fit, source, HandShape(side=side, scale=each)), started))
+        )
+    frames, least = [each.observation.frame_index for each in started], source.tracker.thresholds.start_confidence
+    return FirstHand(scale, {n: (e,) for n, e in zip(frames, estimates, strict=True) if e.confidence >= least})
+
+
+def best_scale(scales: Sequence[float], fitted: Callable[[float], list[Estimate]]) -> tuple[float, list[Estimate]]:
+    """Return the scale of the lowest median energy, and estimates of a hand of about it.
+
+    scales: to compare, in increasing order.
+    fitted: returns the estimates of a hand of a scale in some frames.
+    """
+    found = dict[int, list[Estimate]]()
+
+    def energy(number: int) -> float:
+        found[number] = fitted(scales[number])
+        return float(np.median([estimate.energy for estimate in found[number]]))
+
+    energies = around_lowest(len(scales), int(np.argmin(np.abs(np.log(scales)))), energy)
     tried = sorted(energies)
-    return float(np.exp(lowest_of_parabola(np.log(scales)[tried], np.array([energies[n] for n in tried]))))
+    lowest = lowest_of_parabola(np.log(scales)[tried], np.array([energies[number] for number in tried]))
+    return float(np.exp(lowest)), found[min(energies, key=energies.__getitem__)]
 
 
 def around_lowest(count: int, first: int, energy: Callable[[int], float]) -> dict[int, float]:
@@ -70,26 +103,30 @@ def lowest_of_parabola(x: Array, y: Array) -> float:
     return float(x[lowest] - slope / (2 * curvature)) if curvature > 0 else float(x[lowest])
 
 
-def _starts(source: CalibrationSource, hand: HandShape) -> list[tuple[Observation, Array]]:
-    """Return observations of frames spread over the recording, and poses (27,) in them."""
-    sequence, count = source.sequence, source.frames or len(source.sequence)
-    indices = np.linspace(0, min(len(sequence), count) - 1, source.options.scale_frames).round().astype(int)
-    segmenter, found = Segmenter.for_sequence(sequence, source.segmentation), list[tuple[Observation, Array]]()
-    with closing(_tracker(source, hand)) as tracker:
-        for frame in sequence.frames(sorted(set(indices.tolist()))):
-            segmenter.reset()
-            observation = segmenter.segment(frame)
-            pose = None if observation is None else tracker.start(observation).pose
-            if observation is not None and pose is not None:
-                found.append((observation, pose))
-    return found
+class _Start(NamedTuple):
+    """An observation, and a pose (27,) in it."""
+
+    observation: Observation
+    pose: Array
 
 
-def _median_energy(source: CalibrationSource, hand: HandShape, started: list[tuple[Observation, Array]]) -> float:
-    """Return the median energy of a hand that is fitted from poses (27,)."""
-    with closing(_tracker(source, hand)) as tracker:
-        return float(np.median([tracker.start(observation, pose).energy for observation, pose in started]))
+def _starts(source: CalibrationSource, hand: HandShape, pool: ThreadPoolExecutor) -> list[_Start]:
+    """Return starts of a hand in frames spread over the recording, without those that show none."""
+    found = pool.map(partial(_start, source, hand), source.sequence.frames(source.first_frames))
+    return [each for each in found if each is not None]
 
 
-def _tracker(source: CalibrationSource, hand: HandShape) -> Tracker:
-    return create_tracker(source.tracker, hand, source.threads)
+def _start(source: CalibrationSource, hand: HandShape, frame: Frame) -> _Start | None:
+    """Return the start of a hand in a frame, if it shows one."""
+    observation = Segmenter.for_sequence(source.sequence, source.segmentation).segment(frame)
+    if observation is None:
+        return None
+    with closing(create_tracker(source.tracker, hand)) as tracker:
+        pose = tracker.start(observation).pose
+    return None if pose is None else _Start(observation, pose)
+
+
+def _fit(source: CalibrationSource, hand: HandShape, start: _Start) -> Estimate:
+    """Return the estimate of a hand that is fitted from the pose of another one."""
+    with closing(create_tracker(source.tracker, hand)) as tracker:
+        return tracker.start(*start)

@@ -2,9 +2,9 @@
 
 A hand of average proportions is tracked first. Sizes and poses are then optimised jointly in its views, and a hand of
 these sizes is tracked in its place. Better sizes give better poses, and those give better sizes, until the sizes stay.
-Every second hand is not tracked: its poses are fitted from those of the views. The alternation follows Tkach et al.,
-"Online generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording. At last the
-displacement of the skin is fitted with the sizes.
+The third hand and later ones are not tracked: their poses are fitted from those of the views. The alternation follows
+Tkach et al., "Online generative model personalization for hand tracking", SIGGRAPH Asia 2017, over a recording. At last
+the displacement of the skin is fitted with the sizes, and the hand is tracked once more for that.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from depthtrack.calibration.first_scale import FirstHand
 from depthtrack.calibration.joint_optimisation import fit_jointly
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.recorded_views import CalibrationSource
@@ -20,7 +21,7 @@ from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, SCALE, THUMB_BASE, WIDTHS, hand_of
-from depthtrack.tracking.stretches import TrackedView
+from depthtrack.tracking.stretches import Starts, TrackedView
 from depthtrack.types import Array
 
 
@@ -34,6 +35,7 @@ class FittedHand:
     views: the views.
     poses: (V, 27) in them.
     energies: (N,) of the last hand that was tracked, in all tracked frames; NaN without a pose.
+    starts: estimates of it to begin stretches with.
     """
 
     side: Side
@@ -42,14 +44,15 @@ class FittedHand:
     views: tuple[TrackedView, ...]
     poses: Array
     energies: Array
+    starts: Starts
 
 
 def fit_sizes(
-    source: CalibrationSource, side: Side, scale: float, views: Sequence[TrackedView], report: Progress
+    source: CalibrationSource, side: Side, first: FirstHand, views: Sequence[TrackedView], report: Progress
 ) -> FittedHand:
     """Return the sizes of the hand of a recording. Tracking and joint optimisation alternate.
 
-    scale: of the hand of average proportions to begin with.
+    first: hand of average proportions to begin with.
     views: its poses; without them, it is tracked first.
 
     Raises:
@@ -57,11 +60,12 @@ def fit_sizes(
     """
     options, threads = source.options, source.threads
     values, rounds, joint, energies = np.zeros(COUNT), options.rounds, options.joint, np.zeros(0)
-    values[SCALE] = np.log(scale)
+    values[SCALE], starts = np.log(first.scale), first.starts
     for number in range(rounds):
         hand = hand_of(values, side)
-        if number % 2 == 1 or not views:
-            energies, views = source.tracked(hand, _part(report, number / rounds, 0.6 / rounds))
+        if not views or number == 1:
+            tracked = source.tracked(hand, _part(report, number / rounds, 0.6 / rounds), starts)
+            energies, views, starts = tracked.energies, tracked.views, tracked.starts
         elif number > 0:
             views = source.refined(views, hand)
         source.check(views)
@@ -79,7 +83,7 @@ def fit_sizes(
     last = options.exact_iterations
     fitted = fit_jointly(observed, fitted.poses, values, side, last, exact=True, options=joint, threads=threads)
     return FittedHand(
-        side, with_usual_proportions(fitted.values), fitted.covariance, tuple(chosen), fitted.poses, energies
+        side, nearest_solid(fitted.values, side), fitted.covariance, tuple(chosen), fitted.poses, energies, starts
     )
 
 
@@ -90,16 +94,16 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
     """
     options, fitted = source.options, sized
     values = np.concatenate([sized.values, np.zeros(NODES)])
-    views, poses = sized.views, sized.poses
+    views, poses, starts = sized.views, sized.poses, sized.starts
     observed, _ = prepared(views)
     for number in range(options.skin_rounds):
         begun = number / options.skin_rounds
         if number > 0:
             progress = _part(report, begun, 0.6 / options.skin_rounds)
-            tracked = source.tracked(hand_of(values, sized.side), progress).views
-            if len(tracked) < options.fewest:
+            tracked = source.tracked(hand_of(values, sized.side), progress, starts)
+            if len(tracked.views) < options.fewest:
                 break
-            views = tuple(best_views(tracked, options.accepted.good_views))
+            views, starts = tuple(best_views(tracked.views, options.accepted.good_views)), tracked.starts
             observed, poses = prepared(views)
         report("skin", begun + 0.6 / options.skin_rounds)
         iterations = options.skin_iterations
@@ -113,8 +117,8 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
             options=options.joint,
             threads=source.threads,
         )
-        values = with_usual_proportions(fit.values)
-        fitted = FittedHand(sized.side, values, fit.covariance, views, fit.poses, sized.energies)
+        values = nearest_solid(fit.values, sized.side)
+        fitted = FittedHand(sized.side, values, fit.covariance, views, fit.poses, sized.energies, starts)
     return fitted
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from depthtrack.calibration.options import JointFitOptions
-from depthtrack.calibration.residuals import CalibrationView, Evidence, PosedSkin, linearise
+from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise, stretches
 from depthtrack.calibration.solid_hands import solid_step
 from depthtrack.hand.displacement_grid import NODES, neighbour_differences
 from depthtrack.hand.limits import within_limits
-from depthtrack.hand.pose import ANGLES, TANGENT_SIZE, retract
+from depthtrack.hand.pose import ANGLES, retract
 from depthtrack.hand.shape import Side
 from depthtrack.hand.size_parameters import COUNT, hand_of, placement_covariance, prior_covariance
 from depthtrack.solver.shared_parameters import EliminatedPose, eliminate_pose, solve_free
@@ -59,8 +59,9 @@ def fit_jointly(
     values: (35,) sizes to start from; or sizes and displacement of the skin, which are then fitted together and need
         `exact`.
     free: the sizes that may change; all by default.
-    exact: build the skin of the current sizes in every iteration (see `PosedSkin`), with the final kernel scale. The
-        sizes to start from must give a solid hand, and steps that do not are shortened.
+    exact: stretch the skin of the sizes to start from, instead of the average hand's (see `PosedSkin`), with the final
+        kernel scale. It is built again if the sizes changed by `JointFitOptions.rebuilt`. The sizes to start from must
+        give a solid hand, and steps to others are shortened if those do not.
     threads: among which the views are divided. Sizes and poses do not depend on their number.
     """
     options = options or JointFitOptions()
@@ -70,23 +71,24 @@ def fit_jointly(
     prior = prior_information(options, displaced)
     held = np.ones(len(values), dtype=np.bool_)
     held[free] = False
+    built = values[:COUNT] if exact else np.zeros(COUNT)
     with ThreadPoolExecutor(threads, thread_name_prefix="views") as pool:
         for k in range(iterations):
-            skin = PosedSkin(hand_of(values, side), exact)
+            skin = PosedSkin(hand_of(values, side), hand_of(np.append(built, values[COUNT:]), side))
             kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
-            linearised = partial(linearise, skin=skin, kernel_scale=kernel_scale, displaced=displaced)
-            evidence = list(pool.map(linearised, views, poses))
-            eliminated = [_eliminate(*each, options) for each in zip(views, evidence, poses, strict=True)]
+            contribution = partial(_contribution, skin=skin, scale=kernel_scale, displaced=displaced, options=options)
+            eliminated, distances = zip(*pool.map(contribution, views, poses), strict=True)
             information = np.sum([e.information for e in eliminated], axis=0)
             gradient = np.sum([e.gradient for e in eliminated], axis=0)
             change = solve_free(information + prior, -(gradient + prior @ values), held)
             change *= min(1.0, options.largest_change / max(np.abs(change[:COUNT]).max(), 1e-12))
-            before, values = values, solid_step(values, change, side) if exact else values + change
-            change = values - before
+            before, values = values, values + change
+            if exact and _differ(values, built, side, options.rebuilt):
+                values = solid_step(before, change, side)
+                built, change = values[:COUNT], values - before
             tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
             poses = within_limits(retract(poses, tangents))
-    distances = np.array([e.distance for e in evidence])
-    return JointFit(values, np.linalg.inv(information + prior)[:COUNT, :COUNT], poses, distances)
+    return JointFit(values, np.linalg.inv(information + prior)[:COUNT, :COUNT], poses, np.array(distances))
 
 
 def size_covariance(options: JointFitOptions) -> Array:
@@ -112,14 +114,30 @@ def prior_information(options: JointFitOptions, displaced: bool) -> Array:
     return np.asarray(block_diag(sizes, skin), dtype=np.float64)
 
 
-def _eliminate(view: CalibrationView, evidence: Evidence, pose: Array, options: JointFitOptions) -> EliminatedPose:
-    """Return the normal equations of the sizes for one view.
+def _differ(values: Array, built: Array, side: Side, most: float) -> bool:
+    """Return whether a skin must be stretched or moved by more than `most`.
+
+    values: (n,) that it is needed for.
+    built: (35,) that it was built for.
+    """
+    hand, other = hand_of(values[:COUNT], side), hand_of(built, side)
+    factors = np.diagonal(stretches(hand, other)[:, :3, :3], axis1=1, axis2=2)
+    shifts = (hand.bases * hand.scale - other.bases * other.scale) / (other.palm_length * other.scale)
+    return bool(max(np.abs(np.log(factors)).max(), np.abs(shifts).max()) > most)
+
+
+def _contribution(
+    view: CalibrationView, pose: Array, skin: PosedSkin, scale: float, displaced: bool, options: JointFitOptions
+) -> tuple[EliminatedPose, float]:
+    """Return the normal equations of the sizes for one view, and its distance.
 
     They are scaled to its number of independent measurements.
+
+    scale: m, of the Geman-McClure kernel.
     """
-    displaced = len(evidence.g) > TANGENT_SIZE + COUNT
+    evidence = linearise(view, pose, skin, scale, displaced)
     misfit = options.displaced_misfit if displaced else options.misfit
     noise = max(options.noise, misfit * evidence.distance) ** 2
-    scale = min(view.patches / max(evidence.count, 1), 1.0) / noise
+    share = min(view.patches / max(evidence.count, 1), 1.0) / noise
     damping = 1 / np.repeat(options.step_spread, [3, 3, 20]) ** 2
-    return eliminate_pose(scale * evidence.H, scale * evidence.g, pose[ANGLES], damping)
+    return eliminate_pose(share * evidence.H, share * evidence.g, pose[ANGLES], damping), evidence.distance

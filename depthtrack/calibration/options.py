@@ -51,6 +51,9 @@ class JointFitOptions:
     largest_change: float = option(
         0.08, "Change of the logarithm of a size in one iteration; the skin is linear within about that"
     )
+    rebuilt: float = option(
+        0.02, "Stretch of the skin from the sizes that it was built for, from which on it is built again"
+    )
 
 
 @dataclass(frozen=True)
@@ -69,17 +72,17 @@ class AcceptanceOptions:
 class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
-    stretches: StretchOptions = option(StretchOptions(), "Frames that the hand is tracked in")
+    stretches: StretchOptions = option(StretchOptions(views=54), "Frames that the hand is tracked in")
     first_scales: tuple[float, ...] = option(
         (0.72, 0.8, 0.9, 1.0, 1.1, 1.22),
-        "Sizes of the whole hand, of the average one's, that are compared at first; empty: begin with the average",
+        "Sizes of the whole hand, of the average one's, that are compared in the first frames of the stretches; empty: "
+        "begin with the average",
     )
-    scale_frames: int = option(8, "Frames that they are compared in", unit="frames")
-    rounds: int = option(4, "Rounds of joint optimisation, at most; every second hand is tracked")
+    rounds: int = option(3, "Rounds of joint optimisation, at most; the hand is tracked in the first two")
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
-    exact_iterations: int = option(3, "Last iterations, which build the skin of the current sizes")
+    exact_iterations: int = option(3, "Last iterations, which stretch the skin of the sizes found so far")
     skin_rounds: int = option(2, "Fits of the skin's displacement; without any, the skin follows from the sizes")
-    skin_iterations: int = option(12, "Iterations of each")
+    skin_iterations: int = option(10, "Iterations of each")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
     accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")

@@ -10,7 +10,14 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording import sequence as recording
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig
-from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, refine_views, track_stretches
+from depthtrack.tracking.stretches import (
+    Starts,
+    StretchOptions,
+    TrackedStretches,
+    TrackedView,
+    refine_views,
+    track_stretches,
+)
 
 
 @dataclass(frozen=True)
@@ -27,10 +34,21 @@ class CalibrationSource:
     frames: int | None
     options: CalibrationOptions
 
-    def tracked(self, hand: HandShape, progress: Callable[[int, int], None]) -> TrackedStretches:
-        """Return views and energies of a hand that is tracked in stretches."""
+    def tracked(self, hand: HandShape, progress: Callable[[int, int], None], starts: Starts) -> TrackedStretches:
+        """Return views and energies of a hand that is tracked in stretches.
+
+        starts: estimates to begin them with.
+        """
         stretches = self._stretches
-        return track_stretches(self.sequence, hand, self.segmentation, self.threads, self.frames, stretches, progress)
+        return track_stretches(
+            self.sequence, hand, self.segmentation, self.threads, self.frames, stretches, progress, starts
+        )
+
+    @property
+    def first_frames(self) -> list[int]:
+        """The first frames of the stretches."""
+        length = min(len(self.sequence), self.frames or len(self.sequence))
+        return [each.start for each in self.options.stretches.ranges(length)]
 
     def refined(self, views: Sequence[TrackedView], hand: HandShape) -> Sequence[TrackedView]:
         """Return views with the poses of another hand, fitted from theirs."""

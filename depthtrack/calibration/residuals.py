@@ -51,18 +51,16 @@ class CalibrationView:
 class PosedSkin:
     """Skin of a hand of given sizes, rendered in the views.
 
-    By default it is the skin of the average hand, stretched along and across its bones, which is fast. `exact` builds
-    the skin of the sizes.
+    It is the skin of another hand, the average one by default, stretched along and across its bones. That is fast.
 
     Raises:
-        InputError: if `exact` and the sizes give no single solid hand.
+        InputError: if the sizes of the other hand give no single solid hand.
     """
 
-    def __init__(self, shape: HandShape, exact: bool = False) -> None:
-        average = HandShape(side=shape.side)
-        self.model, self._skin = HandModel(shape), Skin.of(shape if exact else average)
-        self._mesh = _mesh_of(self._skin)
-        self._stretch = np.tile(np.eye(4), (BODY_COUNT, 1, 1)) if exact else _stretches(shape, average)
+    def __init__(self, shape: HandShape, built: HandShape | None = None) -> None:
+        built = built or HandShape(side=shape.side)
+        self.model, self._skin = HandModel(shape), Skin.of(built)
+        self._mesh, self._stretch = _mesh_of(self._skin), stretches(shape, built)
         self.wrist = shape.wrist[1] + _WRIST_ROOM
 
     def seen(self, view: CalibrationView, pose: Array) -> RenderedSurface:
@@ -118,17 +116,17 @@ def linearise(
     return Evidence(H, g, count, float(np.median(found)) if len(found) else np.inf)
 
 
-def _stretches(shape: HandShape, average: HandShape) -> Array:
-    """Return the stretches (16, 4, 4), body frames, from the average hand to these sizes."""
+def stretches(shape: HandShape, other: HandShape) -> Array:
+    """Return the stretches (16, 4, 4), body frames, from another hand to these sizes."""
     S = np.tile(np.eye(4), (BODY_COUNT, 1, 1))
     sizes = ("palm_breadth", "palm_length", "palm_thickness")
-    S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(average, size) for size in sizes]
-    longer, wider = shape.lengths / average.lengths, (shape.radii / average.radii).mean(axis=1)
+    S[0, [0, 1, 2], [0, 1, 2]] = [getattr(shape, size) / getattr(other, size) for size in sizes]
+    longer, wider = shape.lengths / other.lengths, (shape.radii / other.radii).mean(axis=1)
     for finger in range(5):
         for phalanx in range(3):
             factors = wider[finger], longer[finger, phalanx], wider[finger]
             S[body_of(finger, phalanx), [0, 1, 2], [0, 1, 2]] = factors
-    S[:, :3] *= shape.scale
+    S[:, :3] *= shape.scale / other.scale
     return S
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
-from depthtrack.calibration.first_scale import first_scale
+from depthtrack.calibration.first_scale import FirstHand, first_hand
 from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
@@ -41,11 +41,14 @@ def calibrate_either_side(
     side_options = SideOptions()
     source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
     report("size of the hand", 0.0)
-    scale = first_scale(source)
+    scale = first_hand(source).scale
     choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.05, 0.2), scale)
+    first = {side: FirstHand(scale, starts) for side, starts in choice.starts.items()}
     if choice.sure:
         views, part = choice.views.get(choice.side, ()), _part(report, 0.25, 0.75)
-        found = calibrate(sequence, choice.side, views, segmentation, seed, threads, frames, part, options, scale)
+        found = calibrate(
+            sequence, choice.side, views, segmentation, seed, threads, frames, part, options, first.get(choice.side)
+        )
         return replace(found, side_margin=choice.margin, sure_margin=side_options.sure_margin)
     sized: dict[Side, FittedHand] = {}
     failure: InputError | None = None
@@ -53,7 +56,7 @@ def calibrate_either_side(
     for n, side in enumerate(sides):
         try:
             part = _part(report, 0.25 + 0.25 * n, 0.25)
-            sized[side] = fit_sizes(source, side, scale, choice.views.get(side, ()), part)
+            sized[side] = fit_sizes(source, side, first[side], choice.views.get(side, ()), part)
         except InputError as error:
             failure = error
     if failure is not None:

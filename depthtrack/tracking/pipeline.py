@@ -61,6 +61,10 @@ class Pipeline:
         self._keypoints = KeypointGuide(self._model)
         self._start_pose, self._clock = start_pose, clock
 
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        """Go on from estimates of earlier frames, or of the next one."""
+        self._tracker.restore(estimates)
+
     def step(self, frame: Frame, known: Estimate | None = None) -> TrackedFrame:
         """Segment and track one frame.
 

@@ -13,7 +13,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.options import option
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.stretches import StretchOptions, TrackedStretches, TrackedView, track_hands
+from depthtrack.tracking.stretches import Starts, StretchOptions, TrackedStretches, TrackedView, track_hands
 from depthtrack.types import Array
 
 
@@ -36,6 +36,7 @@ class SideChoice:
     sure: whether that is enough.
     frames: number of frames that both were tracked in.
     views: poses of the tracked hand of each side.
+    starts: estimates of them to begin stretches with.
     """
 
     side: Side
@@ -43,6 +44,7 @@ class SideChoice:
     sure: bool
     frames: int
     views: Mapping[Side, tuple[TrackedView, ...]] = field(default_factory=dict, repr=False, compare=False)
+    starts: Mapping[Side, Starts] = field(default_factory=dict, repr=False, compare=False)
 
 
 def choose_side(
@@ -64,12 +66,13 @@ def choose_side(
     hands = {side: HandShape(side=side, scale=scale) for side in sides}
     tracked = track_sides(sequence, hands, segmentation, threads, frames, options.stretches, progress)
     views = {side: each.views for side, each in tracked.items()}
+    starts = {side: each.starts for side, each in tracked.items()}
     means, count = mean_energies({side: each.energies for side, each in tracked.items()})
     if count == 0:
-        return SideChoice("right", 0.0, False, 0, views)
+        return SideChoice("right", 0.0, False, 0, views, starts)
     side, other = sorted(means, key=lambda each: means[each])
     margin = means[other] / means[side] - 1
-    return SideChoice(side, margin, margin >= options.sure_margin, count, views)
+    return SideChoice(side, margin, margin >= options.sure_margin, count, views, starts)
 
 
 def track_sides(

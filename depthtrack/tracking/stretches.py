@@ -1,11 +1,15 @@
 """Stretches of a recording that a hand is tracked in, to compare hands or to measure one."""
 
 import math
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby, pairwise
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +24,14 @@ from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.tracking.configuration import HybridConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline
 from depthtrack.tracking.registry import create_tracker
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
 _AHEAD = 2
 """Frames that are read while another one is tracked."""
+Starts = Mapping[int, tuple[Estimate, ...]]
+"""Estimates that tracks of stretches may begin with, by the first frames of these stretches."""
+_NO_STARTS: Starts = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -35,11 +43,20 @@ class StretchOptions:
     views: int = option(32, "Frames kept as views, at most, evenly spread over those", unit="frames")
     tracker: TrackerConfig = option(HybridConfig(), "Tracker")
 
+    def ranges(self, length: int) -> list[range]:
+        """Return the stretches of a recording with `length` frames, in order.
+
+        A short recording is divided evenly.
+        """
+        if length <= self.stretches * self.stretch_frames:
+            ends = np.unique(np.linspace(0, length, self.stretches + 1).round().astype(int)).tolist()
+            return [range(*pair) for pair in pairwise(ends)]
+        starts = np.linspace(0, length - self.stretch_frames, self.stretches).round().astype(int).tolist()
+        return [range(start, start + self.stretch_frames) for start in starts]
+
     def frames(self, length: int) -> list[int]:
         """Return the frames to track of a recording with `length` frames."""
-        starts = np.linspace(0, max(0, length - self.stretch_frames), self.stretches).round().astype(int)
-        chosen = {index for start in starts for index in range(start, min(length, start + self.stretch_frames))}
-        return sorted(map(int, chosen))
+        return [index for each in self.ranges(length) for index in each]
 
 
 class TrackedView(NamedTuple):
@@ -56,10 +73,12 @@ class TrackedStretches(NamedTuple):
 
     energies: (N,) of all frames; NaN without a hand.
     views: trusted poses in some of them.
+    starts: trusted estimates of the first frames of stretches, by frame.
     """
 
     energies: Array
     views: tuple[TrackedView, ...]
+    starts: Starts = _NO_STARTS
 
 
 def track_stretches(
@@ -70,13 +89,16 @@ def track_stretches(
     frames: int | None = None,
     options: StretchOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
+    starts: Starts = _NO_STARTS,
 ) -> TrackedStretches:
     """Track a hand in the stretches of a recording.
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
+    starts: estimates to begin stretches with; that of the lowest energy in the first frame is used. Stretches without
+        any go on with the track before them.
     """
-    return track_hands(sequence, [hand], segmentation, threads, frames, options, progress)[0]
+    return track_hands(sequence, [hand], segmentation, threads, frames, options, progress, [starts])[0]
 
 
 def track_hands(
@@ -87,27 +109,49 @@ def track_hands(
     frames: int | None = None,
     options: StretchOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
+    starts: Iterable[Starts] = (),
 ) -> list[TrackedStretches]:
     """Track several hands in the same stretches of a recording, side by side.
 
-    Each frame is read once. What is found for a hand depends neither on the others nor on the number of threads.
+    Each frame is read once. Threads share hands and stretches. What is found for a hand depends neither on the others
+    nor on the number of threads.
 
+    starts: see `track_stretches`; of each hand.
     The other arguments are those of `track_stretches`.
     """
-    options = options or StretchOptions()
-    indices = options.frames(min(len(sequence), frames or len(sequence)))
+    options, hands, known = options or StretchOptions(), list(hands), list(starts)
+    ranges = options.ranges(min(len(sequence), frames or len(sequence)))
+    first, indices = [each.start for each in ranges], [index for each in ranges for index in each]
+    every, done, waiting = max(1, math.ceil(len(indices) / options.views)), 0, deque[list[Future[int]]]()
+    parallel = len(hands) * (len(ranges) if any(known) else 1)
     with ExitStack() as stack:
-        tracked = list[_Tracked]()
-        for hand in hands:
-            tracker = stack.enter_context(closing(create_tracker(options.tracker, hand, threads)))
-            pipeline = Pipeline(tracker, Segmenter.for_sequence(sequence, segmentation), hand)
-            tracked.append(_Tracked(pipeline, len(indices), max(1, math.ceil(len(indices) / options.views))))
-        pool = stack.enter_context(ThreadPoolExecutor(min(threads, len(tracked)), "hands"))
-        for number, frame in enumerate(read_ahead(sequence.frames(indices), _AHEAD)):
-            list(pool.map(partial(_Tracked.step, frame=frame, number=number), tracked))
-            if progress is not None:
-                progress(number + 1, len(indices))
-    return [TrackedStretches(each.energies, tuple(each.views)) for each in tracked]
+
+        def begun(hand: HandShape) -> Pipeline:
+            tracker = create_tracker(options.tracker, hand, max(1, threads // parallel))
+            stack.callback(tracker.close)
+            return Pipeline(tracker, Segmenter.for_sequence(sequence, segmentation), hand)
+
+        pool = stack.enter_context(ThreadPoolExecutor(threads, "stretches"))
+        tracked = [
+            _Tracked(partial(begun, hand), known[number] if known else _NO_STARTS, every)
+            for number, hand in enumerate(hands)
+        ]
+
+        def finish(most: int) -> None:
+            nonlocal done
+            while len(waiting) > most:
+                finished, *_ = [job.result() for job in waiting.popleft()]
+                done += finished
+                if progress is not None:
+                    progress(done, len(indices))
+
+        reader = read_ahead(sequence.frames(indices), _AHEAD)
+        for _, stretch in groupby(reader, lambda frame: bisect_right(first, frame.index)):
+            images = list(stretch)
+            waiting.append([hand.submit(images, pool) for hand in tracked])
+            finish(threads)
+        finish(0)
+    return [each.found() for each in tracked]
 
 
 def refine_views(
@@ -126,22 +170,90 @@ def refine_views(
     return tuple(refined)
 
 
-class _Tracked:
-    """Results of one hand so far.
+class _Stretch(NamedTuple):
+    """Result of a hand in one stretch; see `TrackedStretches`.
 
-    count: number of frames.
+    frames: its frames, the first one and the last one.
+    ends: trusted estimates in them, None without.
+    """
+
+    energies: list[float]
+    views: list[TrackedView]
+    frames: tuple[int, int]
+    ends: list[Estimate | None]
+
+
+class _Tracked:
+    """Track of one hand, stretch by stretch.
+
+    begun: returns a new pipeline.
+    starts: estimates to begin stretches with.
     every: every n-th frame may become a view.
     """
 
-    def __init__(self, pipeline: Pipeline, count: int, every: int) -> None:
-        self._pipeline, self._every = pipeline, every
-        self.energies, self.views = np.full(count, np.nan), list[TrackedView]()
+    def __init__(self, begun: Callable[[], Pipeline], starts: Starts, every: int) -> None:
+        self._begun, self._starts, self._every = begun, starts, every
+        self._stretches, self._frames = list[_Stretch](), 0
+        self._pipeline: Pipeline | None = None
+        self._before: Future[int] | None = None
 
-    def step(self, frame: Frame, number: int) -> None:
-        """Track the hand in the next frame."""
-        tracked = self._pipeline.step(frame)
-        estimate, observation = tracked.estimate, tracked.observation
-        self.energies[number] = estimate.energy
-        due = number % self._every == self._every - 1
-        if due and estimate.status.is_trusted and estimate.pose is not None and observation is not None:
-            self.views.append(TrackedView(observation, estimate.pose, estimate.energy, estimate.agreement))
+    def submit(self, frames: list[Frame], pool: ThreadPoolExecutor) -> Future[int]:
+        """Track the next stretch in a thread; the result is the number of its frames."""
+        starts, stretch = (
+            self._starts.get(frames[0].index, ()),
+            _Stretch([], [], (frames[0].index, frames[-1].index), []),
+        )
+        if self._pipeline is None or starts:
+            self._pipeline, self._before = self._begun(), None
+        self._before = pool.submit(self._track, self._pipeline, frames, self._frames, stretch, self._before, starts)
+        self._stretches.append(stretch)
+        self._frames += len(frames)
+        return self._before
+
+    def _track(
+        self,
+        pipeline: Pipeline,
+        frames: list[Frame],
+        first: int,
+        stretch: _Stretch,
+        before: Future[int] | None,
+        starts: tuple[Estimate, ...],
+    ) -> int:
+        """Track the hand in frames, the first one with this number, if those before are finished."""
+        if before is not None:
+            before.result()
+        if starts:
+            pipeline.restore([self._best(starts, frames[0])])
+        for number, frame in enumerate(frames, first):
+            tracked = pipeline.step(frame)
+            estimate, observation = tracked.estimate, tracked.observation
+            stretch.energies.append(estimate.energy)
+            trusted = estimate if estimate.status.is_trusted else None
+            if frame.index in stretch.frames:
+                stretch.ends.append(trusted)
+            due = number % self._every == self._every - 1
+            if due and trusted is not None and trusted.pose is not None and observation is not None:
+                stretch.views.append(TrackedView(observation, trusted.pose, trusted.energy, trusted.agreement))
+        return len(frames)
+
+    def _best(self, starts: tuple[Estimate, ...], frame: Frame) -> Estimate:
+        """Return the estimate that the track of the lowest energy in a frame begins with."""
+        if len(starts) == 1:
+            return starts[0]
+        energies = list[float]()
+        for start in starts:
+            pipeline = self._begun()
+            pipeline.restore([start])
+            energies.append(pipeline.step(frame).estimate.energy)
+        return starts[int(np.argmin(np.nan_to_num(energies, nan=np.inf)))]
+
+    def found(self) -> TrackedStretches:
+        """Return the results of the finished stretches."""
+        energies = np.array([energy for each in self._stretches for energy in each.energies])
+        views = tuple(view for each in self._stretches for view in each.views)
+        starts = {each.frames[0]: [each.ends[0]] for each in self._stretches}
+        for one, other in pairwise(self._stretches):
+            if other.frames[0] == one.frames[1] + 1:
+                starts[other.frames[0]].append(one.ends[-1])
+        known = {frame: tuple(each for each in found if each is not None) for frame, found in starts.items()}
+        return TrackedStretches(energies, views, {frame: found for frame, found in known.items() if found})

@@ -222,6 +222,24 @@ def test_the_true_hand_in_its_true_pose_has_no_residuals(made: Synthesiser) -> N
     assert np.abs(true.g).max() < 0.02 * np.abs(average.g).max()
 
 
+def test_the_skin_of_a_hand_nearby_is_stretched_instead_of_built(made: Synthesiser) -> None:
+    """It is closer to the built one than the stretched skin of the average hand."""
+    displacement = np.full(NODES, 0.001)
+    values = np.append(_sizes() + 0.02 * np.random.default_rng(5).standard_normal(COUNT), displacement)
+    values[KNUCKLES.start : COUNT] = 0.0
+    near, view = np.append(_sizes(), displacement), CalibrationView(observe(made, 40))
+    hand = hand_of(values, "right")
+    exact, stretched, average = (
+        PosedSkin(hand, built).seen(view, made.poses[40]).depth for built in (hand, hand_of(near, "right"), None)
+    )
+    for depth, most in ((stretched, 0.0003), (average, 0.003)):
+        both = (depth > 0) & (exact > 0)
+        assert np.mean(np.abs(depth - exact)[both]) < most
+    assert np.mean(np.abs(stretched - exact)[(stretched > 0) & (exact > 0)]) < 0.5 * np.mean(
+        np.abs(average - exact)[(average > 0) & (exact > 0)]
+    )
+
+
 def test_fingers_that_grow_together_are_parted() -> None:
     """The bases of three fingers are moved to the same place."""
     values, across = _sizes(), slice(KNUCKLES.start, KNUCKLES.start + 6, 2)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from depthtrack.calibration.first_scale import around_lowest, first_scale, lowest_of_parabola
+from depthtrack.calibration.first_scale import FirstHand, around_lowest, first_hand, lowest_of_parabola
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.hand.shape import HandShape, Side
@@ -52,10 +52,17 @@ def test_the_scale_of_a_recorded_hand(tmp_path: Path, scale: float, side: Side, 
     options = Synthesis("everyday", hand=hand, model="skin", background="room", frames=60, rate=15.0)
     write_recording(Synthesiser(options), tmp_path / "recording")
     source = CalibrationSource(open_sequence(tmp_path / "recording"), None, 0, 1, None, CalibrationOptions())
-    assert first_scale(source, assumed) == pytest.approx(scale, rel=0.06)
+    found = first_hand(source, assumed)
+    assert found.scale == pytest.approx(scale, rel=0.06)
+    assert set(found.starts) <= set(source.first_frames)
+    assert len(found.starts) >= 0.7 * len(source.first_frames)
+    two = first_hand(replace(source, threads=2), assumed)
+    assert two.scale == found.scale
+    one, other = ([each.pose for starts in hand.starts.values() for each in starts] for hand in (found, two))
+    np.testing.assert_array_equal(np.array(one), np.array(other))
 
 
 def test_without_scales_to_compare_the_hand_is_the_average_one() -> None:
     options = replace(CalibrationOptions(), first_scales=())
     source = CalibrationSource(None, None, 0, 1, None, options)  # type: ignore[arg-type]
-    assert first_scale(source) == 1.0
+    assert first_hand(source) == FirstHand(1.0, {})

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from depthtrack.calibration import sides
+from depthtrack.calibration.first_scale import FirstHand
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.cli import main
@@ -15,7 +16,7 @@ from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
-from depthtrack.tracking.stretches import StretchOptions, track_hands, track_stretches
+from depthtrack.tracking.stretches import Starts, StretchOptions, track_hands, track_stretches
 
 OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
 
@@ -31,6 +32,9 @@ def recorded(folder: Path, side: Side) -> Path:
 def test_frames_are_spread_over_the_recording() -> None:
     assert StretchOptions(stretches=3, stretch_frames=2).frames(11) == [0, 1, 4, 5, 9, 10]
     assert StretchOptions(stretches=3, stretch_frames=20).frames(5) == [0, 1, 2, 3, 4]
+    assert StretchOptions(stretches=3, stretch_frames=2).ranges(11) == [range(2), range(4, 6), range(9, 11)]
+    assert StretchOptions(stretches=3, stretch_frames=4).ranges(10) == [range(3), range(3, 7), range(7, 10)]
+    assert StretchOptions(stretches=8, stretch_frames=4).ranges(2) == [range(1), range(1, 2)]
 
 
 @pytest.mark.slow
@@ -42,6 +46,24 @@ def test_hands_side_by_side_are_tracked_as_each_alone(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found.energies, alone.energies)
         assert [view.pose.tolist() for view in found.views] == [view.pose.tolist() for view in alone.views]
         assert len(alone.views) > 0
+
+
+@pytest.mark.slow
+def test_stretches_begin_with_estimates_of_their_first_frames(tmp_path: Path) -> None:
+    """The second track is as good, and the same for any number of threads."""
+    sequence, hand = open_sequence(recorded(tmp_path / "recording", "right")), HandShape()
+    options, reported = OPTIONS.stretches, list[tuple[int, int]]()
+    searched = track_stretches(sequence, hand, options=options)
+    assert list(searched.starts) == [0, 37]
+    found = [
+        track_stretches(sequence, hand, None, threads, None, options, lambda *pair: reported.append(pair), starts)
+        for threads, starts in ((1, searched.starts), (3, searched.starts), (2, {37: searched.starts[37]}))
+    ]
+    np.testing.assert_array_equal(found[0].energies, found[1].energies)
+    np.testing.assert_array_equal(found[0].energies[3:], found[2].energies[3:])
+    np.testing.assert_array_equal(searched.energies[:3], found[2].energies[:3])
+    assert np.median(found[0].energies) <= 1.02 * np.median(searched.energies)
+    assert reported == 3 * [(3, 6), (6, 6)]
 
 
 @pytest.mark.slow
@@ -112,8 +134,9 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
         return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side], energies[side])
 
-    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10))
-    monkeypatch.setattr(sides, "first_scale", lambda source: 1.0)
+    starts: dict[Side, Starts] = {"right": {}, "left": {}}
+    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10, {}, starts))
+    monkeypatch.setattr(sides, "first_hand", lambda source: FirstHand(1.0, {}))
     monkeypatch.setattr(sides, "fit_sizes", fit_sizes)
     monkeypatch.setattr(sides, "fit_skin", fit_skin)
     monkeypatch.setattr(sides, "calibration_of", calibration_of)
