@@ -34,8 +34,9 @@ class HandTracker(Closing):
     Searches end at a deadline, and go on in the next frames. Without a deadline, equal frames give equal bits; with a
     given hand, all frames of a recording then give the poses that `depthtrack track` writes. Without a hand, it is
     measured while it is tracked: the average adult's hands of both sides are tracked first, then those of the sizes so
-    far. A hand is first measured after it was visible for three seconds, then every two seconds, and less often when
-    its sizes stay. `depthtrack track` measures it before it tracks the first frame.
+    far. The size of the whole hand is known after it was visible for 1.5 seconds, all sizes two seconds later. They are
+    measured again every two seconds, and less often when they stay. `depthtrack track` measures the hand before it
+    tracks the first frame.
     Frames are numbered from 0 as they arrive; the random numbers of a frame depend on its number.
     The segmentation uses colour if the first frame has colour.
 
@@ -82,7 +83,10 @@ class HandTracker(Closing):
                 config = replace(config, deadline=deadline)
             make = partial(create_tracker, config, threads=threads or usable_cores())
             measured = hand is None
-            self._tracker = OngoingPipeline(make, self._segmenter, self._start_pose) if measured else make(self._given)
+            waits = getattr(config, "deadline", None) is None
+            self._tracker = (
+                OngoingPipeline(make, self._segmenter, self._start_pose, waits=waits) if measured else make(self._given)
+            )
         else:
             self._tracker = tracker
         self._pipeline: Pipeline | OngoingPipeline | None = None

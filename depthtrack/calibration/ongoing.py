@@ -6,13 +6,15 @@ time. Sizes as slow states with an uncertainty follow Tkach et al., "Online gene
 tracking", SIGGRAPH Asia 2017; the prior is that of `joint_optimisation`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.calibrate import Measured, measured_sizes
+from depthtrack.calibration.first_scale import best_scale
 from depthtrack.calibration.fitted_hand import best_views, with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
 from depthtrack.calibration.options import OngoingOptions
@@ -20,10 +22,14 @@ from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape, Side
-from depthtrack.hand.size_parameters import COUNT, WIDTHS, hand_of
+from depthtrack.hand.size_parameters import COUNT, SCALE, WIDTHS, hand_of
 from depthtrack.tracking.pipeline import TrackedFrame
 from depthtrack.tracking.stretches import TrackedView
+from depthtrack.tracking.tracker import Estimate, Tracker
 from depthtrack.types import Array
+
+MakeTracker = Callable[[HandShape], Tracker]
+"""Returns a tracker of a hand."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +46,11 @@ class OngoingSizes:
     measured: Mapping[str, Measured]
 
     @classmethod
-    def average(cls, side: Side) -> "OngoingSizes":
-        """Return the average adult's sizes."""
-        return cls(np.zeros(COUNT), HandShape(side=side), {})
+    def scaled(cls, side: Side, scale: float = 1.0) -> "OngoingSizes":
+        """Return the average adult's sizes, or those of a hand of its proportions."""
+        values = np.zeros(COUNT)
+        values[SCALE] = np.log(scale)
+        return cls(values, HandShape(side=side, scale=scale), {})
 
     def differs(self, other: "OngoingSizes", least: float) -> bool:
         """Return whether the scale or a length differs by at least `least`, in its logarithm."""
@@ -70,6 +78,24 @@ class KeptViews:
         self._next = visible + self._period
         if len(self.views) == self._most:
             self.views, self._period = self.views[::2], 2 * self._period
+
+
+def first_scale(views: Sequence[TrackedView], side: Side, make: MakeTracker, options: OngoingOptions) -> float:
+    """Return the scale of the hand of average proportions that fits some views best.
+
+    views: with poses of the average hand.
+
+    Raises:
+        InputError: if there are too few views.
+    """
+    if len(views) < options.fewest:
+        raise InputError(f"comparing sizes needs at least {options.fewest} views of a hand, found {len(views)}")
+
+    def fitted(scale: float) -> list[Estimate]:
+        with closing(make(HandShape(side=side, scale=scale))) as tracker:
+            return [tracker.start(view.observation, view.pose) for view in views]
+
+    return best_scale(sorted(options.first_scales), fitted)[0]
 
 
 def measure(views: Sequence[TrackedView], sizes: OngoingSizes, options: OngoingOptions) -> OngoingSizes:

@@ -3,8 +3,10 @@
 Hands of both sides are tracked, each with its own sizes, until the energy of one is clearly lower. The right one leads
 at first, since a flat hand looks alike from either side.
 
-Sizes are measured in another thread. A measurement is used at a fixed visible time after its begin, when the next one
-begins. If it is not there by then, the frame waits for it. So equal frames give equal bits.
+Sizes of the whole hand are compared first, in a few views of the leading hand. Then all sizes are measured again and
+again. Both are done in another thread. A result is used at a fixed visible time after its begin, when the next
+measurement begins. If it is not there by then, the frame waits for it, so that equal frames give equal bits. Frames
+with a deadline do not wait: a late result is used in the first frame after it.
 """
 
 from collections import deque
@@ -13,7 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 
 from depthtrack.calibration.calibrate import Measured
-from depthtrack.calibration.ongoing import KeptViews, OngoingSizes, measure
+from depthtrack.calibration.ongoing import KeptViews, MakeTracker, OngoingSizes, first_scale, measure
 from depthtrack.calibration.options import OngoingOptions
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError
@@ -23,17 +25,22 @@ from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.options import SurfaceName
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
 from depthtrack.tracking.surfaces.registry import make_surface
-from depthtrack.tracking.tracker import Estimate, Tracker
+from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array
 
-MakeTracker = Callable[[HandShape], Tracker]
-"""Returns a tracker of a hand."""
 MakeSegmenter = Callable[[Frame], Segmenter]
 """Returns a segmenter for frames like this one, with or without colour."""
 _SURFACES: tuple[SurfaceName, ...] = ("skin", "primitives")
 """Surfaces that trackers fit, and share."""
 _LEAST_ENERGY = 1e-3
 """Energy that a ratio of energies is limited to."""
+
+
+def prepared(sizes: OngoingSizes) -> OngoingSizes:
+    """Make the surfaces of a hand, which are kept: the next tracker need not sample them."""
+    for surface in _SURFACES:
+        make_surface(surface, sizes.hand)
+    return sizes
 
 
 class OngoingHand(Closing):
@@ -47,7 +54,7 @@ class OngoingHand(Closing):
         start_pose: Array | None,
         options: OngoingOptions,
     ) -> None:
-        self.sizes, self._make, self._options = OngoingSizes.average(side), make, options
+        self.sizes, self._make, self._options = OngoingSizes.scaled(side), make, options
         self._tracker, self._start_pose = make(self.sizes.hand), start_pose
         self._make_segmenter = make_segmenter
         self._segmenter: Segmenter | None = None
@@ -74,14 +81,23 @@ class OngoingHand(Closing):
 
         def measured() -> OngoingSizes:
             try:
-                found = measure(views, sizes, options)
-                for surface in _SURFACES:
-                    make_surface(surface, found.hand)  # kept: the next tracker need not sample them
+                return prepared(measure(views, sizes, options))
             except InputError:
                 return sizes
-            return found
 
         return measured
+
+    def comparison(self) -> Callable[[], float]:
+        """Return a function that measures the scale in the views so far; 1 if that fails."""
+        views, hand, options, make = self._kept.views, self.sizes.hand, self._options, self._make
+
+        def compared() -> float:
+            try:
+                return first_scale(views, hand.side, make, options)
+            except InputError:
+                return hand.scale
+
+        return compared
 
     def use(self, sizes: OngoingSizes) -> bool:
         """Go on with these sizes. Return whether they differ from those so far.
@@ -108,6 +124,7 @@ class OngoingPipeline(Closing):
     make: returns the tracker of a hand.
     make_segmenter: returns the segmenter for frames like the first one.
     start_pose: (27,) see `Pipeline`.
+    waits: whether frames wait for results.
     side: of the hand in use.
     """
 
@@ -117,14 +134,17 @@ class OngoingPipeline(Closing):
         make_segmenter: MakeSegmenter,
         start_pose: Array | None = None,
         options: OngoingOptions | None = None,
+        waits: bool = True,
     ) -> None:
-        self._options = options or OngoingOptions()
+        self._options, self._waits = options or OngoingOptions(), waits
         sides: tuple[Side, ...] = ("right", "left")
         self._hands = {side: OngoingHand(side, make, make_segmenter, start_pose, self._options) for side in sides}
         self._energies: dict[Side, float] = dict.fromkeys(sides, 0.0)
         self.side: Side = "right"
         self._visible, self._time = 0.0, float("nan")
-        self._due, self._period = self._options.begin, self._options.period
+        self._compares = len(self._options.first_scales) > 1
+        self._due = self._options.scale_begin if self._compares else self._options.begin
+        self._period, self._measures = self._options.period, False
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="measurement")
         self._pending: Future[dict[Side, OngoingSizes]] | None = None
 
@@ -152,11 +172,18 @@ class OngoingPipeline(Closing):
             elapsed = frame.timestamp - self._time
             self._visible += min(elapsed, self._options.longest_step) if elapsed > 0 else 0.0
         self._time = frame.timestamp
-        if self._visible >= self._due:
+        if self._visible >= self._due and (self._waits or self._pending is None or self._pending.done()):
+            if not self._waits:
+                self._due = self._visible
             self._give_up_side()
-            self._use_measurement()
-            self._begin_measurement()
-            self._due += self._period
+            stays = self._use_measurement()
+            if self._compares:
+                self._begin_comparison()
+                self._compares, self._due = False, self._options.begin
+            else:
+                self._begin_measurement()
+                self._period *= 2 if stays and self._measures else 1
+                self._measures, self._due = True, self._due + self._period
         return found
 
     def _compare(self, tracked: dict[Side, TrackedFrame]) -> None:
@@ -175,15 +202,27 @@ class OngoingPipeline(Closing):
         """Return the share by which the energy of a side is higher than that of the other one."""
         return self._energies[side] / max(self._energies[other_side(side)], _LEAST_ENERGY) - 1
 
-    def _use_measurement(self) -> None:
-        """Wait for the sizes that are being measured, and go on with them."""
+    def _use_measurement(self) -> bool:
+        """Wait for the sizes that are being measured, and go on with them.
+
+        Returns whether they are those so far.
+        """
         if self._pending is None:
-            return
+            return False
         found = self._pending.result()
         changed = [hand.use(found[side]) for side, hand in self._hands.items()]
-        if not any(changed):
-            self._period *= 2
         self._energies = {side: self._options.kept_evidence * each for side, each in self._energies.items()}
+        return not any(changed)
+
+    def _begin_comparison(self) -> None:
+        """Compare sizes of the whole hand in the views of the leading side, in the other thread."""
+        job, sides = self._hands[self.side].comparison(), tuple(self._hands)
+
+        def compared() -> dict[Side, OngoingSizes]:
+            scale = job()
+            return {side: prepared(OngoingSizes.scaled(side, scale)) for side in sides}
+
+        self._pending = self._pool.submit(compared)
 
     def _begin_measurement(self) -> None:
         """Measure the sizes of each side in the views so far, in the other thread."""

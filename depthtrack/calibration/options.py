@@ -94,7 +94,14 @@ class CalibrationOptions:
 class OngoingOptions:
     """Measurements of a hand while it is tracked."""
 
-    begin: float = option(1.0, "Visible time at which the first measurement begins", unit="s")
+    first_scales: tuple[float, ...] = option(
+        (0.72, 0.8, 0.9, 1.0, 1.1, 1.22),
+        "Sizes of the whole hand, of the average one's, that are compared before the first measurement; empty: none",
+    )
+    scale_begin: float = option(
+        0.3, "Visible time at which the comparison begins; the first measurement begins with its result", unit="s"
+    )
+    begin: float = option(1.5, "Visible time at which the first measurement begins", unit="s")
     period: float = option(
         2.0, "Visible time from its begin to its use, when the next begins; it doubles when the hand stays", unit="s"
     )

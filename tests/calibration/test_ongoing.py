@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from depthtrack.calibration import ongoing_pipeline
-from depthtrack.calibration.ongoing import KeptViews, OngoingSizes, measure
+from depthtrack.calibration.ongoing import KeptViews, OngoingSizes, first_scale, measure
 from depthtrack.calibration.ongoing_pipeline import OngoingPipeline
 from depthtrack.calibration.options import OngoingOptions
 from depthtrack.errors import InputError
@@ -21,7 +22,9 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesiser
+from depthtrack.tracking.configuration import IkConfig
 from depthtrack.tracking.pipeline import TrackedFrame
+from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stretches import TrackedView
 from depthtrack.tracking.tracker import Estimate
 from tests.support.observations import observe
@@ -29,7 +32,9 @@ from tests.support.synthesis import synthesiser
 
 STEP = 0.125
 """Seconds between two frames: a binary fraction, so that sums are exact."""
-OPTIONS = OngoingOptions(begin=1.0, period=1.0, view_period=0.25, views=64, longest_step=STEP, sure_after=4.0)
+OPTIONS = OngoingOptions(
+    first_scales=(), begin=1.0, period=1.0, view_period=0.25, views=64, longest_step=STEP, sure_after=4.0
+)
 SCALE = 0.9
 
 
@@ -93,6 +98,7 @@ class Scene:
     observation: Observation
     energies: dict[Side, Callable[[float], float]]
     trackers: list[ScriptedTracker] = field(default_factory=list)
+    options: OngoingOptions = OPTIONS
 
     def make(self, hand: HandShape) -> ScriptedTracker:
         self.trackers.append(ScriptedTracker(hand, self.energies))
@@ -112,7 +118,7 @@ class Scene:
 
     def run(self, seconds: float) -> tuple[OngoingPipeline, list[Estimate]]:
         segmenter: Any = self
-        with OngoingPipeline(self.make, lambda _: segmenter, options=OPTIONS) as pipeline:
+        with OngoingPipeline(self.make, lambda _: segmenter, options=self.options) as pipeline:
             return pipeline, [pipeline.step(frame).estimate for frame in self.frames(seconds)]
 
 
@@ -158,18 +164,18 @@ def test_only_trusted_poses_are_kept(observation: Observation, status: Status) -
 
 def test_a_hand_is_measured_with_its_uncertainty(made: Synthesiser) -> None:
     views = [TrackedView(observe(made, n), made[n].pose, 1.0, 0.9) for n in range(0, 360, 60)]
-    found = measure(views, OngoingSizes.average("right"), OngoingOptions())
+    found = measure(views, OngoingSizes.scaled("right"), OngoingOptions())
     length = found.measured["hand_length"]
-    true = OngoingSizes.average("right").hand.with_(scale=SCALE)
+    true = OngoingSizes.scaled("right").hand.with_(scale=SCALE)
     assert length.mm == pytest.approx(
         1000 * SCALE * (true.palm_length / 2 + true.bases[2, 1] + true.lengths[2].sum()), rel=0.02
     )
     assert 0 < length.sigma_mm < 8
     assert found.hand.side == "right"
     with pytest.raises(InputError, match="at least 3 views"):
-        measure(views[:2], OngoingSizes.average("right"), OngoingOptions())
+        measure(views[:2], OngoingSizes.scaled("right"), OngoingOptions())
     with pytest.raises(InputError, match="does not resemble a hand"):
-        measure([each._replace(agreement=0.2) for each in views], OngoingSizes.average("right"), OngoingOptions())
+        measure([each._replace(agreement=0.2) for each in views], OngoingSizes.scaled("right"), OngoingOptions())
 
 
 def test_measurements_are_used_at_fixed_times_and_no_frame_is_lost(
@@ -190,6 +196,37 @@ def test_measurements_are_used_at_fixed_times_and_no_frame_is_lost(
     for before, after in pairwise(right):
         assert before.closed
         assert [each.timestamp for each in after.restored] == before.tracked[-2:]
+
+
+def test_the_size_of_the_whole_hand_is_used_before_the_first_measurement(
+    observation: Observation, measured_scales: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compared = list[tuple[Side, int]]()
+
+    def first(views: Sequence[TrackedView], side: Side, make: object, options: OngoingOptions) -> float:
+        compared.append((side, len(views)))
+        return 0.8
+
+    monkeypatch.setattr(ongoing_pipeline, "first_scale", first)
+    options = replace(OPTIONS, first_scales=(0.8, 0.9, 1.0), scale_begin=0.5)
+    scene = Scene(observation, {"right": even, "left": even}, options=options)
+    _, estimates = scene.run(2.5)
+    scales = [each.hand.scale for each in estimates if each.hand is not None]
+    changes = [n for n in range(1, len(scales)) if scales[n] != scales[n - 1]]
+    assert [STEP * (n - 1) for n in changes] == [1.0, 2.0]
+    np.testing.assert_allclose([scales[n] for n in [0, *changes]], [1.0, 0.8, 0.72])
+    # One side is compared, and the other hand has the same size.
+    assert compared == [("right", 2)]
+    np.testing.assert_allclose(measured_scales[:2], 0.8)
+
+
+def test_the_size_of_the_whole_hand_fits_views_best(made: Synthesiser) -> None:
+    views = [TrackedView(observe(made, n), made[n].pose, 1.0, 0.9) for n in range(0, 100, 20)]
+    make = partial(create_tracker, IkConfig())
+    found = first_scale(views, "right", make, OngoingOptions())
+    assert found == pytest.approx(SCALE, rel=0.03)
+    with pytest.raises(InputError, match="at least 3 views"):
+        first_scale(views[:2], "right", make, OngoingOptions())
 
 
 def test_the_next_measurements_are_rarer_when_the_hand_stays(
@@ -234,6 +271,32 @@ def test_a_slow_measurement_changes_no_estimate(
     monkeypatch.setattr(ongoing_pipeline, "measure", slow)
     monkeypatch.setattr(OngoingPipeline, "_use_measurement", use)
     assert [each.hand for each in Scene(observation, scene.energies).run(3.0)[1]] == quick
+
+
+def test_frames_with_a_deadline_do_not_wait(
+    observation: Observation, measured_scales: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first measurement is due at two seconds, and ends after the frame of three."""
+    scene, finished = Scene(observation, {"right": even, "left": even}), threading.Event()
+
+    def slow(views: Sequence[TrackedView], before: OngoingSizes, options: OngoingOptions) -> OngoingSizes:
+        assert finished.wait(60)
+        return smaller(views, before, options)
+
+    monkeypatch.setattr(ongoing_pipeline, "measure", slow)
+    segmenter: Any = scene
+    scales = list[float]()
+    with OngoingPipeline(scene.make, lambda _: segmenter, options=OPTIONS, waits=False) as pipeline:
+        for frame in scene.frames(3.5):
+            if frame.timestamp == 3.0:
+                finished.set()
+                assert pipeline._pending is not None
+                pipeline._pending.result()
+            pipeline.step(frame)
+            scales.append(pipeline.hand.scale)
+    changed = scales.index(0.9)
+    assert changed * STEP == 3.0
+    assert scales == [1.0] * changed + [0.9] * (len(scales) - changed)
 
 
 def test_a_failed_measurement_keeps_the_hand(observation: Observation, monkeypatch: pytest.MonkeyPatch) -> None:
