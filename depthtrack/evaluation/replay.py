@@ -139,7 +139,7 @@ class Replay:
             keypoints = read_keypoints(Path(self.configuration.keypoints))
             frames = keypoints.attach(frames, self.sequence.timestamps)
         known = ((frame, self._estimate(row_of[frame.index])) for frame in frames)
-        for each in replay_frames(known, guide, segmenter, self.hand):
+        for each in replay_frames(known, guide, segmenter, self.hand, self.run.backward):
             yield ReplayedFrame(row_of[each.frame.index], each.frame, each.observation, each.estimate)
 
     def _estimate(self, row: int) -> Estimate:

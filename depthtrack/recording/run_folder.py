@@ -39,8 +39,8 @@ BACKWARD_STAGE = "backward"
 class RunWriter(Closing):
     """Appends frames to a run folder; every row is complete on disk before the next is written.
 
-    rows: of the frames so far, tracked forward.
-    revised: whether poses of the backward pass have replaced some of them in `poses.csv`.
+    rows: of the frames so far.
+    revised: whether poses of the backward pass have replaced some of the forward ones.
     """
 
     def __init__(
@@ -80,8 +80,7 @@ class RunWriter(Closing):
                 write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
             if (folder / FORWARD_FILE).exists():
-                forward = read_rows(folder, FORWARD_FILE)
-                self.revised = list(map(row_cells, forward)) != list(map(row_cells, self.rows))
+                self.revised = bool(_changed(folder, self.rows))
                 if self.revised:
                     return
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
@@ -149,6 +148,7 @@ class Run:
     poses: (T, 27) metres, quaternion, radians, camera frame; NaN if no hand was observed.
     stage_ms: (T,) milliseconds of each stage.
     failures: what failed unexpectedly, by the index of the frame.
+    backward: indices of the frames whose pose is that of the backward pass.
     """
 
     folder: Path
@@ -164,6 +164,7 @@ class Run:
     poses: Array
     stage_ms: dict[str, Array]
     failures: Mapping[int, str] = field(default_factory=dict)
+    backward: frozenset[int] = frozenset()
 
     @classmethod
     def load(cls, folder: Path) -> Self:
@@ -188,7 +189,16 @@ class Run:
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
             read_failures(folder),
+            _changed(folder, rows),
         )
+
+
+def _changed(folder: Path, rows: Sequence[RunRow]) -> frozenset[int]:
+    """Return the indices of rows that differ from those of the forward pass."""
+    if not (folder / FORWARD_FILE).exists():
+        return frozenset()
+    forward = {row.index: row_cells(row) for row in read_rows(folder, FORWARD_FILE)}
+    return frozenset(row.index for row in rows if forward.get(row.index) != row_cells(row))
 
 
 def _branches(rows: Iterable[RunRow]) -> list[list[str]]:

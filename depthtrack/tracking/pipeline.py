@@ -6,8 +6,9 @@ Runs, replay, segmentation figures, comparison, examples and live use all consum
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -128,17 +129,35 @@ def track_frames(frames: Iterable[Frame], pipeline: Pipeline, known: Sequence[Es
         yield pipeline.step(frame, known[number] if number < len(known) else None)
 
 
+class _KnownPose(NamedTuple):
+    """Guides the segmentation of a frame by its own pose."""
+
+    pose: Array
+
+    def predicted_pose(self, timestamp: float) -> Array:
+        return self.pose
+
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        return None
+
+
 def replay_frames(
-    frames: Iterable[tuple[Frame, Estimate]], guide: Guide, segmenter: Segmenter, hand: HandShape
+    frames: Iterable[tuple[Frame, Estimate]],
+    guide: Guide,
+    segmenter: Segmenter,
+    hand: HandShape,
+    backward: Collection[int] = (),
 ) -> Iterator[TrackedFrame]:
     """Segment frames again as during tracking.
 
     guide: restores the ROI prior from the estimates.
+    backward: indices of frames that were tracked backwards. The frame before did not guide them, so their pose does.
     """
     model = HandModel(hand)
     keypoints = KeypointGuide(model)
     for frame, estimate in frames:
-        observation, milliseconds, failure = segment(frame, segmenter, model, guide, keypoints, time.perf_counter)
+        own = _KnownPose(estimate.pose) if frame.index in backward and estimate.pose is not None else guide
+        observation, milliseconds, failure = segment(frame, segmenter, model, own, keypoints, time.perf_counter)
         guide.restore([estimate])
         observation, later = around_start(frame, observation, estimate, segmenter, model)
         segmenter.set_lost(estimate.status is Status.LOST, frame.timestamp)

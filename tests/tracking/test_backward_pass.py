@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,17 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from depthtrack.errors import InputError
+from depthtrack.evaluation.replay import Replay
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.run_folder import Run
+from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking import pipeline
 from depthtrack.tracking.backward_pass import (
     BackwardOptions,
     change_of_direction,
@@ -26,9 +32,10 @@ from depthtrack.tracking.backward_pass import (
     in_order,
 )
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, Oikonomidis2011Config
+from depthtrack.tracking.guided_segmentation import segment
 from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
-from depthtrack.tracking.tracker import ABSENT, Estimate, Tracker
+from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
 from tests.support.recordings import pose_at
 
@@ -158,6 +165,21 @@ def test_the_forward_poses_are_kept_beside_them(run: Path) -> None:
     assert [before == after for before, after in zip(*lines, strict=True)] == (
         [True] + [False] * CLEAR + [True] * (FRAMES - CLEAR)
     )
+
+
+def test_a_replay_segments_frames_of_the_backward_pass_around_their_poses(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replay, guided = Replay.open(Run.load(run)), list[Array | None]()
+
+    def spy(frame: Frame, segmenter: Segmenter, model: HandModel, guide: Guide, *others: Any) -> Any:
+        guided.append(guide.predicted_pose(frame.timestamp))
+        return segment(frame, segmenter, model, guide, *others)
+
+    monkeypatch.setattr(pipeline, "segment", spy)
+    assert len(list(replay)) == FRAMES
+    own = [pose is not None and np.array_equal(pose, row) for pose, row in zip(guided, replay.run.poses, strict=True)]
+    assert own == [True] * CLEAR + [False] * (FRAMES - CLEAR)
 
 
 @pytest.mark.parametrize("kept", ["frames", "forward"])
