@@ -11,7 +11,7 @@ from pathlib import Path
 from depthtrack.errors import InputError
 
 _SOURCES = {
-    "run.json": {"run.json", "poses.csv", "timings.csv", "branches.csv"},
+    "run.json": {"run.json", "poses.csv", "forward.csv", "timings.csv", "branches.csv", "failures.csv"},
     "depth.txt": {"depth.txt", "rgb.txt", "camera.json", "hand.json", "hand_poses.csv", "joints.csv", "keypoints.csv"},
     "markers.json": {"markers.json", "confidence.csv", "residual.csv", "filled.csv"},
 }

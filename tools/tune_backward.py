@@ -11,6 +11,7 @@ folder holds the estimates, from which an interrupted choice continues.
 """
 
 import argparse
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from depthtrack.evaluation.sweep.workers import chosen_workers
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.recording.sequence import Sequence
+from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
@@ -125,11 +126,12 @@ def _stretches(sequence: Sequence, hand: HandShape, clip: range) -> list[Any]:
     rows = []
     with closing(create_tracker(config, hand)) as tracker:
         for stretch in reversed(stretches):
-            backward, _ = track_stretch(
-                stretch, forward, lambda places: sequence.frames(clip[i] for i in places), pipeline()
-            )
-            pairs = zip(range(*stretch), backward, strict=True)
-            rows.append([[*row(forward[place], clip[place]), *row(each, clip[place])] for place, each in pairs])
+
+            def read(places: Iterable[int]) -> Iterator[Frame]:
+                return sequence.frames(clip[place] for place in places)
+
+            backward = {place: each for place, each, _ in track_stretch(stretch, forward, read, pipeline())}
+            rows.append([[*row(forward[at], clip[at]), *row(backward[at], clip[at])] for at in range(*stretch)])
     return rows
 
 

@@ -79,7 +79,7 @@ def track(
     keypoints: Path | str | None = None,
     backward: bool | BackwardOptions | None = None,
 ) -> Iterator[TrackedFrame] | Run:
-    """Track the hand of a recording; the poses are those of `depthtrack track`.
+    """Track the hand of a recording; the poses of a written run are those of `depthtrack track`.
 
     hand: a hand, the path of a hand file or rigged mesh, "truth", or "average" for the average adult's right hand. If
         absent, it is measured first, while it is tracked in up to 160 frames.

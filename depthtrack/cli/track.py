@@ -167,7 +167,8 @@ class TrackCommand:
 
         from depthtrack.recording.depth_checks import no_hand_note, poor_agreement_note
         from depthtrack.recording.frame_failures import FAILURES_FILE, read_failures
-        from depthtrack.recording.run_rows import read_rows
+        from depthtrack.recording.run_folder import backward_frames
+        from depthtrack.recording.run_rows import FORWARD_FILE, read_rows
 
         rows, failures = read_rows(self.out), read_failures(self.out)
         if failures and len(failures) == len(rows):
@@ -182,8 +183,12 @@ class TrackCommand:
             choice = quick_side(sequence, self.segmentation_options, self.threads or 1, self.frames)
             if (better := other_side_text(choice, self.hands.given_side)) is not None:
                 print(better)
+        backward = len(backward_frames(self.out, rows))
+        replaced = (
+            f", {backward} tracked backwards ({self.out / FORWARD_FILE} has all forward poses)" if backward else ""
+        )
         failed = f", {len(failures)} failed unexpectedly ({self.out / FAILURES_FILE})" if failures else ""
-        print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{failed}{rate}")
+        print(f"{self.out}: {len(rows)} frames, {untrusted} without a trusted pose{replaced}{failed}{rate}")
         print(f"errors and timing:  depthtrack evaluate {self.out}")
 
 

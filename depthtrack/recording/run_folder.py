@@ -44,11 +44,18 @@ class RunWriter(Closing):
     """
 
     def __init__(
-        self, folder: Path, configuration: dict[str, Any], stages: Sequence[str], resume: bool = False
+        self,
+        folder: Path,
+        configuration: dict[str, Any],
+        stages: Sequence[str],
+        resume: bool = False,
+        length: int | None = None,
     ) -> None:
         """Begin a run, or resume it.
 
         stages: names of the timings' columns.
+        length: frames that a whole run has; None if unknown. A revised run that is not whole goes on from its forward
+            rows, as it does if the recording has grown.
 
         Raises:
             InputError: if the folder holds a run and `resume` is false, or a run of another configuration, or another
@@ -63,14 +70,14 @@ class RunWriter(Closing):
         with ExitStack() as stack:
             stack.enter_context(locked(folder))
             check_unused(folder, resume)
-            self._prepare(configuration)
+            self._prepare(configuration, length)
             self._poses, self._timings, self._branches = (
                 stack.enter_context((folder / name).open("a", newline="", encoding="utf-8"))
                 for name in ("poses.csv", "timings.csv", "branches.csv")
             )
             self._open = stack.pop_all()
 
-    def _prepare(self, configuration: dict[str, Any]) -> None:
+    def _prepare(self, configuration: dict[str, Any], length: int | None) -> None:
         """Write the tables of a new run, or keep the whole rows of a begun one."""
         folder = self.folder
         if (folder / "run.json").exists():
@@ -80,12 +87,17 @@ class RunWriter(Closing):
                 write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
             self.rows = read_rows(folder)
             if (folder / FORWARD_FILE).exists():
-                self.revised = bool(_changed(folder, self.rows))
+                forward = read_rows(folder, FORWARD_FILE)
+                whole = len(forward) >= (length or 0) and [row.index for row in forward] == [
+                    row.index for row in self.rows
+                ]
+                self.revised = whole and bool(backward_frames(folder, self.rows))
                 if self.revised:
                     return
+                self.rows = forward
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
-            kept = read_table(folder / "timings.csv", ("index", *self._stages))[: len(self.rows)]
-            rewrite_table(folder / "timings.csv", ("index", *self._stages), kept)
+            (folder / FORWARD_FILE).unlink(missing_ok=True)
+            rewrite_table(folder / "timings.csv", ("index", *self._stages), self._timing_rows())
             keep_failures(folder, frozenset(row.index for row in self.rows))
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, _branches(self.rows))
         else:
@@ -93,6 +105,12 @@ class RunWriter(Closing):
             rewrite_table(folder / "timings.csv", ("index", *self._stages), ())
             rewrite_table(folder / "branches.csv", BRANCH_COLUMNS, ())
             write_atomic(folder / "run.json", exact_json_text(configuration, indent=2) + "\n")
+
+    def _timing_rows(self) -> list[list[str]]:
+        """Return the cells of `timings.csv`, a row for each of `rows`; zeros if it has none."""
+        found = {cells[0]: cells for cells in read_table(self.folder / "timings.csv", ("index", *self._stages))}
+        indices = [str(row.index) for row in self.rows]
+        return [found.get(index, [index, *("0.000" for _ in self._stages)]) for index in indices]
 
     def append(self, row: RunRow, stage_ms: dict[str, float], failure: str | None = None) -> None:
         """Append the next frame and the milliseconds of its stages.
@@ -118,7 +136,7 @@ class RunWriter(Closing):
         """
         if not milliseconds:
             return
-        timings = read_table(self.folder / "timings.csv", ("index", *self._stages))
+        timings = self._timing_rows()
         for place, duration in milliseconds.items():
             timings[place][1 + self._stages.index(BACKWARD_STAGE)] = f"{duration:.3f}"
         rewrite_table(self.folder / "timings.csv", ("index", *self._stages), timings)
@@ -189,12 +207,12 @@ class Run:
             np.array([no_pose if row.pose is None else row.pose for row in rows]).reshape(-1, POSE_SIZE),
             _read_timings(folder / "timings.csv", len(rows)),
             read_failures(folder),
-            _changed(folder, rows),
+            backward_frames(folder, rows),
         )
 
 
-def _changed(folder: Path, rows: Sequence[RunRow]) -> frozenset[int]:
-    """Return the indices of rows that differ from those of the forward pass."""
+def backward_frames(folder: Path, rows: Sequence[RunRow]) -> frozenset[int]:
+    """Return the indices of rows whose pose is that of the backward pass."""
     if not (folder / FORWARD_FILE).exists():
         return frozenset()
     forward = {row.index: row_cells(row) for row in read_rows(folder, FORWARD_FILE)}
@@ -264,6 +282,9 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path
             continue
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
             name, before, now = _first_difference(key, found.get(key), wanted.get(key))
+            if key == "backward" and None in (before, now):
+                given, other = ("no", "yes") if before is None else ("yes", "no")
+                raise InputError(f"{folder} was begun with --backward {given}, not {other}: continue with the same")
             raise InputError(
                 f"{folder} was begun with {name} = {before!r:.80}, not {now!r:.80}: "
                 "continue with the same options, or choose another folder"

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from depthtrack.errors import InputError
 from depthtrack.options import check_ranges, option
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
@@ -44,6 +45,8 @@ class BackwardOptions:
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        if self.doubtful > self.confident:
+            raise InputError(f"doubtful must be at most confident, {self.confident:g}, found {self.doubtful:g}")
 
 
 def chosen_backward(choice: bool | BackwardOptions | None, tracker: TrackerConfig) -> BackwardOptions | None:
@@ -51,9 +54,14 @@ def chosen_backward(choice: bool | BackwardOptions | None, tracker: TrackerConfi
 
     choice: whether there is one, or its options. By default, the trackers of papers go forward alone, and so does one
         with a deadline. A lift has no direction.
+
+    Raises:
+        InputError: the choice is of another type.
     """
     if isinstance(choice, BackwardOptions):
         return choice
+    if choice is not None and not isinstance(choice, bool):
+        raise InputError(f"backward must be true, false, absent or BackwardOptions, found {choice!r:.40}")
     if choice is None:
         choice = isinstance(tracker, HybridConfig | IkConfig | PsoConfig)
         choice = choice and getattr(tracker, "deadline", None) is None
@@ -67,8 +75,8 @@ class Stretch(NamedTuple):
     anchor: int
 
 
-class Frames(Protocol):
-    """The frames of a recording."""
+class ReadFrames(Protocol):
+    """Reads frames of a recording."""
 
     def __call__(self, places: Sequence[int]) -> Iterable[Frame]:
         """Return the frames at some places of the estimates."""
@@ -77,7 +85,7 @@ class Frames(Protocol):
 
 def track_backwards(
     forward: Sequence[Estimate],
-    frames: Frames,
+    frames: ReadFrames,
     pipeline: Callable[[], Pipeline],
     clamp: float,
     options: BackwardOptions,
@@ -96,14 +104,21 @@ def track_backwards(
     total = sum(anchor - first for first, anchor in stretches)
     better, milliseconds = dict[int, Estimate](), dict[int, float]()
     # The last one first, so that the tracker's time goes on backwards.
-    for first, anchor in reversed(stretches):
-        found, times = track_stretch(Stretch(first, anchor), forward, frames, pipeline())
-        milliseconds |= dict(enumerate(times, first))
-        change = change_of_direction(forward[first:anchor], found, clamp, options)
-        better |= dict(enumerate(found[change:], first + change))
-        if progress is not None:
-            progress(len(milliseconds), total)
-    return in_order(forward, better), milliseconds
+    for stretch in reversed(stretches):
+        found = dict[int, Estimate]()
+        for place, estimate, duration in track_stretch(stretch, forward, frames, pipeline()):
+            found[place], milliseconds[place] = estimate, duration
+            if progress is not None:
+                progress(len(milliseconds), total)
+        places = range(*stretch)
+        ahead, back = [forward[place] for place in places], [found[place] for place in places]
+        change = change_of_direction(ahead, back, clamp, options)
+        better |= {place: found[place] for place in places[change:]}
+        # A frame without a trusted pose has nothing to lose.
+        better |= {
+            place: found[place] for place in places[:change] if _is_better_than_none(forward[place], found[place])
+        }
+    return with_forward_status(forward, better), milliseconds
 
 
 def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) -> list[Stretch]:
@@ -118,25 +133,25 @@ def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) 
 
 
 def track_stretch(
-    stretch: Stretch, forward: Sequence[Estimate], frames: Frames, pipeline: Pipeline
-) -> tuple[list[Estimate], list[float]]:
-    """Return the backward estimates of a stretch, in forward order, and their milliseconds.
+    stretch: Stretch, forward: Sequence[Estimate], frames: ReadFrames, pipeline: Pipeline
+) -> Iterator[tuple[int, Estimate, float]]:
+    """Yield place, backward estimate and milliseconds of each frame of a stretch, last first.
 
     forward: estimates of all frames.
     pipeline: of a tracker that has followed later stretches at most.
     """
     first, anchor = stretch
     begin = replace(forward[anchor], status=Status.STARTED, timestamp=-forward[anchor].timestamp, branches=())
-    found, milliseconds = list[Estimate](), list[float]()
-    for frame in _reversed(frames, first, anchor):
+    known: Estimate | None = begin  # of the anchor alone, which is tracked already
+    for place, frame in zip(range(anchor, first - 1, -1), _reversed(frames, first, anchor), strict=True):
         begun = time.perf_counter()
         # Time runs backwards: speeds and pauses are those of a hand that moves so.
-        known = None if found else begin
         estimate = pipeline.step(replace(frame, timestamp=-frame.timestamp), known).estimate
-        milliseconds.append(1e3 * (time.perf_counter() - begun))
-        # Branches hold times of this direction, and nothing continues them.
-        found.append(replace(estimate, timestamp=frame.timestamp, branches=()))
-    return found[:0:-1], milliseconds[:0:-1]
+        if known is None:
+            # Branches hold times of this direction, and nothing continues them.
+            estimate = replace(estimate, timestamp=frame.timestamp, branches=())
+            yield place, estimate, 1e3 * (time.perf_counter() - begun)
+        known = None
 
 
 def change_of_direction(
@@ -157,7 +172,7 @@ def change_of_direction(
     return len(forward) - int(np.argmin((before + after)[::-1]))
 
 
-def in_order(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
+def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
     """Return the backward estimates, by their places, with the status of a forward track.
 
     A trusted pose after a frame without one starts the track.
@@ -168,6 +183,11 @@ def in_order(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> d
         status = Status.TRACKED if follows else Status.STARTED
         ordered[place] = replace(estimate, status=status) if estimate.status.is_trusted else estimate
     return ordered
+
+
+def _is_better_than_none(forward: Estimate, backward: Estimate) -> bool:
+    """Return whether only the backward estimate has a trusted pose."""
+    return backward.status.is_trusted and not forward.status.is_trusted
 
 
 def _confidence(estimate: Estimate) -> float:
@@ -185,7 +205,7 @@ def _cost(estimate: Estimate, clamp: float, options: BackwardOptions) -> float:
     return min(estimate.energy / clamp, 1.0) - options.confidence_weight * confidence
 
 
-def _reversed(frames: Frames, first: int, last: int) -> Iterator[Frame]:
+def _reversed(frames: ReadFrames, first: int, last: int) -> Iterator[Frame]:
     """Yield the frames `last` to `first`; few are in memory at once."""
     for stop in range(last + 1, first, -_READ_AT_ONCE):
         yield from reversed(list(frames(range(max(first, stop - _READ_AT_ONCE), stop))))

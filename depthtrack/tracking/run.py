@@ -106,7 +106,7 @@ class TrackingRun(Closing):
         """
         fields, backward = self.configuration.to_fields(), self.configuration.backward
         stages = ("segment", *self.tracker.stages, *(() if backward is None else (BACKWARD_STAGE,)))
-        with RunWriter(folder, fields, stages, resume) as run:
+        with RunWriter(folder, fields, stages, resume, len(self)) as run:
             if run.revised:
                 return
             known = estimates_of(run.rows)

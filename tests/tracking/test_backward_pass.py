@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from depthtrack.evaluation.replay import Replay
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.registry import open_sequence
-from depthtrack.recording.run_folder import Run
+from depthtrack.recording.run_folder import Run, RunWriter
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
@@ -29,7 +30,8 @@ from depthtrack.tracking.backward_pass import (
     change_of_direction,
     chosen_backward,
     doubtful_stretches,
-    in_order,
+    track_backwards,
+    with_forward_status,
 )
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, Oikonomidis2011Config
 from depthtrack.tracking.guided_segmentation import segment
@@ -37,7 +39,7 @@ from depthtrack.tracking.run import TrackingRun, configure
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.tracker import ABSENT, Estimate, Guide, Tracker
 from depthtrack.types import Array
-from tests.support.recordings import pose_at
+from tests.support.recordings import CAMERA, pose_at
 
 OPTIONS = BackwardOptions()
 CLAMP = 40.0
@@ -88,7 +90,9 @@ def test_equal_estimates_of_both_directions_stay_forward() -> None:
 
 def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
     lost = estimate(0.0, status=Status.LOST)
-    ordered = in_order([ABSENT, lost, lost, estimate(0.9)], {1: estimate(0.4), 2: estimate(0.4, status=Status.STARTED)})
+    ordered = with_forward_status(
+        [ABSENT, lost, lost, estimate(0.9)], {1: estimate(0.4), 2: estimate(0.4, status=Status.STARTED)}
+    )
     assert [each.status for each in ordered.values()] == [Status.STARTED, Status.TRACKED]
 
 
@@ -127,6 +131,10 @@ class BadStart:
         self._tracker.close()
 
 
+def bad_start(tracker: Tracker) -> Tracker:
+    return BadStart(tracker, pose_at(0))
+
+
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("backward") / "everyday"
@@ -138,7 +146,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def tracking(recording: Path) -> Iterator[TrackingRun]:
     sequence = open_sequence(recording)
     configuration = configure(recording, sequence, HybridConfig(), HandShape(), backward=OPTIONS)
-    with TrackingRun(configuration, sequence, wrap=lambda each: BadStart(each, pose_at(0))) as run:
+    with TrackingRun(configuration, sequence, wrap=bad_start) as run:
         yield run
 
 
@@ -146,7 +154,7 @@ def tracking(recording: Path) -> Iterator[TrackingRun]:
 def run(tracking: TrackingRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder, shown = tmp_path_factory.mktemp("backward-run") / "run", list[tuple[int, int]]()
     assert len(list(tracking.write(folder, progress=lambda done, total: shown.append((done, total))))) == FRAMES
-    assert shown == [(CLEAR, CLEAR)]
+    assert shown == [(done, CLEAR) for done in range(1, CLEAR + 1)]
     return folder
 
 
@@ -186,10 +194,7 @@ def test_a_replay_segments_frames_of_the_backward_pass_around_their_poses(
 def test_an_interrupted_run_ends_with_the_same_poses(
     kept: str, run: Path, tracking: TrackingRun, tmp_path: Path
 ) -> None:
-    folder = tmp_path / "run"
-    folder.mkdir()
-    for file in run.iterdir():
-        (folder / file.name).write_bytes(file.read_bytes())
+    folder = _copied(run, tmp_path / "run")
     forward = (folder / "forward.csv").read_text()
     if kept == "frames":  # killed before the backward pass
         (folder / "forward.csv").unlink()
@@ -211,3 +216,54 @@ def test_run_json_holds_the_options(run: Path) -> None:
     assert RunConfiguration.from_fields({**fields, "backward": None}, "run.json").backward is None
     with pytest.raises(InputError, match="gain must be"):
         RunConfiguration.from_fields({**fields, "backward": {"gain": -1}}, "run.json")
+
+
+def _copied(run: Path, folder: Path) -> Path:
+    folder.mkdir()
+    for file in run.iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    return folder
+
+
+@pytest.mark.parametrize(("name", "lines"), [("timings.csv", 10), ("poses.csv", 21), ("forward.csv", 1)])
+def test_a_revised_run_with_a_shortened_table_ends_with_the_same_poses(
+    name: str, lines: int, run: Path, tracking: TrackingRun, tmp_path: Path
+) -> None:
+    folder = _copied(run, tmp_path / "run")
+    if name == "timings.csv":  # killed before the poses were replaced
+        (folder / "poses.csv").write_bytes((folder / "forward.csv").read_bytes())
+    (folder / name).write_text("".join((folder / name).read_text().splitlines(keepends=True)[:lines]))
+    with TrackingRun(tracking.configuration, tracking.sequence, wrap=bad_start) as fresh:
+        list(fresh.write(folder, resume=True))
+    assert (folder / "poses.csv").read_bytes() == (run / "poses.csv").read_bytes()
+    assert Run.load(folder).backward == frozenset(range(CLEAR))
+
+
+def test_a_revised_run_that_is_not_whole_goes_on_from_its_forward_poses(run: Path, tmp_path: Path) -> None:
+    folder = _copied(run, tmp_path / "run")
+    configuration = Run.load(folder).configuration
+    stages = tuple(Run.load(folder).stage_ms)
+    with RunWriter(folder, configuration, stages, resume=True, length=FRAMES) as writer:
+        assert writer.revised
+    forward = (folder / "forward.csv").read_bytes()
+    with RunWriter(folder, configuration, stages, resume=True, length=FRAMES + 10) as writer:
+        assert not writer.revised
+    assert (folder / "poses.csv").read_bytes() == forward
+
+
+def test_a_lost_frame_among_better_forward_ones_takes_the_backward_pose() -> None:
+    lost = estimate(0.9, 15.0, Status.LOST)
+    good, fair = estimate(0.4, 8.0), estimate(0.4, 12.0)
+    forward = [estimate(0.9), good, lost, good, estimate(0.9)]
+    found = {1: fair, 2: fair, 3: fair}
+
+    class Backwards:
+        def step(self, frame: Frame, known: Estimate | None) -> Any:
+            return SimpleNamespace(estimate=known or found[frame.index])
+
+    def read(places: Sequence[int]) -> list[Frame]:
+        return [Frame(place, 0.0, np.zeros((1, 1), np.float32), None, CAMERA) for place in places]
+
+    better, milliseconds = track_backwards(forward, read, Backwards, CLAMP, OPTIONS)  # type: ignore[arg-type]
+    assert list(better) == [2]
+    assert sorted(milliseconds) == [1, 2, 3]
