@@ -177,7 +177,8 @@ def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None
         try:
             while (number := waiting.take()) is not None:
                 if not _request(child, kernels[number]) and not is_over:
-                    child = _start_for(kernels)  # the other one has failed: its kernel is compiled at its first use
+                    # The other one has failed, perhaps by its shortcuts: its kernel is compiled at its first use.
+                    child = _start_for(None)
                     children.append(child)
                 waiting.finish(number)
                 finished.put(kernels[number])
@@ -223,10 +224,14 @@ def _send(child: "subprocess.Popen[str]", content: Any) -> bool:
     return True
 
 
-def _start_for(kernels: Sequence[Kernel]) -> "subprocess.Popen[str]":
-    """Start a process that compiles these kernels on request, and their parts without an entry from Python."""
+def _start_for(kernels: Sequence[Kernel] | None) -> "subprocess.Popen[str]":
+    """Start a process that compiles kernels on request.
+
+    kernels: those that have an entry from Python, while all others have none; None for an entry of each, without
+        shortcuts in numba.
+    """
     child = _start()
-    _send(child, [kernel._asdict() for kernel in kernels])
+    _send(child, None if kernels is None else [kernel._asdict() for kernel in kernels])
     return child
 
 
@@ -246,11 +251,12 @@ def _start() -> "subprocess.Popen[str]":
 def _serve() -> None:
     """Compile the kernels that the input describes, a line each, and answer each with a line.
 
-    The first line lists all of them.
+    The first line lists all of them, or is null: see `_start_for`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
-    listed = [Kernel(**each) for each in parse_json(sys.stdin.readline() or "[]")]
-    take_shortcuts({(kernel.module, kernel.name, kernel.signature) for kernel in listed})
+    listed = parse_json(sys.stdin.readline() or "null")
+    if listed is not None:
+        take_shortcuts({(each.module, each.name, each.signature) for each in (Kernel(**entry) for entry in listed)})
     for line in sys.stdin:
         kernel = Kernel(**parse_json(line))
         kernel.dispatcher.compile(kernel.signature)

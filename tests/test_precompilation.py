@@ -44,6 +44,23 @@ retract(poses[0], steps[0, :26], row)  # a part of the kernel, whose code has no
 assert np.array_equal(row, moved[0])
 sys.stdout.buffer.write(moved.tobytes())
 """
+WITHOUT_SHORTCUTS = """
+import subprocess
+import sys
+from subprocess import PIPE
+from depthtrack import precompilation
+from depthtrack.precompilation import absent_kernels, compile_kernels, listed_kernels
+start_for, failed = precompilation._start_for, []
+def start(kernels):
+    if kernels is None:
+        return start_for(None)
+    failed.append(kernels)
+    return subprocess.Popen([sys.executable, "-c", ""], stdin=PIPE, stdout=PIPE, text=True)
+precompilation._start_for = start
+kernels = [kernel for kernel in listed_kernels() if kernel.name in {"is_complete", "submit", "limit_gradients"}]
+compile_kernels(kernels)
+assert len(absent_kernels(kernels)) == len(failed)
+"""
 
 
 @pytest.mark.parametrize("kernel", listed_kernels(), ids=lambda kernel: kernel.name)
@@ -62,6 +79,14 @@ def test_an_unknown_type_is_rejected() -> None:
 def test_processes_compile_what_is_absent(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", SMALL], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_process_that_fails_is_followed_by_one_without_shortcuts(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_SHORTCUTS], env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
