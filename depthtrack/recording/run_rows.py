@@ -80,6 +80,8 @@ def read_rows(folder: Path, name: str = "poses.csv") -> list[RunRow]:
             ) from error
         if (reason := _fault(rows[-1])) is not None:
             raise InputError(f"{path}, frame {rows[-1].index}: {reason}")
+        if len(rows) > 1 and rows[-1].index <= (before := rows[-2].index):
+            raise InputError(f"{path}, line {number}: expected a frame after {before}, found {rows[-1].index}")
     return rows
 
 

@@ -186,6 +186,14 @@ def test_every_status_can_be_read_back(tmp_path: Path, status: Status) -> None:
     assert Run.load(tmp_path / "run").status == (status,)
 
 
+def test_a_repeated_row_is_rejected(tmp_path: Path) -> None:
+    write(tmp_path, 3)
+    lines = (tmp_path / "poses.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "poses.csv").write_text("".join([*lines[:3], *lines[2:]]))
+    with pytest.raises(InputError, match="line 4: expected a frame after 1, found 1"):
+        Run.load(tmp_path)
+
+
 def test_a_run_before_format_3_is_read_with_its_agreement(tmp_path: Path) -> None:
     folder = tmp_path / "old"
     folder.mkdir()
