@@ -159,7 +159,7 @@ def check_replaceable(folder: Path, mark: str, what: str, overwrite: bool) -> No
     if not folder.is_symlink() and (not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))):
         return
     if not overwrite:
-        raise InputError(f"{folder} exists already: choose another name, or use --overwrite")
+        raise InputError(f"{folder} exists already: choose another name, or use --overwrite (Python: overwrite=True)")
     if folder.is_symlink() or not (folder / mark).is_file():
         raise InputError(f"{folder} is not {what}, so it is not overwritten: choose another name")
 

@@ -46,7 +46,9 @@ class McapWriter:
         except ImportError as error:
             raise MissingExtraError("writing MCAP files", "bags") from error
         if self._path.exists() and not self._overwrite:
-            raise InputError(f"{self._path} exists already: choose another name, or use --overwrite")
+            raise InputError(
+                f"{self._path} exists already: choose another name, or use --overwrite (Python: overwrite=True)"
+            )
         self._replacing = replace_atomically(self._path)
         self._temporary = self._replacing.__enter__()
         # rosbags writes a folder; its MCAP file is complete on its own, and holds the name of the folder.
