@@ -130,7 +130,8 @@ def _stretches(sequence: Sequence, hand: HandShape, clip: range) -> list[Any]:
             def read(places: Iterable[int]) -> Iterator[Frame]:
                 return sequence.frames(clip[place] for place in places)
 
-            backward = {place: each for place, each, _ in track_stretch(stretch, forward, read, pipeline())}
+            found = track_stretch(stretch, forward, read, pipeline())
+            backward = {place: each.estimate for place, each in found}
             rows.append([[*row(forward[at], clip[at]), *row(backward[at], clip[at])] for at in range(*stretch)])
     return rows
 

@@ -1,6 +1,7 @@
 """Unexpected failures inside one frame, which end no run: `failures.csv` of a run folder.
 
-The file has a row for each failed frame, and exists only if there is one. The frame is absent in the other tables.
+The file has a row for each failed frame, and exists only if there is one. The frame is absent in the other tables. If
+it failed in the backward pass alone, they have its forward pose.
 """
 
 from pathlib import Path

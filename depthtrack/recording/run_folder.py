@@ -11,7 +11,7 @@ Poses of a resumed run are bitwise those of an uninterrupted one.
 import csv
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -129,13 +129,20 @@ class RunWriter(Closing):
         self._poses.flush()
         self.rows.append(row)
 
-    def revise(self, rows: Mapping[int, RunRow], milliseconds: Mapping[int, float]) -> None:
+    def revise(
+        self, rows: Mapping[int, RunRow], milliseconds: Mapping[int, float], failures: Mapping[int, str]
+    ) -> None:
         """Replace rows of the complete run by those of the backward pass, by their place.
 
         milliseconds: of the frames that were tracked backwards, by their place.
+        failures: what failed unexpectedly inside such a frame, in one line, by their place.
         """
         if not milliseconds:
             return
+        forward = read_failures(self.folder)
+        for place, failure in failures.items():
+            if (index := self.rows[place].index) not in forward:
+                append_failure(self.folder, index, f"backward pass: {failure}")
         timings = self._timing_rows()
         for place, duration in milliseconds.items():
             timings[place][1 + self._stages.index(BACKWARD_STAGE)] = f"{duration:.3f}"
@@ -212,11 +219,18 @@ class Run:
 
 
 def backward_frames(folder: Path, rows: Sequence[RunRow]) -> frozenset[int]:
-    """Return the indices of rows whose pose is that of the backward pass."""
+    """Return the indices of rows whose pose is that of the backward pass.
+
+    The status alone may differ too, of a row after them.
+    """
     if not (folder / FORWARD_FILE).exists():
         return frozenset()
-    forward = {row.index: row_cells(row) for row in read_rows(folder, FORWARD_FILE)}
-    return frozenset(row.index for row in rows if forward.get(row.index) != row_cells(row))
+    forward = {row.index: row for row in read_rows(folder, FORWARD_FILE)}
+    return frozenset(
+        row.index
+        for row in rows
+        if row.index not in forward or row_cells(replace(forward[row.index], status=row.status)) != row_cells(row)
+    )
 
 
 def _branches(rows: Iterable[RunRow]) -> list[list[str]]:

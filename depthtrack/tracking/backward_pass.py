@@ -83,6 +83,28 @@ class ReadFrames(Protocol):
         ...
 
 
+class BackwardFrame(NamedTuple):
+    """A frame that was tracked backwards.
+
+    failure: what failed unexpectedly, in one line; None in a sound frame.
+    """
+
+    estimate: Estimate
+    milliseconds: float
+    failure: str | None
+
+
+class BackwardPass(NamedTuple):
+    """What the backward pass changes, by places.
+
+    estimates: replace forward ones.
+    frames: all that were tracked backwards.
+    """
+
+    estimates: dict[int, Estimate]
+    frames: dict[int, BackwardFrame]
+
+
 def track_backwards(
     forward: Sequence[Estimate],
     frames: ReadFrames,
@@ -90,10 +112,8 @@ def track_backwards(
     clamp: float,
     options: BackwardOptions,
     progress: Callable[[int, int], None] | None = None,
-) -> tuple[dict[int, Estimate], dict[int, float]]:
-    """Return the backward estimates that replace forward ones, by their places.
-
-    The milliseconds of all frames that were tracked backwards follow, by their places too.
+) -> BackwardPass:
+    """Track the doubtful stretches of a run backwards, and choose between both directions.
 
     forward: estimates of all frames.
     pipeline: returns a new pipeline, each time with the same tracker, which has tracked nothing before.
@@ -102,23 +122,21 @@ def track_backwards(
     """
     stretches = doubtful_stretches(forward, options)
     total = sum(anchor - first for first, anchor in stretches)
-    better, milliseconds = dict[int, Estimate](), dict[int, float]()
+    better, found = dict[int, Estimate](), dict[int, BackwardFrame]()
     # The last one first, so that the tracker's time goes on backwards.
     for stretch in reversed(stretches):
-        found = dict[int, Estimate]()
-        for place, estimate, duration in track_stretch(stretch, forward, frames, pipeline()):
-            found[place], milliseconds[place] = estimate, duration
+        for place, frame in track_stretch(stretch, forward, frames, pipeline()):
+            found[place] = frame
             if progress is not None:
-                progress(len(milliseconds), total)
+                progress(len(found), total)
         places = range(*stretch)
-        ahead, back = [forward[place] for place in places], [found[place] for place in places]
-        change = change_of_direction(ahead, back, clamp, options)
-        better |= {place: found[place] for place in places[change:]}
+        ahead, back = [forward[place] for place in places], {place: found[place].estimate for place in places}
+        change = change_of_direction(ahead, list(back.values()), clamp, options)
+        # A frame that has no backward pose, since something failed in it, keeps its forward one.
+        better |= {place: back[place] for place in places[change:] if back[place].pose is not None}
         # A frame without a trusted pose has nothing to lose.
-        better |= {
-            place: found[place] for place in places[:change] if _is_better_than_none(forward[place], found[place])
-        }
-    return with_forward_status(forward, better), milliseconds
+        better |= {place: back[place] for place in places[:change] if _is_better_than_none(forward[place], back[place])}
+    return BackwardPass(with_forward_status(forward, better), found)
 
 
 def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) -> list[Stretch]:
@@ -134,8 +152,8 @@ def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) 
 
 def track_stretch(
     stretch: Stretch, forward: Sequence[Estimate], frames: ReadFrames, pipeline: Pipeline
-) -> Iterator[tuple[int, Estimate, float]]:
-    """Yield place, backward estimate and milliseconds of each frame of a stretch, last first.
+) -> Iterator[tuple[int, BackwardFrame]]:
+    """Yield each frame of a stretch after its place, last first.
 
     forward: estimates of all frames.
     pipeline: of a tracker that has followed later stretches at most.
@@ -146,11 +164,11 @@ def track_stretch(
     for place, frame in zip(range(anchor, first - 1, -1), _reversed(frames, first, anchor), strict=True):
         begun = time.perf_counter()
         # Time runs backwards: speeds and pauses are those of a hand that moves so.
-        estimate = pipeline.step(replace(frame, timestamp=-frame.timestamp), known).estimate
+        tracked = pipeline.step(replace(frame, timestamp=-frame.timestamp), known)
         if known is None:
             # Branches hold times of this direction, and nothing continues them.
-            estimate = replace(estimate, timestamp=frame.timestamp, branches=())
-            yield place, estimate, 1e3 * (time.perf_counter() - begun)
+            estimate = replace(tracked.estimate, timestamp=frame.timestamp, branches=())
+            yield place, BackwardFrame(estimate, 1e3 * (time.perf_counter() - begun), tracked.failure)
         known = None
 
 
@@ -175,13 +193,18 @@ def change_of_direction(
 def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
     """Return the backward estimates, by their places, with the status of a forward track.
 
-    A trusted pose after a frame without one starts the track.
+    A trusted pose after a frame without one starts the track. A forward estimate that started it after a frame that has
+    a pose now continues it; it is returned too.
     """
     ordered = dict[int, Estimate]()
     for place, estimate in sorted(backward.items()):
         follows = place > 0 and ordered.get(place - 1, forward[place - 1]).status.is_trusted
         status = Status.TRACKED if follows else Status.STARTED
         ordered[place] = replace(estimate, status=status) if estimate.status.is_trusted else estimate
+        after = place + 1
+        begins = after < len(forward) and after not in backward and forward[after].status is Status.STARTED
+        if begins and estimate.status.is_trusted:
+            ordered[after] = replace(forward[after], status=Status.TRACKED)
     return ordered
 
 

@@ -126,7 +126,7 @@ class TrackingRun(Closing):
         if not doubtful_stretches(forward, options):
             return
         with closing(self._create()) as tracker:
-            better, milliseconds = track_backwards(
+            found = track_backwards(
                 forward,
                 lambda places: self._frames([run.rows[place].index for place in places]),
                 lambda: self._pipeline(None, tracker),
@@ -134,7 +134,11 @@ class TrackingRun(Closing):
                 options,
                 progress,
             )
-        run.revise({place: row_of(run.rows[place].index, each) for place, each in better.items()}, milliseconds)
+        run.revise(
+            {place: row_of(run.rows[place].index, each) for place, each in found.estimates.items()},
+            {place: each.milliseconds for place, each in found.frames.items()},
+            {place: each.failure for place, each in found.frames.items() if each.failure is not None},
+        )
 
     def _frames(self, indices: Iterable[int] | None = None) -> Iterator[Frame]:
         """Yield some frames, or all that are tracked, with their keypoints."""

@@ -17,7 +17,7 @@ from depthtrack.cli.measuring import calibrate_sequence
 from depthtrack.files import write_atomic
 from depthtrack.geometry.camera import Camera
 from depthtrack.hand.pose import POSE_SIZE
-from depthtrack.recording.run_folder import RunWriter
+from depthtrack.recording.run_folder import BACKWARD_STAGE, RunWriter
 from depthtrack.recording.run_rows import RunRow
 from depthtrack.recording.status import Status
 from depthtrack.recording.writer import SequenceWriter
@@ -37,7 +37,7 @@ def write_recording(arguments: list[str]) -> int:
 
 
 def write_run(arguments: list[str]) -> int:
-    """Begin a run of three frames, or complete it: `FOLDER`."""
+    """Begin a run of three frames, or complete it: `FOLDER`. The backward pass replaces the first pose."""
     return _code(_write_run, Path(arguments[0]))
 
 
@@ -74,9 +74,13 @@ def _write_recording(folder: Path, frames: int) -> None:
 def _write_run(folder: Path) -> None:
     pose = np.zeros(POSE_SIZE)
     pose[3] = 1.0
-    with RunWriter(folder, {"tracker": "ik", "format": 6}, ("fit",), resume=(folder / "run.json").exists()) as run:
+    first = RunRow(0, 0.0, Status.STARTED, 2.0, 0.9, pose + np.eye(POSE_SIZE)[0])
+    resume, stages = (folder / "run.json").exists(), ("fit", BACKWARD_STAGE)
+    with RunWriter(folder, {"tracker": "ik", "format": 6}, stages, resume, length=3) as run:
         for index in range(len(run.rows), 3):
             run.append(RunRow(index, index / 30, Status.TRACKED, 1.0, 0.9, pose), {"fit": 1.0})
+        if not run.revised:
+            run.revise({0: first}, {0: 1.0}, {0: "failed"})
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from depthtrack.errors import InputError
 from depthtrack.evaluation.replay import Replay
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
+from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.registry import open_sequence
 from depthtrack.recording.run_folder import Run, RunWriter
 from depthtrack.recording.sequence import Frame
@@ -24,7 +25,7 @@ from depthtrack.recording.status import Status
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
-from depthtrack.tracking import pipeline
+from depthtrack.tracking import guided_segmentation, pipeline
 from depthtrack.tracking.backward_pass import (
     BackwardOptions,
     change_of_direction,
@@ -94,6 +95,13 @@ def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
         [ABSENT, lost, lost, estimate(0.9)], {1: estimate(0.4), 2: estimate(0.4, status=Status.STARTED)}
     )
     assert [each.status for each in ordered.values()] == [Status.STARTED, Status.TRACKED]
+
+
+def test_a_forward_start_after_a_pose_of_the_backward_pass_continues_it() -> None:
+    begun = estimate(0.9, status=Status.STARTED)
+    ordered = with_forward_status([ABSENT, begun, estimate(0.9)], {0: estimate(0.4)})
+    assert {place: each.status for place, each in ordered.items()} == {0: Status.STARTED, 1: Status.TRACKED}
+    assert list(with_forward_status([ABSENT, begun], {0: estimate(0.4, status=Status.LOST)})) == [0]
 
 
 def test_trackers_of_papers_and_those_with_a_deadline_go_forward_alone() -> None:
@@ -218,6 +226,28 @@ def test_run_json_holds_the_options(run: Path) -> None:
         RunConfiguration.from_fields({**fields, "backward": {"gain": -1}}, "run.json")
 
 
+def test_a_failure_in_the_backward_pass_is_listed_and_keeps_the_forward_pose(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guided_segmentation, "failure_text", failure_text)
+
+    class Failing(BadStart):
+        def track(self, observation: Observation) -> Estimate:
+            if round(30 * observation.timestamp) == -10:
+                raise ZeroDivisionError("no such pose")
+            return super().track(observation)
+
+    sequence = open_sequence(recording)
+    configuration = configure(recording, sequence, HybridConfig(), HandShape(), backward=OPTIONS)
+    with TrackingRun(configuration, sequence, wrap=lambda tracker: Failing(tracker, pose_at(0))) as tracking:
+        list(tracking.write(tmp_path / "run"))
+    found = Run.load(tmp_path / "run")
+    assert list(found.failures) == [10]
+    assert found.failures[10].startswith("backward pass: ZeroDivisionError")
+    assert 10 not in found.backward
+    assert found.poses[10] == pytest.approx(pose_at(0))
+
+
 def _copied(run: Path, folder: Path) -> Path:
     folder.mkdir()
     for file in run.iterdir():
@@ -259,11 +289,11 @@ def test_a_lost_frame_among_better_forward_ones_takes_the_backward_pose() -> Non
 
     class Backwards:
         def step(self, frame: Frame, known: Estimate | None) -> Any:
-            return SimpleNamespace(estimate=known or found[frame.index])
+            return SimpleNamespace(estimate=known or found[frame.index], failure="wrong" if frame.index == 3 else None)
 
     def read(places: Sequence[int]) -> list[Frame]:
         return [Frame(place, 0.0, np.zeros((1, 1), np.float32), None, CAMERA) for place in places]
 
-    better, milliseconds = track_backwards(forward, read, Backwards, CLAMP, OPTIONS)  # type: ignore[arg-type]
+    better, frames = track_backwards(forward, read, Backwards, CLAMP, OPTIONS)  # type: ignore[arg-type]
     assert list(better) == [2]
-    assert sorted(milliseconds) == [1, 2, 3]
+    assert {place: each.failure for place, each in sorted(frames.items())} == {1: None, 2: None, 3: "wrong"}
