@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from depthtrack.calibration.options import JointFitOptions
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise, stretches
-from depthtrack.calibration.solid_hands import solid_step
+from depthtrack.calibration.solid_hands import is_solid, solid_step
 from depthtrack.hand.displacement_grid import NODES, neighbour_differences
 from depthtrack.hand.limits import within_limits
 from depthtrack.hand.pose import ANGLES, retract
@@ -85,7 +85,9 @@ def fit_jointly(
             before, values = values, values + change
             if exact and _differ(values, built, side, options.rebuilt):
                 values = solid_step(before, change, side)
-                built, change = values[:COUNT], values - before
+                change = values - before
+                # Sizes may have left the solid ones in smaller steps. The skin then stays as it was built.
+                built = values[:COUNT] if is_solid(values[:COUNT], side) else built
             tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
             poses = within_limits(retract(poses, tangents))
     return JointFit(values, np.linalg.inv(information + prior)[:COUNT, :COUNT], poses, np.array(distances))

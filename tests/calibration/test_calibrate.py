@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from depthtrack.calibration import joint_optimisation
 from depthtrack.calibration.calibrate import Calibration, calibrate, summary
 from depthtrack.calibration.fitted_hand import with_usual_proportions
 from depthtrack.calibration.joint_optimisation import fit_jointly, size_covariance
@@ -251,6 +252,19 @@ def test_fingers_that_grow_together_are_parted() -> None:
     assert -0.02 < parted[KNUCKLES.start] < 0
     assert nearest_solid(_sizes(), "left").tolist() == _sizes().tolist()
     assert is_solid(solid_step(_sizes(), values - _sizes(), "left"), "left")
+
+
+def test_the_skin_stays_as_built_where_no_step_keeps_the_hand_solid(
+    made: Synthesiser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Small steps may have left the solid sizes before."""
+    joined, across = _sizes(), slice(KNUCKLES.start, KNUCKLES.start + 6, 2)
+    joined[across] = -0.02, 0.0, 0.02
+    monkeypatch.setattr(joint_optimisation, "solid_step", lambda *_: joined)
+    monkeypatch.setattr(joint_optimisation, "_differ", lambda *_: True)
+    view = CalibrationView(observe(made, 40))
+    fit = fit_jointly([view], made.poses[[40]], _sizes(), "right", iterations=2, exact=True)
+    assert np.isfinite(fit.distances).all()
 
 
 def test_open_hands_are_chosen_before_fists() -> None:
