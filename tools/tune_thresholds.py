@@ -36,8 +36,8 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
     "thresholds.confidence": (0.0, 0.01, 0.025, 0.05, 0.1),
     "thresholds.lost_ratio": (1.6, 2.0, 2.6),
     "thresholds.sure_confidence": (0.2, 0.3, 0.5, 1.0),
-    "recovery.good_energy": (0.15, 0.2, 0.25),
-    "recovery.accept_local": (0.88, 0.93, 0.97),
+    "recovery.good_energy": (0.2, 0.25, 0.35),
+    "recovery.accept_local": (0.85, 0.93, 0.97),
     "recovery.accept_global": (0.65, 0.75, 0.85),
     "recovery.accept_finger": (0.95, 0.98, 0.99),
     "recovery.accept_hidden": (0.7, 0.8, 0.9, 0.98),
@@ -49,7 +49,7 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
     "branches.accept_at_once": (0.65, 0.75, 0.85),
     "branches.accept": (0.88, 0.93, 0.97),
 }
-"""Values of each threshold, the default among them."""
+"""Values of each threshold to try beside the default."""
 SETTING = ("folder", "tracker", "option", "value")
 """Entries of a cell that are no arguments of `made_recording`."""
 WORST = 2 * WRONG
@@ -67,7 +67,8 @@ def main() -> None:
     chosen = arguments.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
     options = ExperimentOptions(repetitions=chosen.seeds, frames=chosen.frames, rigs=tuple(chosen.rig), split="tuning")
-    settings = [(name, value) for name in chosen.only for value in THRESHOLDS[name]]
+    values = {name: sorted({*THRESHOLDS[name], _default(chosen.tracker, name)}) for name in chosen.only}
+    settings = [(name, value) for name in chosen.only for value in values[name]]
     cells = [
         recording | {"folder": str(chosen.folder), "tracker": chosen.tracker, "option": name, "value": value}
         for recording in recording_cells(options)
@@ -76,7 +77,7 @@ def main() -> None:
     with Journal(chosen.folder / f"costs-{chosen.tracker}.jsonl", list(cells[0])) as journal:
         rows = run_sweep(measure_cost, cells, journal, chosen_workers(None))
     for name in chosen.only:
-        costs = {value: _costs(rows, name, value) for value in THRESHOLDS[name]}
+        costs = {value: _costs(rows, name, value) for value in values[name]}
         print(_recommendation(name, _default(chosen.tracker, name), costs))
 
 
