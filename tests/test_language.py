@@ -49,6 +49,7 @@ REWRITTEN = (
     "README.md",
     "examples/README.md",
     "docs/benchmarks.md",
+    "docs/experiments.md",
     "docs/exports.md",
     "docs/formats.md",
     "docs/joints.md",
