@@ -39,6 +39,8 @@ class Command:
     """Renderer of the swarm's hypotheses."""
     repetitions: Annotated[int | None, number(1, 10000, metavar="N")] = None
     """Measurements of the swarm per cell, each with another seed (default: as many as in the paper)."""
+    first_seed: Annotated[int, number(0, 10000, metavar="N")] = 0
+    """Seed of the first of them. `crossmodel` counts from the first one of its split."""
     resolution: Annotated[int | None, number(1, 10000, metavar="PIXELS")] = None
     """Longest side of the rendered hypotheses of the swarm (default: the resolution of the sensor)."""
     frames: Annotated[int | None, number(1, 10**7, metavar="N")] = None
@@ -71,6 +73,7 @@ class Command:
             variant=self.variant,
             renderer=self.renderer,
             repetitions=self.repetitions,
+            first_seed=self.first_seed,
             resolution=self.resolution,
             frames=self.frames,
             synergies=self.synergies,

@@ -39,6 +39,7 @@ def test_cells_are_drawn_once_for_each_motion_and_seed() -> None:
     assert cells == recording_cells(ExperimentOptions(repetitions=3))
     assert {cell["side"] for cell in cells} == {"left", "right"}
     assert all(0.8 <= cell["scale"] <= 1.2 for cell in cells)
+    assert cells[-6:] == recording_cells(ExperimentOptions(repetitions=1, first_seed=2))
     tuned = recording_cells(ExperimentOptions(repetitions=3, split="tuning"))
     assert not {cell["seed"] for cell in cells} & {cell["seed"] for cell in tuned}
 

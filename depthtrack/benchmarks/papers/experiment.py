@@ -21,6 +21,7 @@ class ExperimentOptions:
     variant: trackers of this program or those of the papers.
     renderer: renderer of the swarm.
     repetitions: number of seeds; None for the number of the experiment.
+    first_seed: seeds that are left out before them.
     resolution: longest side of the region of interest, pixels; None for the sensor's, or QUICK_RESOLUTION if quick.
     frames: number of first frames of the motion; None for all.
     synergies: name for `synergy_sources.load_source`; None for the synergies of the experiment.
@@ -32,6 +33,7 @@ class ExperimentOptions:
     variant: Literal["default", "paper"] = "default"
     renderer: str = "raster"
     repetitions: int | None = None
+    first_seed: int = 0
     resolution: int | None = None
     frames: int | None = None
     synergies: str | None = None
@@ -54,7 +56,7 @@ class ExperimentOptions:
         count = (quick if self.quick else own) if self.repetitions is None else self.repetitions
         if not 1 <= count <= 10_000:
             raise InputError(f"--repetitions must be from 1 to 10000, found {count}")
-        return range(count)
+        return range(self.first_seed, self.first_seed + count)
 
 
 @dataclass(frozen=True)
