@@ -87,6 +87,13 @@ class CalibrationOptions:
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
     accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
     sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
+    size_weight: float = option(
+        0.02,
+        "Share by which a side costs more for a squared standard deviation of its sizes from the average ones",
+        source="tools/tune_side.py on tuning seeds of the cross-model benchmark",
+        most=1,
+    )
+    size_cost: float = option(2.0, "Largest factor of that", least=1, most=1000)
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
 

@@ -2,11 +2,13 @@
 
 Hands of average proportions of both sides are tracked over the recording. If that leaves the side open, hands of both
 sides are calibrated. The energies of the last hands tracked for that are compared. A few views alone leave the side
-open often: a hand of adapted sizes fits them from its back as well.
+open often: a hand of adapted sizes fits them from its back as well. Such sizes are less common among people.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+
+import numpy as np
 
 from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
 from depthtrack.calibration.first_scale import FirstHand, first_hand
@@ -16,6 +18,7 @@ from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import Side
+from depthtrack.hand.size_parameters import COUNT, size_deviation
 from depthtrack.recording.sequence import Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies
@@ -64,22 +67,39 @@ def calibrate_either_side(
             raise failure
         return calibration_of(source, fit_skin(source, next(iter(sized.values())), _part(report, 0.75, 0.25)))
     calibrations = {side: calibration_of(source, each) for side, each in sized.items()}
-    side, margin = _cheaper(calibrations, choice)
+    factors = size_costs({side: size_deviation(each.values[:COUNT]) for side, each in sized.items()}, source.options)
+    side, margin = _cheaper(calibrations, choice, factors)
     found = calibration_of(source, fit_skin(source, sized[side], _part(report, 0.85, 0.15)))
     return replace(found, side_margin=margin)
 
 
-def _cheaper(calibrations: dict[Side, Calibration], choice: SideChoice) -> tuple[Side, float]:
+def size_costs(deviations: Mapping[Side, float], options: CalibrationOptions) -> dict[Side, float]:
+    """Return the factor of the sizes in the cost of each side.
+
+    It is 1 for the more common sizes.
+
+    deviations: squared, in standard deviations among people, see `size_deviation`.
+    """
+    least, most = min(deviations.values()), np.log(options.size_cost)
+    return {side: float(np.exp(min(options.size_weight * (each - least), most))) for side, each in deviations.items()}
+
+
+def _cheaper(
+    calibrations: dict[Side, Calibration], choice: SideChoice, factors: Mapping[Side, float]
+) -> tuple[Side, float]:
     """Return the side that costs less, and the share by which the other one costs more.
 
     choice: the comparison of the average hands.
+    factors: of the sizes of each side.
 
-    The cost of a side is a product of three figures: the mean energy of its last tracked hand, that of its average
-    hand, and the median distance of the views' points to its skin. The first one does not count if no frame shows both
-    hands.
+    The cost of a side is a product of four figures: the mean energies of its last tracked hand and of its average
+    hand, the factor of its sizes, and the median distance of its views. That is the distance of their points to its
+    skin. The first energy does not count if no frame shows both hands.
     """
     energies, frames = mean_energies({side: each.energies for side, each in calibrations.items()})
-    costs = {side: each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()}
+    costs = {
+        side: factors[side] * each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()
+    }
     costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
     side, other = sorted(calibrations, key=lambda each: costs[each])
     return side, costs[other] / costs[side] - 1

@@ -85,6 +85,14 @@ def prior_covariance() -> Array:
     return C
 
 
+def size_deviation(values: Array) -> float:
+    """Return the squared distance of sizes (35,) from the average ones.
+
+    Its unit is a standard deviation among people.
+    """
+    return float(values @ np.linalg.solve(prior_covariance(), values))
+
+
 def placement_covariance(joints: tuple[float, float, float], thickness: float) -> Array:
     """Return the covariance (35, 35) of sizes by the places of joints in the same flesh.
 

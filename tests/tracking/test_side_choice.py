@@ -11,6 +11,7 @@ from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.sides import calibrate_either_side
 from depthtrack.cli import main
 from depthtrack.hand.shape import HandShape, Side
+from depthtrack.hand.size_parameters import COUNT, SCALE, prior_covariance, size_deviation
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
@@ -122,17 +123,22 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
 
     tried, skins = list[Side](), list[Side]()
 
-    def fit_sizes(source: object, side: Side, *rest: object) -> Side:
+    @dataclass(frozen=True)
+    class Sized:
+        side: Side
+        values: np.ndarray
+
+    def fit_sizes(source: object, side: Side, *rest: object) -> Sized:
         tried.append(side)
-        return side
+        return Sized(side, np.zeros(COUNT))
 
-    def fit_skin(source: object, side: Side, *rest: object) -> Side:
-        skins.append(side)
-        return side
+    def fit_skin(source: object, sized: Sized, *rest: object) -> Sized:
+        skins.append(sized.side)
+        return sized
 
-    def calibration_of(source: object, side: Side) -> Measured:
+    def calibration_of(source: object, sized: Sized) -> Measured:
         energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
-        return Measured(HandShape(side=side), {"right": 1.0, "left": 2.0}[side], energies[side])
+        return Measured(HandShape(side=sized.side), {"right": 1.0, "left": 2.0}[sized.side], energies[sized.side])
 
     starts: dict[Side, Starts] = {"right": {}, "left": {}}
     monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10, {}, starts))
@@ -148,3 +154,14 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     assert found.hand.side == ("left" if sure else "right")
     assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
+
+
+def test_uncommon_sizes_raise_the_cost_of_a_side_up_to_a_limit() -> None:
+    options = CalibrationOptions()
+    factors = sides.size_costs({"right": 40.0, "left": 60.0}, options)
+    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(20 * options.size_weight))}
+    assert sides.size_costs({"right": 1e9, "left": 0.0}, options) == {"right": options.size_cost, "left": 1.0}
+    # One standard deviation of the scale of people, and none of another size.
+    values = np.zeros(COUNT)
+    values[SCALE] = np.sqrt(prior_covariance()[SCALE, SCALE])
+    assert size_deviation(values) == pytest.approx(1.0)
