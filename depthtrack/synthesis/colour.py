@@ -5,6 +5,12 @@ import numpy as np
 
 from depthtrack.types import Array
 
+_XYZ_OF_WHITE = np.array([0.950456, 1.0, 1.088754])
+"""White of the illuminant D65."""
+_RGB = np.array([[3.240479, -1.53715, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]])
+"""Linear RGB of XYZ (IEC 61966-2-1), for XYZ as multiples of the white."""
+_RGB *= _XYZ_OF_WHITE
+
 
 def linear_from_srgb(srgb: Array) -> Array:
     """Convert sRGB values to linear RGB, both 0 to 1 (IEC 61966-2-1)."""
@@ -18,8 +24,17 @@ def srgb_from_linear(linear: Array) -> Array:
 
 
 def linear_from_lab(lab: Array) -> Array:
-    """Convert a CIELAB colour (3,) under D65 to linear RGB (3,)."""
-    return np.asarray(cv2.cvtColor(lab.astype(np.float32)[None, None], cv2.COLOR_Lab2LRGB)[0, 0], dtype=np.float64)
+    """Convert a CIELAB colour (3,) under D65 to linear RGB (3,), clipped, in single precision.
+
+    The bits are those of OpenCV, which fills large tables at its first conversion.
+    """
+    lightness, a, b = lab.astype(np.float32)
+    fy = (lightness + np.float32(16)) / np.float32(116)
+    f = np.array([a / np.float32(500) + fy, fy, fy - b / np.float32(200)])
+    linear = (f - np.float32(16 / 116)) / np.float32(7.787)
+    xyz = np.where(f <= np.float32(6 / 29), linear, f * f * f)
+    r, g, b = (np.float32(row[0]) * xyz[0] + np.float32(row[1]) * xyz[1] + np.float32(row[2]) * xyz[2] for row in _RGB)
+    return np.clip(np.array([r, g, b], dtype=np.float64), 0, 1)
 
 
 def smooth_field(shape: tuple[int, ...], width: float, rng: np.random.Generator) -> Array:

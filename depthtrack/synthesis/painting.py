@@ -1,6 +1,8 @@
 """Colour images: random skin colours and texture, lighting and camera noise."""
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import cv2
@@ -79,9 +81,14 @@ class Light:
         facing = np.maximum(normal @ self.towards, 0)
         light = albedo * (self.ambient + self.lamp * facing)[..., None]
         if shine:
-            halfway = self.towards - np.array([0, 0, 1])
-            light = light + self.shine * (np.maximum(normal @ (halfway / np.linalg.norm(halfway)), 0) ** 20)[..., None]
+            light = light + self.shine * (np.maximum(normal @ self.halfway, 0) ** 20)[..., None]
         return np.asarray(light)
+
+    @cached_property
+    def halfway(self) -> Array:
+        """Return the unit vector (3,) between the directions to the lamp and to the camera."""
+        halfway = self.towards - np.array([0, 0, 1])
+        return np.asarray(halfway / np.linalg.norm(halfway))
 
 
 class Painter:
@@ -105,7 +112,8 @@ class Painter:
         self._noise = noise
         self._held = held
         self._light = Light.sample(rng)
-        self._waves = rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32)
+        # Contiguous: numpy multiplies a transposed view a hundred times slower.
+        self._waves = np.ascontiguousarray(rng.normal(0, 2 * np.pi / 0.03, (6, 3)).astype(np.float32).T)
         self._phases = rng.uniform(0, 2 * np.pi, 6).astype(np.float32)
         self._T_palm_body = _neutral_transforms(shape)
         background = backdrop.surface
@@ -118,9 +126,8 @@ class Painter:
         picture = self._background.copy()
         pixels, labels, normals = picture.reshape(-1, 3), surface.label.reshape(-1), surface.normal.reshape(-1, 3)
         at = np.flatnonzero((labels >= 0) & (labels <= FOREARM))
-        normal = normals[at]
-        albedo = self._skin(self._camera.unproject_rows(at, surface.depth), normal, labels[at], rendered.transforms)
-        pixels[at] = np.rint(255 * srgb_from_linear(self._light.reflected(albedo, normal, shine=True)))
+        points = self._camera.unproject_rows(at, surface.depth)
+        pixels[at] = np.rint(255 * srgb_from_linear(self._skin(points, normals[at], labels[at], rendered.transforms)))
         if self._held is not None:
             at = np.flatnonzero(labels == HELD)
             pixels[at] = np.rint(255 * srgb_from_linear(self._light.reflected(self._held, normals[at])))
@@ -130,18 +137,18 @@ class Painter:
         return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), dtype=np.uint8)
 
     def _skin(self, points: Array, normal: Array, label: NDArray[np.int16], transforms: Array) -> Array:
-        """Return the skin's albedo (N, 3) at camera-frame points (N, 3).
+        """Return the light (N, 3), linear RGB, that skin reflects at camera-frame points (N, 3).
 
         The texture moves with the hand, since it is a function of the point in the neutral pose.
         """
         T = self._T_palm_body @ np.linalg.inv(transforms)
-        neutral, albedo = np.empty((len(points), 3), np.float32), np.empty((len(points), 3))
+        neutral, colour = np.empty((len(points), 3), np.float32), np.empty((len(points), 3))
         tone = self._tone.back, self._tone.palm - self._tone.back
-        place_on_skin(points, normal, label, T, transforms, tone, neutral, albedo)
-        blotches = np.sin(neutral @ self._waves.T + self._phases).sum(axis=-1) / np.sqrt(3)
-        # Haemoglobin absorbs green and blue more than red.
-        albedo *= 1 + blotches[:, None] * np.array([0.02, 0.045, 0.045])
-        return albedo
+        place_on_skin(points, normal, label, T, transforms, tone, neutral, colour)
+        light = self._light
+        lamp = light.towards, light.halfway, (light.ambient, light.lamp, light.shine)
+        light_skin(np.sin(neutral @ self._waves + self._phases), normal, lamp, colour)
+        return colour
 
 
 @compiled(nogil=True)
@@ -174,6 +181,31 @@ def place_on_skin(
         for i in range(3):
             neutral[n, i] = T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]
             albedo[n, i] = back[i] + share * difference[i]
+
+
+@compiled(nogil=True)
+def light_skin(
+    waves: Array32, normal: Array, lamp: tuple[Array, Array, tuple[float, float, float]], out: Array
+) -> None:
+    """Replace the albedo of skin by reflected light, as `Light.reflected` with shine.
+
+    waves: (N, 6) sines of the texture, which makes blotches.
+    normal: (N, 3) unit, camera frame.
+    lamp: (3,) directions to the lamp and halfway to the camera, then ambient, diffuse and specular intensity.
+    out: (N, 3) albedo, then reflected light, linear RGB.
+    """
+    towards, halfway, (ambient, diffuse, specular) = lamp
+    for n in range(out.shape[0]):
+        blotches = np.float32(0.0)
+        for k in range(waves.shape[1]):
+            blotches += waves[n, k]
+        share = blotches / math.sqrt(3.0)
+        facing = normal[n, 0] * towards[0] + normal[n, 1] * towards[1] + normal[n, 2] * towards[2]
+        glancing = normal[n, 0] * halfway[0] + normal[n, 1] * halfway[1] + normal[n, 2] * halfway[2]
+        brightness, shine = ambient + diffuse * max(facing, 0.0), specular * max(glancing, 0.0) ** 20
+        # Haemoglobin absorbs green and blue more than red.
+        for i, strength in enumerate((0.02, 0.045, 0.045)):
+            out[n, i] = out[n, i] * (1.0 + share * strength) * brightness + shine
 
 
 def flip_skin(

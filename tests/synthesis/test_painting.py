@@ -6,7 +6,8 @@ import pytest
 
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
-from depthtrack.synthesis.painting import SkinTone, place_on_skin
+from depthtrack.synthesis.colour import linear_from_lab
+from depthtrack.synthesis.painting import Light, SkinTone, light_skin, place_on_skin
 from depthtrack.synthesis.randomness import Stream, generator
 from tests.support.hands import random_pose
 from tests.support.synthesis import synthesiser
@@ -51,6 +52,24 @@ def test_points_of_the_skin_move_with_their_bodies() -> None:
     np.testing.assert_allclose(neutral, expected, rtol=1e-6, atol=1e-6)
     palmar = np.clip(0.5 + 1.2 * np.einsum("nj,nj->n", transforms[label, :3, 2], normal), 0, 1)[:, None]
     np.testing.assert_allclose(albedo, back + palmar**2 * (3 - 2 * palmar) * difference, atol=1e-12)
+
+
+def test_skin_reflects_light_as_any_surface() -> None:
+    rng = np.random.default_rng(6)
+    waves, albedo = rng.uniform(-1, 1, (50, 6)).astype(np.float32), rng.random((50, 3))
+    normal, light = rng.normal(size=(50, 3)), Light.sample(rng)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    blotches = waves.sum(axis=-1)[:, None] / np.sqrt(3)
+    expected = light.reflected(albedo * (1 + blotches * [0.02, 0.045, 0.045]), normal, shine=True)
+    light_skin(waves, normal, (light.towards, light.halfway, (light.ambient, light.lamp, light.shine)), albedo)
+    np.testing.assert_allclose(albedo, expected, rtol=1e-12)
+
+
+def test_colours_are_converted_like_those_of_opencv() -> None:
+    rng = np.random.default_rng(7)
+    for lab in np.stack([rng.uniform(1, 99, 200), rng.uniform(-20, 30, 200), rng.uniform(-20, 40, 200)], axis=-1):
+        expected = cv2.cvtColor(lab.astype(np.float32)[None, None], cv2.COLOR_Lab2LRGB)[0, 0]
+        np.testing.assert_allclose(linear_from_lab(lab), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3])

@@ -150,6 +150,27 @@ def test_the_shadow_of_a_thin_object_is_separate_from_it() -> None:
     assert dark.mean() == pytest.approx(124.5 - offset, abs=1)
 
 
+def test_a_shadow_is_where_the_second_camera_sees_something_nearer() -> None:
+    rng = np.random.default_rng(5)
+    camera, baseline = Camera(60, 40, 200.0, 200.0, 30.0, 20.0), 0.075
+    depth = np.repeat(rng.choice([0.0, 0.6, 0.9, 1.5], (40, 12)), 5, axis=1) * rng.uniform(0.995, 1.005, (40, 60))
+    near = np.zeros((40, 60))
+    place = np.arange(60) - camera.fx * baseline / np.where(depth > 0, depth, np.inf)
+    for v, u in np.argwhere(depth > 0):
+        follows = u + 1 < 60 and abs(depth[v, u + 1] - depth[v, u]) <= JUMP * depth[v, u]
+        ends = np.array([place[v, u], place[v, u + 1] if follows else place[v, u] + 1])
+        inverse = 1 / np.array([depth[v, u], depth[v, u + 1] if follows else depth[v, u]])
+        order = np.argsort(ends)
+        for k in range(max(int(np.ceil(ends.min())), 0), min(int(np.floor(ends.max())), 59) + 1):
+            near[v, k] = max(near[v, k], np.interp(k, ends[order], inverse[order]))
+    expected = np.zeros((40, 60), dtype=bool)
+    for v, u in np.argwhere(depth > 0):
+        k = round(place[v, u])
+        expected[v, u] = 0 <= k < 60 and near[v, k] > (1 + JUMP) / depth[v, u]
+    assert expected.mean() > 0.05
+    np.testing.assert_array_equal(shadow(depth, camera, baseline), expected)
+
+
 def test_a_slanted_surface_casts_no_shadow_on_itself() -> None:
     assert not shadow(_tilted(SMALL, 0.8, 40).depth, SMALL, 0.075).any()
     assert not shadow(_tilted(SMALL, 0.8, -40).depth, SMALL, 0.075).any()
@@ -268,9 +289,7 @@ def test_kinect1_reads_plain_pixels_like_the_others() -> None:
     sigma = np.vectorize(kinect1.axial_noise)(surface.depth, 0.0) * scale / surface.depth**2
     disparity = scale / surface.depth + np.sqrt(np.maximum(sigma**2 - 1 / 12, 0)) * error
     np.testing.assert_allclose(out, scale / np.rint(disparity), rtol=1e-12)
-    row = np.empty(SMALL.width)
-    kinect1._read_plain(
-        surface.depth[3], surface.normal[3], 3, lens, nowhere[3], nowhere[3], error[3], limits, plain, row
-    )
+    row, x, y = np.empty(SMALL.width), (np.arange(SMALL.width) - SMALL.cx) / SMALL.fx, (3 - SMALL.cy) / SMALL.fy
+    kinect1._read_plain(surface.depth[3], surface.normal[3], x, y, nowhere[3], nowhere[3], error[3], limits, plain, row)
     assert plain.all()
     np.testing.assert_array_equal(row, out[3])

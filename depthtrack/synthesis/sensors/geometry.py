@@ -129,31 +129,32 @@ def _edges(depth: Array, radius: int, jump: float, out: Mask) -> None:
 @compiled(nogil=True, error_model="numpy")
 def _shadow(depth: Array, focal_baseline: float, jump: float, out: Mask) -> None:
     height, width = depth.shape
-    inverse, place = np.empty(width), np.empty(width)
+    near, inverse, place = np.empty(width), np.empty(width), np.empty(width)
     for v in range(height):
         row = depth[v]
+        # Without branches, so that the compiler makes vectors of it. Pixels without a surface have no place.
         for u in range(width):
-            inverse[u], place[u] = 0.0, u - focal_baseline / row[u] if row[u] > 0.0 else 0.0
+            near[u] = 0.0
+            inverse[u] = 1.0 / row[u] if row[u] > 0.0 else 0.0
+            place[u] = u - focal_baseline * inverse[u]
         for u in range(width):
             z = row[u]
             if z <= 0.0:
                 continue
-            here = place[u]
+            here, inverse_here = place[u], inverse[u]
             # The segment ends at the right neighbour; an isolated pixel covers its own width.
-            z_next = row[u + 1] if u + 1 < width else 0.0
-            continues = abs(z_next - z) <= jump * z
-            if not continues:
-                z_next = z
-            there = place[u + 1] if continues else u + 1 - focal_baseline / z
+            continues = u + 1 < width and abs(row[u + 1] - z) <= jump * z
+            there = place[u + 1] if continues else here + 1.0
             first, last = math.ceil(min(here, there)), math.floor(max(here, there))
+            if first > last:
+                continue
+            slope = (inverse[u + 1] - inverse_here) / (there - here) if continues and there != here else 0.0
             for k in range(max(first, 0), min(last, width - 1) + 1):
-                share = (k - here) / (there - here) if there != here else 0.0
-                inverse[k] = max(inverse[k], (1.0 - share) / z + share / z_next)
+                near[k] = max(near[k], inverse_here + (k - here) * slope)
         for u in range(width):
-            z = depth[v, u]
-            if z <= 0.0:
+            if row[u] <= 0.0:
                 continue
             k = round(place[u])
             # Pixels outside the second image count as visible, since real second cameras cover a wider field.
-            if 0 <= k < width and inverse[k] > (1.0 + jump) / z:
+            if 0 <= k < width and near[k] > (1.0 + jump) * inverse[u]:
                 out[v, u] = True

@@ -111,9 +111,12 @@ def _read(
 ) -> None:
     height, width = depth.shape
     places, quantiles = wander
-    plain = np.empty(width, np.bool_)
+    plain, x = np.empty(width, np.bool_), np.empty(width)
+    for u in range(width):
+        x[u] = (u - lens[2]) / lens[0]
     for v in range(height):
-        _read_plain(depth[v], normal[v], v, lens, edge[v], dark[v], error[v], limits, plain, out[v])
+        y = (v - lens[3]) / lens[1]
+        _read_plain(depth[v], normal[v], x, y, edge[v], dark[v], error[v], limits, plain, out[v])
         for u in range(width):
             if plain[u]:
                 continue
@@ -140,8 +143,8 @@ def _read(
 def _read_plain(
     depth: Array,
     normal: Array,
-    v: int,
-    lens: tuple[float, float, float, float],
+    x: Array,
+    y: float,
     edge: Mask,
     dark: Mask,
     error: Array32,
@@ -152,15 +155,15 @@ def _read_plain(
     """Read the pixels of a row that neither edge, shadow nor incidence affects.
 
     They are most, and are marked in `plain`. Without branches, so that the compiler makes vectors of it.
+
+    x, y: (w,) coordinates of the viewing rays of the row at z = 1.
     """
-    fx, fy, cx, cy = lens
-    y = (v - cy) / fy
     for u in range(depth.shape[0]):
-        x, surface = (u - cx) / fx, depth[u] > 0.0
-        along = -(normal[u, 0] * x + normal[u, 1] * y + normal[u, 2])
-        flat = (along > 0.0) & (along * along > SURELY_FLAT * (x * x + y * y + 1.0))
-        plain[u] = surface & flat & ~edge[u] & ~dark[u]
-        z = depth[u] if surface else 1.0
+        along = -(normal[u, 0] * x[u] + normal[u, 1] * y + normal[u, 2])
+        flat = (along > 0.0) & (along * along > SURELY_FLAT * (x[u] * x[u] + y * y + 1.0))
+        plain[u] = (depth[u] > 0.0) & flat & ~edge[u] & ~dark[u]
+    for u in range(depth.shape[0]):
+        z = depth[u] if plain[u] else 1.0
         z = _quantised(z, 0.0012 + 0.0019 * (z - 0.4) ** 2, error[u])
         out[u] = z if plain[u] & (limits[0] <= z) & (z <= limits[1]) else 0.0
 
@@ -174,6 +177,7 @@ def _quantised(z: float, sigma: float, error: float) -> float:
     """
     # A disparity step equals z^2 / (8 f b) in depth; rounding adds a variance of a twelfth of a step squared.
     scale = STEPS * INFRARED_FOCAL * BASELINE
-    spread = sigma * scale / (z * z)
-    disparity = scale / z + np.sqrt(max(spread * spread - 1.0 / 12.0, 0.0)) * error
+    inverse = 1.0 / z
+    spread = sigma * scale * inverse * inverse
+    disparity = scale * inverse + np.sqrt(max(spread * spread - 1.0 / 12.0, 0.0)) * error
     return scale / max(np.rint(disparity), 1.0)
