@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from depthtrack.calibration.options import RigCalibrationOptions
 from depthtrack.calibration.pose_search import PoseSearcher, Progress, ScorerFactory
@@ -83,6 +82,8 @@ def calibrate_rig(
     Raises:
         InputError: if `rig` refers to no rigged mesh, if the views show no hand, or if they show one of the other side.
     """
+    from scipy.optimize import minimize_scalar
+
     if rig.rig is None:
         raise InputError("the hand to scale must be a rigged mesh (.glb, .gltf) or a hand file of one")
     show = progress or (lambda stage, share: None)

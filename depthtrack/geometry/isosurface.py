@@ -34,9 +34,9 @@ def polygonise(field: Field, low: Array, high: Array, cell: float, rounds: int =
     values = field(points.reshape(-1, 3)).reshape(points.shape[:3])
     vertices, quads = surface_nets(without_ambiguous_cells(values))
     vertices = low + cell * vertices
-    faces = _triangles(vertices, quads)
+    average = neighbour_average(_triangles(vertices, quads), len(vertices))
     for _ in range(rounds):
-        vertices = _project(field, _relax(vertices, faces), 0.1 * cell)
+        vertices = _project(field, 0.5 * (vertices + average @ vertices), 0.1 * cell)
     faces = _triangles(vertices, quads)
     return _project(field, vertices, 0.1 * cell), faces
 
@@ -132,11 +132,6 @@ def neighbour_average(faces: Faces, count: int) -> csr_array:
     links = csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
     links.data[:] = 1.0
     return csr_array(links.multiply(1 / links.sum(axis=1)[:, None]))
-
-
-def _relax(vertices: Array, faces: Faces) -> Array:
-    """Return the vertices moved halfway to the mean of their neighbours."""
-    return 0.5 * (vertices + neighbour_average(faces, len(vertices)) @ vertices)
 
 
 def _project(field: Field, vertices: Array, step: float) -> Array:

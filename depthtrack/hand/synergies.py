@@ -4,6 +4,7 @@ Source: Schroeder et al. 2014, Sec. V.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -206,10 +207,16 @@ def load_synergies(name: str | Path = "leap") -> Synergies:
     """
     names = synergy_names()
     if str(name) in names:
-        return Synergies.from_json(_folder() / f"{name}.json")
+        return _packaged(str(name))
     if Path(name).suffix == ".json":
         return Synergies.from_json(Path(name))
     raise InputError(f"no synergies '{name}': choose one of {', '.join(names)}, or give the path of a .json file")
+
+
+@cache
+def _packaged(name: str) -> Synergies:
+    """Return the synergies of a set that comes with depthtrack."""
+    return Synergies.from_json(_folder() / f"{name}.json")
 
 
 def synergy_names() -> list[str]:

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from depthtrack.geometry.capsules import capsule_distance
 from depthtrack.hand.kinematics import HandModel, body_of
@@ -96,6 +95,8 @@ def _taper(lost: Array, length: Array) -> Array:
 
 def _fit(capsules: list[Array], points: Array, scale: float) -> list[Array]:
     """Return capsules (8,) after alternating assignments of points (N, 3) and fits."""
+    from scipy.optimize import least_squares  # a tenth of a second, for rigs alone
+
     # The bounds hold ends that no vertex determines.
     near = np.concatenate([np.full(6, _NEAR), np.full(2, _NEAR / 2)]) * scale
     bounds = [(np.maximum(ends - near, np.repeat([-1, 1e-4], [6, 2])), ends + near) for ends in capsules]

@@ -8,7 +8,6 @@ from copy import copy
 from typing import Self
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from depthtrack.hand.compiled_kinematics import BodyPoses
 from depthtrack.segmentation.observation import Observation
@@ -18,17 +17,7 @@ from depthtrack.solver.options import SurfaceOptions
 from depthtrack.solver.point_search import PointSearch, match_points
 from depthtrack.solver.surface_points import PointBlocks
 from depthtrack.solver.visible_points import Cells, cells_over
-from depthtrack.types import Array, Index
-
-
-def subsample_evenly(points: Array, spacing: float) -> Index:
-    """Return increasing rows of points (N, 3) that are at least `spacing` (m) apart."""
-    tree, free, picked = cKDTree(points), np.ones(len(points), np.bool_), []
-    for i in range(len(points)):
-        if free[i]:
-            picked.append(i)
-            free[tree.query_ball_point(points[i], spacing)] = False
-    return np.array(picked)
+from depthtrack.types import Array
 
 
 class PointSurface:

@@ -8,7 +8,7 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.solver.surface_points import SurfacePoints
-from depthtrack.tracking.surfaces.points import subsample_evenly
+from depthtrack.tracking.surfaces.subsampling import subsample_evenly
 from depthtrack.types import Array, Index, Mask
 
 SAMPLES = 1600

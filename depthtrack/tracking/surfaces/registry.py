@@ -1,6 +1,7 @@
 """The surfaces of a hand that points are matched to, by name."""
 
 from functools import lru_cache
+from threading import Lock
 
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.backends import create_scorer
@@ -13,6 +14,7 @@ from depthtrack.tracking.surfaces.primitives import primitive_points
 from depthtrack.tracking.surfaces.skin import skin_points
 
 DEFAULTS = SurfaceOptions()
+_MAKING = Lock()
 
 
 def make_surface(
@@ -27,7 +29,10 @@ def make_surface(
     """
     if name == "cylinders":
         return CapsuleSurface(hand, create_scorer(renderer, hand), options)
-    return PointSurface(_points(name, hand, options.spacing), options)
+    # Threads that need the same points wait for them, instead of making them too.
+    with _MAKING:
+        points = _points(name, hand, options.spacing)
+    return PointSurface(points, options)
 
 
 @lru_cache(maxsize=8)

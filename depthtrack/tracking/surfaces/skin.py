@@ -7,7 +7,7 @@ import numpy as np
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.skin.mesh import Skin
 from depthtrack.solver.surface_points import SurfacePoints
-from depthtrack.tracking.surfaces.points import subsample_evenly
+from depthtrack.tracking.surfaces.subsampling import subsample_evenly
 
 _MOST_VERTICES = 25_000
 """Number of vertices from which on a skin is not divided."""

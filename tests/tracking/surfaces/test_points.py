@@ -15,8 +15,8 @@ from depthtrack.solver.correspondences import Correspondences, PointCloud
 from depthtrack.solver.point_search import resolve_bodies
 from depthtrack.solver.surface_points import PointBlocks, SurfacePoints, pose_blocks
 from depthtrack.solver.visible_points import FAR, Cells, Visible, cells_over, sort_visible
-from depthtrack.tracking.surfaces.points import subsample_evenly
 from depthtrack.tracking.surfaces.skin import mesh_points
+from depthtrack.tracking.surfaces.subsampling import subsample_evenly
 from tests.support.hands import random_pose
 from tests.support.surface_points import Posed, posed_points
 
@@ -78,6 +78,13 @@ def test_subsampled_points_are_apart_and_leave_no_gaps() -> None:
     between = distance[picked] + np.eye(len(picked))
     assert between.min() > 0.2
     assert distance.min(axis=1).max() <= 0.2
+    expected: list[int] = []
+    for n, point in enumerate(points):
+        if not expected or np.linalg.norm(points[expected] - point, axis=1).min() > 0.2:
+            expected.append(n)
+    np.testing.assert_array_equal(picked, expected)
+    assert len(subsample_evenly(points, 1e-9)) == 400
+    assert subsample_evenly(points[:1], 0.2).tolist() == [0]
 
 
 def _seen_slowly(posed: Posed, cells: Cells) -> dict[int, list[int]]:
