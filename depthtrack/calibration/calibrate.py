@@ -123,7 +123,7 @@ def calibrate(
 def calibration_of(source: CalibrationSource, fitted: FittedHand) -> Calibration:
     """Return the calibration with a fitted hand, compared with the average one."""
     joint, threads, side = source.options.joint, source.threads, fitted.side
-    observed, _ = prepared(fitted.views)
+    observed, _ = prepared(fitted.views, threads)
     before, after = (
         fit_jointly(
             observed,

@@ -8,6 +8,7 @@ the displacement of the skin is fitted with the sizes, and the hand is tracked o
 """
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from depthtrack.calibration.solid_hands import nearest_solid
 from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import COUNT, LENGTHS, PALM, SCALE, THUMB_BASE, WIDTHS, hand_of
+from depthtrack.segmentation.observation import Observation
 from depthtrack.tracking.stretches import Starts, TrackedView
 from depthtrack.types import Array
 
@@ -72,7 +74,7 @@ def fit_sizes(
         report("fingers and palm", (number + 0.6) / rounds)
         rows = best_rows(views, options.accepted.good_views)
         chosen = [views[row] for row in rows]
-        observed, poses = prepared(chosen)
+        observed, poses = prepared(chosen, threads)
         fitted = fit_jointly(observed, poses, values, side, options.iterations, options=joint, threads=threads)
         found = nearest_solid(fitted.values, side)
         change, values = np.abs(found - values)[: WIDTHS.start].max(), found
@@ -95,7 +97,7 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
     options, fitted = source.options, sized
     values = np.concatenate([sized.values, np.zeros(NODES)])
     views, poses, starts = sized.views, sized.poses, sized.starts
-    observed, _ = prepared(views)
+    observed, _ = prepared(views, source.threads)
     for number in range(options.skin_rounds):
         begun = number / options.skin_rounds
         if number > 0:
@@ -104,7 +106,7 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
             if len(tracked.views) < options.fewest:
                 break
             views, starts = tuple(best_views(tracked.views, options.accepted.good_views)), tracked.starts
-            observed, poses = prepared(views)
+            observed, poses = prepared(views, source.threads)
         report("skin", begun + 0.6 / options.skin_rounds)
         iterations = options.skin_iterations
         fit = fit_jointly(
@@ -122,9 +124,16 @@ def fit_skin(source: CalibrationSource, sized: FittedHand, report: Progress) -> 
     return fitted
 
 
-def prepared(views: Sequence[TrackedView]) -> tuple[list[CalibrationView], Array]:
+def prepared(views: Sequence[TrackedView], threads: int) -> tuple[list[CalibrationView], Array]:
     """Return views prepared for fits, and their poses (V, 27)."""
-    return [CalibrationView(each.observation) for each in views], np.stack([each.pose for each in views])
+    with ThreadPoolExecutor(threads, "prepare") as pool:
+        observed = list(pool.map(_prepared, [each.observation for each in views]))
+    return observed, np.stack([each.pose for each in views])
+
+
+def _prepared(observation: Observation) -> CalibrationView:
+    """Return the view of an observation, which its fits share."""
+    return observation.shared("calibration", lambda: CalibrationView(observation))
 
 
 def best_views(views: Sequence[TrackedView], share: float) -> list[TrackedView]:

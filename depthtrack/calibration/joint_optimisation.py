@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from depthtrack.calibration.options import JointFitOptions
 from depthtrack.calibration.residuals import CalibrationView, PosedSkin, linearise, stretches
@@ -77,9 +76,14 @@ def fit_jointly(
             skin = PosedSkin(hand_of(values, side), hand_of(np.append(built, values[COUNT:]), side))
             kernel_scale = soft * (firm / soft) ** (k / max(iterations - 1, 1))
             contribution = partial(_contribution, skin=skin, scale=kernel_scale, displaced=displaced, options=options)
-            eliminated, distances = zip(*pool.map(contribution, views, poses), strict=True)
-            information = np.sum([e.information for e in eliminated], axis=0)
-            gradient = np.sum([e.gradient for e in eliminated], axis=0)
+            information: Array = np.zeros((len(values), len(values)))
+            gradient = np.zeros(len(values))
+            steps, distances = list[tuple[Array, Array]](), list[float]()
+            for eliminated, distance in pool.map(contribution, views, poses):
+                information += eliminated.information
+                gradient += eliminated.gradient
+                steps.append((eliminated.step, eliminated.step_by_shared))
+                distances.append(distance)
             change = solve_free(information + prior, -(gradient + prior @ values), held)
             change *= min(1.0, options.largest_change / max(np.abs(change[:COUNT]).max(), 1e-12))
             before, values = values, values + change
@@ -88,9 +92,10 @@ def fit_jointly(
                 change = values - before
                 # Sizes may have left the solid ones in smaller steps. The skin then stays as it was built.
                 built = values[:COUNT] if is_solid(values[:COUNT], side) else built
-            tangents = np.stack([e.step + e.step_by_shared @ change for e in eliminated])
+            tangents = np.stack([step + by_shared @ change for step, by_shared in steps])
             poses = within_limits(retract(poses, tangents))
-    return JointFit(values, np.linalg.inv(information + prior)[:COUNT, :COUNT], poses, np.array(distances))
+    covariance = np.asarray(np.linalg.inv(information + prior)[:COUNT, :COUNT], dtype=np.float64)
+    return JointFit(values, covariance, poses, np.array(distances))
 
 
 def size_covariance(options: JointFitOptions) -> Array:
@@ -113,7 +118,9 @@ def prior_information(options: JointFitOptions, displaced: bool) -> Array:
     differences = neighbour_differences()
     skin = np.eye(NODES) / options.displacement**2
     skin += (differences.T @ differences).toarray() / options.displacement_difference**2
-    return np.asarray(block_diag(sizes, skin), dtype=np.float64)
+    both = np.zeros((COUNT + NODES, COUNT + NODES))
+    both[:COUNT, :COUNT], both[COUNT:, COUNT:] = sizes, skin
+    return both
 
 
 def _differ(values: Array, built: Array, side: Side, most: float) -> bool:
@@ -142,4 +149,5 @@ def _contribution(
     noise = max(options.noise, misfit * evidence.distance) ** 2
     share = min(view.patches / max(evidence.count, 1), 1.0) / noise
     damping = 1 / np.repeat(options.step_spread, [3, 3, 20]) ** 2
-    return eliminate_pose(share * evidence.H, share * evidence.g, pose[ANGLES], damping), evidence.distance
+    evidence.H[:] *= share
+    return eliminate_pose(evidence.H, share * evidence.g, pose[ANGLES], damping), evidence.distance

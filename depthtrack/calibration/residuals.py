@@ -14,7 +14,7 @@ import numpy as np
 
 from depthtrack.calibration.outline_and_surface import SeenSkin, SeenView, outline_residuals, surface_residuals
 from depthtrack.calibration.posed_mesh import PosableMesh, posed_mesh
-from depthtrack.calibration.size_equations import PARAMETERS, SizedHand, add_normal_equations
+from depthtrack.calibration.size_equations import PARAMETERS, SizedHand, add_normal_equations, mirror_upper
 from depthtrack.hand.compiled_kinematics import BODY_COUNT
 from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.kinematics import HandModel, body_of
@@ -67,7 +67,14 @@ class PosedSkin:
         """Return the skin in a pose (27,), rendered with the camera of the view."""
         skin = self._skin
         vertices, normals = posed_mesh(self._mesh, self.model.transforms(pose) @ self._stretch @ skin.T_body_rest)
-        return rasterise(view.observation.camera, vertices, self._mesh.faces, normals, skin.face_bodies)
+        return rasterise(
+            view.observation.camera,
+            vertices,
+            self._mesh.faces,
+            normals,
+            skin.face_bodies,
+            closed=skin.shape.rig is None,
+        )
 
 
 @lru_cache(maxsize=4)
@@ -111,6 +118,7 @@ def linearise(
     H, g = np.zeros((n, n)), np.zeros(n)
     for residuals in (on_surface, on_outline):
         add_normal_equations(hand, residuals, kernel_scale, H, g)
+    mirror_upper(H)
     found = on_surface.distances
     count = len(found) + len(on_outline.distances)
     return Evidence(H, g, count, float(np.median(found)) if len(found) else np.inf)

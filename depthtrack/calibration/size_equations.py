@@ -21,6 +21,7 @@ from depthtrack.types import Array, Index
 PARAMETERS = TANGENT_SIZE + COUNT
 _LENGTHS, _WIDTHS, _PALM = (TANGENT_SIZE + part.start for part in (LENGTHS, WIDTHS, PALM))
 _KNUCKLES, _THUMB_BASE = (TANGENT_SIZE + part.start for part in (KNUCKLES, THUMB_BASE))
+_BLOCK = 32
 _MOST = 24 + TOUCHED
 """Bound on the parameters that one residual depends on."""
 
@@ -156,7 +157,7 @@ def _along(T: Array, body: int, axis: int, n: Array) -> float:
 
 @compiled(nogil=True)
 def add_normal_equations(hand: SizedHand, residuals: Residuals, kernel_scale: float, H: Array, g: Array) -> None:
-    """Add the weighted sums of a a^T to H (61, 61) and of a e to g (61,).
+    """Add the weighted sums of a a^T to the upper triangle of H (61, 61), and of a e to g (61,).
 
     If H and g have rows for the nodes of the displacement as well, these are added up too.
 
@@ -175,6 +176,14 @@ def add_normal_equations(hand: SizedHand, residuals: Residuals, kernel_scale: fl
             g[row] += share * residuals.errors[k]
             for j in range(i, count):
                 H[row, columns[j]] += share * a[j]
-    for i in range(H.shape[0]):
-        for j in range(i):
-            H[i, j] = H[j, i]
+
+
+@compiled(nogil=True)
+def mirror_upper(H: Array) -> None:
+    """Write the upper triangle of H (n, n) to the lower one too, in blocks that the cache holds."""
+    n = H.shape[0]
+    for top in range(0, n, _BLOCK):
+        for left in range(0, top + 1, _BLOCK):
+            for i in range(top, min(top + _BLOCK, n)):
+                for j in range(left, min(left + _BLOCK, i)):
+                    H[i, j] = H[j, i]

@@ -18,6 +18,7 @@ def rasterise(
     vertex_normals: Array,
     labels: Index,
     onto: RenderedSurface | None = None,
+    closed: bool = False,
 ) -> RenderedSurface:
     """Render triangles from both sides; return the nearest hit at every pixel centre.
 
@@ -26,6 +27,7 @@ def rasterise(
     vertex_normals: (V, 3) of any length, camera frame.
     labels: (F,) written at the pixels of each face.
     onto: a surface to draw over in place; a new one if None.
+    closed: whether the faces close a solid and are counter-clockwise from outside; those that face away are left out.
     """
     surface = RenderedSurface.empty(camera) if onto is None else onto
     _rasterise(
@@ -34,6 +36,7 @@ def rasterise(
         np.ascontiguousarray(vertex_normals, dtype=np.float64),
         np.asarray(labels, dtype=np.int16),
         (camera.fx, camera.fy, camera.cx, camera.cy),
+        closed,
         surface.depth,
         surface.label,
         surface.normal,
@@ -48,6 +51,7 @@ def _rasterise(
     normals: Array,
     labels: NDArray[np.int16],
     intrinsics: tuple[float, float, float, float],
+    closed: bool,
     depth: Array,
     label: NDArray[np.int16],
     normal: Array,
@@ -68,7 +72,7 @@ def _rasterise(
         ub, vb = pixels[b, 0], pixels[b, 1]
         uc, vc = pixels[c, 0], pixels[c, 1]
         area = (ub - ua) * (vc - va) - (uc - ua) * (vb - va)
-        if area == 0.0:
+        if area == 0.0 or (closed and area > 0.0):
             continue
         sign_of_area = 1.0 if area > 0.0 else -1.0
         u0, u1 = max(0, math.ceil(min(ua, ub, uc))), min(width - 1, math.floor(max(ua, ub, uc)))

@@ -161,13 +161,16 @@ def refine_views(
 
     Observations stay those of the hand that was tracked.
     """
-    refined = list[TrackedView]()
-    with closing(create_tracker(config, hand, threads)) as tracker:
-        for view in views:
+
+    def refined(view: TrackedView) -> TrackedView | None:
+        with closing(create_tracker(config, hand)) as tracker:
             found = tracker.start(view.observation, view.pose)
-            if found.pose is not None:
-                refined.append(TrackedView(view.observation, found.pose, found.energy, found.agreement))
-    return tuple(refined)
+        if found.pose is None:
+            return None
+        return TrackedView(view.observation, found.pose, found.energy, found.agreement)
+
+    with ThreadPoolExecutor(threads, "views") as pool:
+        return tuple(view for view in pool.map(refined, views) if view is not None)
 
 
 class _Stretch(NamedTuple):

@@ -10,6 +10,7 @@ from depthtrack.calibration.size_equations import (
     Residuals,
     SizedHand,
     add_normal_equations,
+    mirror_upper,
     write_gradient,
 )
 from depthtrack.hand.displacement_grid import NODES
@@ -57,6 +58,7 @@ def test_normal_equations_are_weighted_sums_of_gradients() -> None:
     H, g = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
     for _ in range(2):
         add_normal_equations(SizedHand.at(model, pose), residuals, 0.01, H, g)
+        mirror_upper(H)
     a, weights = _gradients(model, pose, residuals), geman_mcclure(residuals.distances**2, 0.01)
     np.testing.assert_allclose(H, 2 * (a * weights[:, None]).T @ a, rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(g, 2 * a.T @ (weights * residuals.errors), rtol=1e-11, atol=1e-12)
@@ -74,6 +76,7 @@ def test_displacements_are_added_by_finite_differences_of_the_skin() -> None:
     residuals = Residuals(bodies, x, normals, errors, np.abs(errors))
     H, g = np.zeros((PARAMETERS + NODES,) * 2), np.zeros(PARAMETERS + NODES)
     add_normal_equations(SizedHand.at(model, pose), residuals, 0.01, H, g)
+    mirror_upper(H)
     by_node, weights = np.zeros((len(rigid), NODES)), geman_mcclure(residuals.distances**2, 0.01)
     for node in range(NODES):
         displaced = Skin.of(hand.with_(displacement=0.001 * np.eye(NODES)[node])).at(pose)[rigid]

@@ -11,6 +11,7 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.primitives import CYLINDER, PRIMITIVE_COUNT, SPHERE, Primitives, cone, ellipsoid
 from depthtrack.hand.shape import HandShape
+from depthtrack.hand.skin.mesh import Skin
 from depthtrack.rendering.raycast import _bounds, raycast
 from depthtrack.rendering.rendered_surface import NEAR
 from depthtrack.rendering.triangles import rasterise
@@ -115,6 +116,18 @@ def test_hand_depth_is_the_nearest_of_its_tessellated_primitives(seed: int, scal
     assert both.sum() > 60
     assert np.mean((exact.depth > 0) != (surface.depth > 0)) < 0.01
     assert np.median(np.abs(exact.depth - surface.depth)[both]) < 2e-4
+
+
+def test_faces_of_a_solid_that_face_away_are_hidden_anyway() -> None:
+    for side in ("right", "left"):
+        skin, pose = Skin.of(HandShape(side=side)), random_pose_in_view(8)
+        pose[:3] = [0, 0, 0.3]
+        mesh = skin.at(pose), skin.faces, skin.normals(skin.at(pose)), skin.face_bodies
+        both_sides, front = rasterise(CAMERA, *mesh), rasterise(CAMERA, *mesh, closed=True)
+        assert (both_sides.depth > 0).sum() > 60
+        np.testing.assert_allclose(front.depth, both_sides.depth, atol=1e-6)
+        assert np.mean(front.label != both_sides.label) < 0.002
+        np.testing.assert_allclose(front.normal, both_sides.normal, atol=1e-6)
 
 
 def test_normals_are_unit_and_face_the_camera() -> None:
