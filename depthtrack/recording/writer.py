@@ -101,8 +101,9 @@ class SequenceWriter:
         pose: ArrayLike | None = None,
         joints: ArrayLike | None = None,
         keypoints: ImageKeypoints | None = None,
+        copied: bool = True,
     ) -> None:
-        """Add a frame; arrays are copied.
+        """Add a frame.
 
         timestamp: seconds, kept to the microsecond, increasing.
         depth, exact_depth: (h, w) metres, 0 or not finite = none. They are rounded to the camera's depth scale and to
@@ -112,6 +113,7 @@ class SequenceWriter:
         pose: (27,) metres, quaternion, radians, camera frame.
         joints: (21, 3) metres, camera frame; NaN if unknown.
         keypoints: in the depth image, from a detector.
+        copied: whether the images are copied; if not, they must stay as they are.
 
         Frames may lack ground truth, but all annotated frames have the same parts.
 
@@ -131,7 +133,7 @@ class SequenceWriter:
         # All checks precede this line, so a frame is written whole or not at all.
         self._last_stem = stem
         for kind, image in images.items():
-            self._submit(kind, stem, image.copy())
+            self._submit(kind, stem, image.copy() if copied else image)
         for (name, header), values in truth.items():
             # repr is the shortest text that reads back as the same float64.
             cells = ["" if math.isnan(value) else repr(value) for value in values.ravel().tolist()]

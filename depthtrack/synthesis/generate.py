@@ -274,4 +274,5 @@ def write_recording(
                 pose=frame.pose,
                 joints=frame.joints,
                 keypoints=frame.keypoints,
+                copied=False,
             )
