@@ -82,7 +82,7 @@ class CalibrationOptions:
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
     exact_iterations: int = option(3, "Last iterations, which stretch the skin of the sizes found so far")
     skin_rounds: int = option(2, "Fits of the skin's displacement; without any, the skin follows from the sizes")
-    skin_iterations: int = option(10, "Iterations of each")
+    skin_iterations: int = option(6, "Iterations of each")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
     accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
