@@ -35,6 +35,10 @@ _IMPORT = re.compile(rb"^\s*(?:from|import)\s+(depthtrack[\w.]*)(?:\s+import\s+(
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles a function of a module on its first call.
 
+    A kernel that Python calls must return plain numbers, arrays and tuples of them. numba calls Python to make an
+    object of a class, such as a NamedTuple, and does not check the result. A signal that is handled there raises an
+    error, and the process crashes.
+
     options: those of `numba.njit`; the kernel lets other threads run. Functions with equal options share the code that
         numba makes of its own functions.
 

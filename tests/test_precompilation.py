@@ -7,8 +7,10 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
+from numba import types
 from numba.core.dispatcher import Dispatcher
 
 from depthtrack import precompilation
@@ -68,6 +70,19 @@ def test_each_listed_kernel_takes_these_arguments(kernel: Kernel) -> None:
     assert isinstance(kernel.dispatcher, Dispatcher), "run  python tools/generate_kernels.py"
     inspect.signature(kernel.dispatcher.py_func).bind(*kernel.signature)
     assert [text_of(each) for each in kernel.signature] == kernel.arguments
+
+
+@pytest.mark.parametrize("kernel", listed_kernels(), ids=lambda kernel: kernel.name)
+def test_each_listed_kernel_returns_plain_values(kernel: Kernel) -> None:
+    """numba would make an object by a call of Python, and crash if a signal raises an error there."""
+
+    def is_plain(kind: Any) -> bool:
+        if isinstance(kind, types.BaseAnonymousTuple):
+            return all(map(is_plain, kind))
+        return isinstance(kind, types.Array | types.Number | types.Boolean) or kind == types.none
+
+    kernel.dispatcher.compile(kernel.signature)
+    assert is_plain(kernel.dispatcher.overloads[kernel.signature].signature.return_type)
 
 
 def test_an_unknown_type_is_rejected() -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from depthtrack.calibration.size_equations import Residuals
 from depthtrack.compilation import compiled
 from depthtrack.solver.robust import compiled_symmetric_direction
-from depthtrack.types import Array
+from depthtrack.types import Array, Index
 
 _REACH, _AGREEMENT = 0.04, 0.3
 """Metres and cosine between normals: limits of a correspondence."""
@@ -41,13 +41,27 @@ class SeenSkin(NamedTuple):
     camera: tuple[float, float, float, float]
 
 
-@compiled(nogil=True)
 def surface_residuals(view: SeenView, skin: SeenSkin, palm: Array, wrist: float) -> Residuals:
     """Return the symmetric residuals of observed points and the nearest visible skin.
 
     palm: (3, 4) T_camera_palm.
     wrist: place along the palm's y axis from which on there are residuals, m.
     """
+    return Residuals(*_surface_residuals(view, skin, palm, wrist))
+
+
+def outline_residuals(view: SeenView, skin: SeenSkin, palm: Array, wrist: float) -> Residuals:
+    """Return the residuals from the outline of the visible skin to that of the silhouette.
+
+    palm, wrist: see `surface_residuals`.
+    """
+    return Residuals(*_outline_residuals(view, skin, palm, wrist))
+
+
+@compiled(nogil=True)
+def _surface_residuals(
+    view: SeenView, skin: SeenSkin, palm: Array, wrist: float
+) -> tuple[Index, Array, Array, Array, Array]:
     count, kept = view.points.shape[0], 0
     found = _empty(count)
     for k in range(count):
@@ -73,11 +87,9 @@ def surface_residuals(view: SeenView, skin: SeenSkin, palm: Array, wrist: float)
 
 
 @compiled(nogil=True)
-def outline_residuals(view: SeenView, skin: SeenSkin, palm: Array, wrist: float) -> Residuals:
-    """Return the residuals from the outline of the visible skin to that of the silhouette.
-
-    palm, wrist: see `surface_residuals`.
-    """
+def _outline_residuals(
+    view: SeenView, skin: SeenSkin, palm: Array, wrist: float
+) -> tuple[Index, Array, Array, Array, Array]:
     height, width = skin.depth.shape
     fx, kept = skin.camera[0], 0
     found = _empty(_outline_length(skin.depth))
@@ -191,11 +203,6 @@ def _empty(count: int) -> Residuals:
 
 
 @compiled(nogil=True)
-def _first(residuals: Residuals, count: int) -> Residuals:
-    return Residuals(
-        residuals.bodies[:count],
-        residuals.x[:count],
-        residuals.directions[:count],
-        residuals.errors[:count],
-        residuals.distances[:count],
-    )
+def _first(residuals: Residuals, count: int) -> tuple[Index, Array, Array, Array, Array]:
+    bodies, x, directions, errors, distances = residuals
+    return bodies[:count], x[:count], directions[:count], errors[:count], distances[:count]

@@ -12,7 +12,7 @@ import numpy as np
 from depthtrack.compilation import compiled
 from depthtrack.simd.functions import lowest_of_halves
 from depthtrack.simd.vectors import F32X16, both, filler, kernel_part, loader, select, store
-from depthtrack.solver.visible_points import FAR, LANES
+from depthtrack.solver.visible_points import FAR, LANES, Cells
 from depthtrack.types import Array, Array32, Index
 
 _WIDEST = 12
@@ -49,12 +49,17 @@ class Groups(NamedTuple):
         return self._replace(best=np.zeros_like(self.best), chosen=np.zeros_like(self.chosen))
 
 
-@compiled(nogil=True)
-def grouped(points, normals, cells, origin):
+def grouped(points: Array, normals: Array, cells: Cells, origin: Array) -> tuple[Array, Array, Groups]:
     """Return the sorted points and normals (N, 3) of a cloud, and their groups among cells.
 
     origin: (3,) metres, camera frame, of the visible points.
     """
+    points, normals, *found = _grouped(points, normals, cells, origin)
+    return points, normals, Groups(*found)
+
+
+@compiled(nogil=True)
+def _grouped(points, normals, cells, origin):
     count = points.shape[0]
     cell, slots = np.empty((count, 2), np.int64), np.zeros(cells.rows * cells.columns + 1, np.int64)
     inside = np.empty(count)
@@ -87,8 +92,8 @@ def grouped(points, normals, cells, origin):
             place[k, j], sorted_normals[k, j] = points[i, k] - origin[k], normals[i, k]
     first[total] = count
     memory = np.zeros((2, count + LANES), np.float32)
-    found = first[: total + 1].copy(), span[:total].copy(), place, sorted_normals, margin
-    return sorted_points, cloud_normals, Groups(*found, memory[0], memory[1])
+    ends, cells_of = first[: total + 1].copy(), span[:total].copy()
+    return sorted_points, cloud_normals, ends, cells_of, place, sorted_normals, margin, memory[0], memory[1]
 
 
 @compiled(nogil=True)

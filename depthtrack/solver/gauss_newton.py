@@ -100,7 +100,7 @@ def solve(problem: Problem, options: SolverOptions, bodies: BodyPoses, state: So
     if not reached:
         best = energy(problem.equations, problem.points, bodies) + prior_energy(pose, prior)
         trace[0] = best
-    return Outcome(status, steps, best)
+    return status.value, steps, best
 
 
 @compiled(nogil=True)
@@ -131,8 +131,7 @@ def solve_each(
             coordinates[i] = 0.0
             for j in range(20):
                 coordinates[i] += problem.space.basis[j, i] * angles[j]
-        outcome = solve(problem, options, bodies, SolverState(pose, coordinates, slope), trace)
-        energies[n] = outcome.energy
+        energies[n] = solve(problem, options, bodies, SolverState(pose, coordinates, slope), trace)[2]
 
 
 @compiled(nogil=True)

@@ -92,12 +92,11 @@ class SolverState(NamedTuple):
         return SolverState(start, coordinates, limit_gradients(coordinates, space.lower, space.upper))
 
 
-class Outcome(NamedTuple):
-    """Result of the compiled solver: status, number of steps, and final energy, m^2."""
+Outcome = tuple[int, int, float]
+"""Result of the compiled solver: status, number of steps, and final energy, m^2.
 
-    status: SolverStatus
-    iterations: int
-    energy: float
+Kernels that Python calls return plain numbers and arrays, see `compilation.compiled`.
+"""
 
 
 @dataclass(frozen=True)
@@ -120,8 +119,8 @@ class Solution:
     @staticmethod
     def of(pose: Array, outcome: Outcome, trace: Array) -> "Solution":
         """Return the solution of a run of the compiled solver; `trace` may be longer than its steps."""
-        energies = trace[: outcome.iterations + 1].copy()
-        return Solution(pose, outcome.status, outcome.iterations, outcome.energy, energies)
+        status, iterations, energy = outcome
+        return Solution(pose, SolverStatus(status), iterations, energy, trace[: iterations + 1].copy())
 
     @property
     def converged(self) -> bool:

@@ -54,7 +54,6 @@ class Cells(NamedTuple):
     columns: int
 
 
-@compiled(nogil=True)
 def cells_over(points: Array, size: float, margin: float) -> Cells:
     """Return the cells that cover the image of points and a margin around it.
 
@@ -62,8 +61,13 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
     size, margin: side of a cell and width of the margin, metres at the mean depth of the points. Cells are larger where
         a side would need more than _MOST_CELLS.
     """
+    return Cells(*_cells_over(points, size, margin))
+
+
+@compiled(nogil=True)
+def _cells_over(points: Array, size: float, margin: float) -> tuple[float, float, float, int, int]:
     if points.shape[0] == 0:
-        return Cells(0.0, 0.0, 1.0, 1, 1)
+        return 0.0, 0.0, 1.0, 1, 1
     low_u = low_v = 1e9
     high_u = high_v = -1e9
     depth = 0.0
@@ -78,7 +82,7 @@ def cells_over(points: Array, size: float, margin: float) -> Cells:
     side = max(size / depth, max(width, height) / (_MOST_CELLS - 1))
     columns = min(int(width / side) + 1, _MOST_CELLS)
     rows = min(int(height / side) + 1, _MOST_CELLS)
-    return Cells(low_u - around, low_v - around, side, rows, columns)
+    return low_u - around, low_v - around, side, rows, columns
 
 
 @compiled(nogil=True)
