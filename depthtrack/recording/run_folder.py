@@ -36,6 +36,10 @@ BACKWARD_STAGE = "backward"
 """Column of the milliseconds of the backward pass."""
 
 
+_OTHER = {"hand": "another hand (--hand, --side)", "reading": "other options of reading, such as --depth-scale"}
+"""What differs if an entry of the configuration does, whose values say little."""
+
+
 class RunWriter(Closing):
     """Appends frames to a run folder; every row is complete on disk before the next is written.
 
@@ -93,6 +97,8 @@ class RunWriter(Closing):
                 ]
                 self.revised = whole and bool(backward_frames(folder, self.rows))
                 if self.revised:
+                    for name, columns in (("timings.csv", ("index", *self._stages)), ("branches.csv", BRANCH_COLUMNS)):
+                        read_table(folder / name, columns)
                     return
                 self.rows = forward
             rewrite_table(folder / "poses.csv", ROW_COLUMNS, map(row_cells, self.rows))
@@ -276,10 +282,20 @@ def check_unused(folder: Path, resume: bool) -> None:
     """Check that a folder holds no run, unless it is resumed.
 
     Raises:
-        InputError: if it holds one.
+        InputError: if it holds one, or poses whose `run.json` is missing.
     """
-    if not resume and (folder / "run.json").exists():
-        raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
+    if (folder / "run.json").exists():
+        if not resume:
+            raise InputError(f"{folder} already holds a run: continue it with --resume, or choose another folder")
+    elif (folder / "poses.csv").exists() and not _is_empty_table(folder / "poses.csv"):
+        raise InputError(f"{folder} holds a poses.csv without a run.json: choose another folder")
+
+
+def _is_empty_table(path: Path) -> bool:
+    """Return whether a table of poses has no row: its run ended before the first frame."""
+    header = (",".join(ROW_COLUMNS) + "\r\n").encode()
+    with path.open("rb") as file:
+        return header.startswith(file.read(len(header) + 1))
 
 
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path) -> None:
@@ -290,8 +306,8 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path
     Raises:
         InputError: if another entry differs; it names the first one.
     """
-    # The tracker first, since its options follow from it.
-    for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key)):
+    # The tracker first, since its options follow from it, and the backward pass last, which follows from them.
+    for key in sorted(set(found) | set(wanted), key=lambda key: (key != "tracker", key == "backward", key)):
         if key == "on_damage" and wanted.get(key) == "skip":
             continue
         if key not in ("versions", "threads", "machine") and found.get(key) != wanted.get(key):
@@ -299,6 +315,10 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], folder: Path
             if key == "backward" and None in (before, now):
                 given, other = ("no", "yes") if before is None else ("yes", "no")
                 raise InputError(f"{folder} was begun with --backward {given}, not {other}: continue with the same")
+            if key in _OTHER:
+                raise InputError(
+                    f"{folder} was begun with {_OTHER[key]}: continue with the same, or choose another folder"
+                )
             raise InputError(
                 f"{folder} was begun with {name} = {before!r:.80}, not {now!r:.80}: "
                 "continue with the same options, or choose another folder"

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
+from depthtrack.errors import InputError
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.run_folder import RunWriter
@@ -165,10 +166,19 @@ def replay_frames(
 
 
 def write_run(tracked: Iterable[TrackedFrame], run: RunWriter) -> Iterator[TrackedFrame]:
-    """Append tracked frames to a run folder; yield those that it did not hold before."""
+    """Append tracked frames to a run folder; yield those that it did not hold before.
+
+    Raises:
+        InputError: if the frames that it holds are not the first ones.
+    """
     held = len(run.rows)
     for number, each in enumerate(tracked):
         if number < held:
+            if (found := run.rows[number].index) != each.frame.index:
+                raise InputError(
+                    f"{run.folder / 'poses.csv'}, line {number + 2}: expected frame {each.frame.index}, found {found}: "
+                    "remove the lines from there on, and resume"
+                )
             continue
         row = row_of(each.frame.index, replace(each.estimate, timestamp=each.frame.timestamp))
         run.append(row, {"segment": each.segment_ms, **each.estimate.stage_ms}, each.failure)

@@ -90,6 +90,30 @@ def test_a_run_resumes_only_with_its_own_options(tmp_path: Path) -> None:
     RunWriter(tmp_path / "run", {**CONFIGURATION, "threads": 1}, STAGES, resume=True).close()
 
 
+def test_what_differs_is_named_by_its_options(tmp_path: Path) -> None:
+    write(tmp_path / "run", 2)
+    for entry, message in {
+        "hand": r"another hand \(--hand, --side\)",
+        "reading": "--depth-scale",
+        "options": "begun with options",
+    }.items():
+        with pytest.raises(InputError, match=message):
+            # The backward pass differs as well, since it follows from the options.
+            RunWriter(tmp_path / "run", {**CONFIGURATION, entry: "other", "backward": None, "x": 1}, STAGES, True)
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_poses_without_a_configuration_are_not_replaced(tmp_path: Path, resume: bool) -> None:
+    write(tmp_path, 2)
+    (tmp_path / "run.json").unlink()
+    with pytest.raises(InputError, match=r"poses.csv without a run.json"):
+        write(tmp_path, 2, resume)
+    assert len(read_rows(tmp_path)) == 2
+    (tmp_path / "poses.csv").write_text((tmp_path / "poses.csv").read_text().splitlines()[0] + "\r\n")
+    write(tmp_path, 3, resume)  # as if it had been killed before its first frame
+    assert len(read_rows(tmp_path)) == 3
+
+
 def test_a_run_goes_on_without_damaged_frames(tmp_path: Path) -> None:
     """It may not return to their refusal, which would have ended it earlier."""
     refuse, skip = ({**CONFIGURATION, "on_damage": choice} for choice in ("refuse", "skip"))

@@ -269,6 +269,15 @@ def test_a_revised_run_with_a_shortened_table_ends_with_the_same_poses(
     assert Run.load(folder).backward == frozenset(range(CLEAR))
 
 
+@pytest.mark.parametrize("name", ["timings.csv", "branches.csv"])
+def test_a_revised_run_without_a_table_is_refused(name: str, run: Path, tracking: TrackingRun, tmp_path: Path) -> None:
+    folder = _copied(run, tmp_path / "run")
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=f"{name} is missing"):
+        list(tracking.write(folder, resume=True))
+    assert not (folder / name).exists()
+
+
 def test_a_revised_run_that_is_not_whole_goes_on_from_its_forward_poses(run: Path, tmp_path: Path) -> None:
     folder = _copied(run, tmp_path / "run")
     configuration = Run.load(folder).configuration

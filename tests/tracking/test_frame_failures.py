@@ -122,6 +122,16 @@ def test_a_resumed_run_has_the_same_bytes(tmp_path: Path, kept: int) -> None:
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
 
 
+def test_a_run_that_lacks_a_row_is_not_resumed(tmp_path: Path) -> None:
+    """Its later poses would go to other frames."""
+    run(tmp_path / "run", {}, {})
+    lines = (tmp_path / "run" / "poses.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "run" / "poses.csv").write_text("".join([*lines[:3], *lines[4:6]]))
+    with pytest.raises(InputError, match=r"poses.csv, line 4: expected frame 2, found 3: remove the lines"):
+        run(tmp_path / "run", {}, {}, resume=True)
+    assert len((tmp_path / "run" / "poses.csv").read_text().splitlines()) == 5
+
+
 def test_a_sound_run_has_no_file_of_failures(tmp_path: Path) -> None:
     assert not run(tmp_path / "run", {}, {}).failures
     assert not (tmp_path / "run" / FAILURES_FILE).exists()
