@@ -55,7 +55,7 @@ def main() -> None:
     for weight in WEIGHTS:
         margins = np.array([margin(row, weight) for row in rows])
         needed = np.array([OPTIONS.sure_margin if row["open"] else SideOptions().sure_margin for row in rows])
-        sure = np.abs(margins) >= np.log1p(needed)
+        sure = (np.abs(margins) >= np.log1p(needed)) & (margins * np.array([row["average"] for row in rows]) >= 0)
         print(
             f"weight {weight:g}: {(margins > 0).sum()} of {len(rows)} sides right, {sure.sum()} sure, "
             f"{(margins[sure] > 0).sum()} of them right; least margin of a right one that is sure "
@@ -78,7 +78,8 @@ def margin(row: Row, weight: float) -> float:
 def measure_sides(cell: Cell) -> Row:
     """Return how much more the wrong side of a recording costs, without the factor of the sizes.
 
-    `open` is whether the average hands leave the side open, `margin` the logarithm of the quotient of the costs.
+    `open` is whether the average hands leave the side open. `margin` is the logarithm of the quotient of the costs, and
+    `average` that of the average hands.
     """
     with made_recording(**cell) as sequence:
         source = CalibrationSource(sequence, None, 0, 1, None, OPTIONS)
@@ -86,7 +87,8 @@ def measure_sides(cell: Cell) -> Row:
         choice = choose_side(sequence, scale=scale)
         side: Side = cell["side"]
         known = float(np.log1p(choice.margin)) * (1 if choice.side == side else -1)
-        row: Row = {"open": not choice.sure, "margin": known, "right_deviation": 0.0, "left_deviation": 0.0}
+        row: Row = {"open": not choice.sure, "margin": known, "average": known}
+        row |= {"right_deviation": 0.0, "left_deviation": 0.0}
         if choice.sure:
             return row
         costs = dict[Side, float]()

@@ -52,6 +52,7 @@ class Calibration:
     poses_before: (V, 27) of the average hand.
     sure_margin: margin from which on the side is sure.
     energies: (N,) of the last hand that was tracked, in all tracked frames; NaN without a pose.
+    side_agrees: whether hands of average proportions fit this side no worse than the other one.
     """
 
     hand: HandShape
@@ -64,11 +65,12 @@ class Calibration:
     poses_before: Array
     sure_margin: float = CalibrationOptions.sure_margin
     energies: Array = field(default_factory=lambda: np.zeros(0))
+    side_agrees: bool = True
 
     @property
     def side_sure(self) -> bool:
         """Whether the side was given, or the other one fits clearly worse."""
-        return self.side_margin is None or self.side_margin >= self.sure_margin
+        return self.side_margin is None or (self.side_agrees and self.side_margin >= self.sure_margin)
 
     @property
     def is_of_usual_size(self) -> bool:

@@ -70,7 +70,8 @@ def calibrate_either_side(
     factors = size_costs({side: size_deviation(each.values[:COUNT]) for side, each in sized.items()}, source.options)
     side, margin = _cheaper(calibrations, choice, factors)
     found = calibration_of(source, fit_skin(source, sized[side], _part(report, 0.85, 0.15)))
-    return replace(found, side_margin=margin)
+    # With an object in the hand, the average hands and those of adapted sizes often have different sides.
+    return replace(found, side_margin=margin, side_agrees=side == choice.side)
 
 
 def size_costs(deviations: Mapping[Side, float], options: CalibrationOptions) -> dict[Side, float]:

@@ -120,6 +120,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         energies: np.ndarray
         side_margin: float | None = None
         sure_margin: float = CalibrationOptions().sure_margin
+        side_agrees: bool = True
 
     tried, skins = list[Side](), list[Side]()
 
@@ -153,6 +154,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     assert skins == ["left" if sure else "right"]
     assert found.hand.side == ("left" if sure else "right")
     assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
+    assert found.side_agrees == sure
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
 
 
