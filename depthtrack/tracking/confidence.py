@@ -1,8 +1,9 @@
 """Confidence of an estimate.
 
-The confidence is the probability that the largest joint error is below 20 mm. It is a logistic function of a few
-figures of the frame. `tools/fit_confidence.py` fits it on the tuning seeds of the cross-model benchmark: no recording
-of a reported figure takes part.
+The confidence is the probability that the largest joint error is below 20 mm, apart from constant offsets of the
+joints. Such offsets come from another skeleton or a wrong calibration. It is a logistic function of a few figures of
+the frame. `tools/fit_confidence.py` fits it on the tuning seeds of the cross-model benchmark: no recording of a
+reported figure takes part.
 """
 
 import math

@@ -13,6 +13,7 @@ from depthtrack.benchmarks.crossmodel.recordings import MOTIONS, made_recording,
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.benchmarks.papers.plot import draw_png
 from depthtrack.calibration.calibrate import Calibration
+from depthtrack.errors import InputError
 from depthtrack.tracking.confidence import Evidence
 
 TINY: dict[str, Any] = {
@@ -40,6 +41,8 @@ def test_cells_are_drawn_once_for_each_motion_and_seed() -> None:
     assert {cell["side"] for cell in cells} == {"left", "right"}
     assert all(0.8 <= cell["scale"] <= 1.2 for cell in cells)
     assert cells[-6:] == recording_cells(ExperimentOptions(repetitions=1, first_seed=2))
+    with pytest.raises(InputError, match="must be below 1000, found 1001"):
+        recording_cells(ExperimentOptions(repetitions=2, first_seed=1000, split="tuning"))
     tuned = recording_cells(ExperimentOptions(repetitions=3, split="tuning"))
     assert not {cell["seed"] for cell in cells} & {cell["seed"] for cell in tuned}
 

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from depthtrack.benchmarks.papers.experiment import ExperimentOptions
+from depthtrack.errors import InputError
 from depthtrack.evaluation.sweep.rows import Cell
 from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.shape import HandShape, Side
@@ -32,7 +33,13 @@ FIRST_SEED = {"tuning": 0, "report": 1000}
 
 
 def recording_cells(options: ExperimentOptions) -> list[Cell]:
-    """Return one cell per motion and seed: a recording of a random hand, sensor and viewpoint."""
+    """Return one cell per motion and seed: a recording of a random hand, sensor and viewpoint.
+
+    Raises:
+        InputError: the seeds reach those of the other split.
+    """
+    if options.split == "tuning" and (last := options.seeds(SEEDS, QUICK_SEEDS)[-1]) >= FIRST_SEED["report"]:
+        raise InputError(f"seeds of the split tuning must be below {FIRST_SEED['report']}, found {last}")
     rigs = [(str(Path(rig).resolve()), load_hand(Path(rig)).side) for rig in options.rigs]
     first = FIRST_SEED[options.split]
     return [
