@@ -13,6 +13,7 @@ from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.files import compact_json
+from depthtrack.hand.pose import ANGLES, FINGERS
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import COUNT, hand_of, measures
 from depthtrack.recording.sequence import Sequence
@@ -25,6 +26,8 @@ _POSE_ITERATIONS = 4, 2
 """Iterations of the poses alone, for the hands before and after calibration; the latter's are nearly there."""
 _USUAL_LENGTHS = (110, 240)
 """Length of the hand of children at school and of adults, mm, with a margin for its error."""
+_STIFF = np.radians(20)
+"""Range of a finger's flexion over the views, rad, below which it hardly bends."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,18 @@ class Calibration:
     def is_of_usual_size(self) -> bool:
         """Whether a person may have such a hand; else the unit of the depth is probably wrong."""
         return _USUAL_LENGTHS[0] <= self.measured["hand_length"].mm <= _USUAL_LENGTHS[1]
+
+    @property
+    def stiff_fingers(self) -> tuple[str, ...]:
+        """Fingers without the thumb that hardly bend in the views.
+
+        Such views leave open where their joints lie.
+        """
+        if len(self.poses) == 0:
+            return ()
+        flexion = self.poses[:, ANGLES].reshape(-1, len(FINGERS), 4)[..., 1:]
+        ranges = np.ptp(flexion, axis=0).max(axis=-1)
+        return tuple(name for name, each in zip(FINGERS[1:], ranges[1:], strict=True) if each < _STIFF)
 
     def to_json(self) -> str:
         """Return the text of `hand.json`, with the measured sizes and their uncertainty."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from depthtrack.cli.argument_checks import OUTPUT_FILE, PICTURE
-from depthtrack.cli.hand_options import unusual_size
+from depthtrack.cli.hand_options import size_notes
 from depthtrack.cli.measuring import calibrate_rig_on_sequence, calibrate_sequence
 from depthtrack.cli.recording_options import RecordingOptions
 from depthtrack.cli.stated_default import number, stated_default
@@ -113,7 +113,7 @@ def _text(calibration: "Calibration", out: Path, picture: Path) -> str:
             f"  {name:16}{m.mm:8.1f}{m.sigma_mm:8.1f}{min(m.confidence, _LARGEST_CONFIDENCE):12.2f}"
             for name, m in calibration.measured.items()
         ),
-        *unusual_size(calibration),
+        *size_notes(calibration),
         f"check the picture {picture}; use the hand:  depthtrack track RECORDING --hand {out}",
     ]
     return "\n".join(lines)

@@ -133,7 +133,7 @@ def _text(evaluation: "Evaluation") -> str:
     if losses.losses:
         mean = losses.time_to_recovery().statistics()["mean"]
         after = "" if mean is None else f" after {mean:.2f} s on average"
-        lines.append(f"  lost {len(losses.losses)} times, recovered {losses.recovered} times{after}")
+        lines.append(f"  losses: {len(losses.losses)}, {losses.recovered} of them recovered{after}")
     lines.append(_HEAD)
     lines += [_row(metric.name, metric) for metric in evaluation.metrics]
     lines += [_row(f"  {finger} (mm)", metric) for finger, metric in evaluation.finger_errors.items()]

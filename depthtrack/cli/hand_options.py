@@ -143,13 +143,21 @@ def measured_text(found: "Calibration") -> str:
         f"{found.after_mm:.1f} mm from the skin of the points of {len(found.observations)} frames "
         f"(average hand {found.before_mm:.1f} mm)"
     )
-    lines = [sizes, *unusual_size(found)]
+    lines = [sizes, *size_notes(found)]
     return "\n".join(lines if found.side_sure else [*lines, "the side is uncertain: give --side"])
 
 
-def unusual_size(found: "Calibration") -> list[str]:
-    """Return a line if hardly any person has a hand of the measured length."""
-    if found.is_of_usual_size:
-        return []
-    length = found.measured["hand_length"].mm
-    return [f"hardly any hand is {length:.0f} mm long: if the depth has another unit, give --depth-scale METRES"]
+def size_notes(found: "Calibration") -> list[str]:
+    """Return a line for each reason why measured sizes may be wrong."""
+    notes = []
+    if not found.is_of_usual_size:
+        length = found.measured["hand_length"].mm
+        notes.append(
+            f"hardly any hand is {length:.0f} mm long: if the depth has another unit, give --depth-scale METRES"
+        )
+    if found.stiff_fingers:
+        notes.append(
+            f"fingers hardly bend ({', '.join(found.stiff_fingers)}), so their joints may be wrong by centimetres: "
+            "measure a recording in which all fingers bend and stretch"
+        )
+    return notes

@@ -128,7 +128,7 @@ def no_hand_note(sequence: Sequence, found: str = "no hand was found in any fram
     likely = likely_scale(histogram)
     if likely is None or np.isclose(likely, scale):
         return f"{text}; a hand must be one of the nearest objects, 0.2 to 1.5 m away (`depthtrack segment` shows it)"
-    return f"{text}; {_COMMON_SCALES[likely]} is more likely: give --depth-scale {likely:g}"
+    return f"{text}; if that is wrong, {_COMMON_SCALES[likely]} is the likely unit: give --depth-scale {likely:g}"
 
 
 def likely_scale(histogram: Index) -> float | None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,13 +17,14 @@ from depthtrack.calibration.solid_hands import is_solid, nearest_solid, solid_st
 from depthtrack.calibration.views import choose_views, finger_area
 from depthtrack.cli import main
 from depthtrack.cli.calibrate import _text
+from depthtrack.cli.hand_options import size_notes
 from depthtrack.errors import InputError
 from depthtrack.evaluation.metrics import endpoint_error
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rotations import quaternion_product
 from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.kinematics import KEYPOINT_BODIES, HandModel
-from depthtrack.hand.pose import make_pose
+from depthtrack.hand.pose import ANGLES, FINGERS, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.hand.size_parameters import (
@@ -265,6 +267,18 @@ def test_the_skin_stays_as_built_where_no_step_keeps_the_hand_solid(
     view = CalibrationView(observe(made, 40))
     fit = fit_jointly([view], made.poses[[40]], _sizes(), "right", iterations=2, exact=True)
     assert np.isfinite(fit.distances).all()
+
+
+def test_fingers_that_hardly_bend_are_named() -> None:
+    poses = np.tile(_towards_camera(0.0), (3, 1))
+    poses[:, ANGLES] += np.radians(1.0) * np.random.default_rng(3).standard_normal((3, 20))
+    found = SimpleNamespace(poses=poses, is_of_usual_size=True)
+    found.stiff_fingers = Calibration.stiff_fingers.fget(found)  # type: ignore[attr-defined]
+    assert found.stiff_fingers == FINGERS[1:]
+    (note,) = size_notes(found)  # type: ignore[arg-type]
+    assert note.startswith("fingers hardly bend (index, middle, ring, little), so their joints may be wrong")
+    poses[1, ANGLES.start + 4 * 2 + 2] += np.radians(30)  # the second flexion of the middle finger
+    assert Calibration.stiff_fingers.fget(found) == ("index", "ring", "little")  # type: ignore[attr-defined]
 
 
 def test_open_hands_are_chosen_before_fists() -> None:

@@ -119,7 +119,7 @@ def test_the_command_prints_what_the_function_returns(
     assert main(["evaluate", str(run), "--no-residuals"]) == 0
     text = capsys.readouterr().out
     assert "1 without a trusted pose" in text
-    assert "lost 1 times, recovered 1 times" in text
+    assert "losses: 1, 1 of them recovered" in text
     assert "100 % within 10 mm" in text
     assert "e3d" not in text
 
