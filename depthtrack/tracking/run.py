@@ -13,7 +13,8 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
 from depthtrack.recording.registry import reading_of
-from depthtrack.recording.run_folder import BACKWARD_STAGE, RunWriter, check_unused
+from depthtrack.recording.run_continuation import check_unused
+from depthtrack.recording.run_folder import BACKWARD_STAGE, RunWriter
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter

@@ -21,7 +21,8 @@ from depthtrack.recording import open_sequence
 from depthtrack.recording.hand_choice import chosen_hand
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.reading import ReadingOptions
-from depthtrack.recording.run_folder import check_same, read_configuration
+from depthtrack.recording.run_continuation import check_same
+from depthtrack.recording.run_folder import read_configuration
 from depthtrack.recording.run_rows import read_rows
 from depthtrack.recording.sequence import OnDamage, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
