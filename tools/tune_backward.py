@@ -4,16 +4,17 @@ Usage: tune_backward.py FOLDER --rig RIG.glb [...] [--seeds N] [--frames N]
 
 The recordings are those of the tuning seeds of the cross-model benchmark. Clips of them begin every half second, so
 that some begin at a view that is hard to start from. `hybrid` tracks each with two hands: one with the joints of the
-rig, and the average one. Each pair of
-`confidence_weight` and `gain` is tried. Printed is the mean joint error of the doubtful stretches. Numbers of stretches
-follow that improve, and that get worse, by 1 mm. An error counts as at most 40 mm, and so does a missing pose. The
-folder holds the estimates, from which an interrupted choice continues.
+rig, and the average one. Each set of `confidence_weight`, `gain` and `motion_weight` is tried. Printed is the mean
+joint error of the doubtful stretches. Numbers of stretches follow that improve, and that get worse, by 1 mm. An error
+counts as at most 40 mm, and so does a missing pose. The folder holds the estimates, from which an interrupted choice
+continues.
 """
 
 import argparse
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -33,24 +34,20 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
-from depthtrack.tracking.backward_pass import (
-    BackwardOptions,
-    change_of_direction,
-    doubtful_stretches,
-    track_stretch,
-)
+from depthtrack.tracking.backward_pass import doubtful_stretches, motion_of, track_stretch
+from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.tracker import ABSENT, Estimate
 from depthtrack.types import Array
 
-WEIGHTS, GAINS = (0.0, 0.25, 0.5, 1.0, 2.0), (0.0, 0.025, 0.05, 0.1, 0.15, 0.2)
+WEIGHTS, GAINS, MOTIONS = (0.25, 0.5, 1.0), (0.0, 0.05, 0.1, 0.15), (0.0, 1.0, 2.5, 5.0, 10.0, 20.0, 40.0)
 WORST = 2e3 * WRONG
 """Millimetres: largest error of a frame."""
 CLIP, EVERY = 45, 15
 """Frames of a clip, and between the beginnings of two."""
 POSE = np.eye(27)[3]
-"""Stands for any pose: the choice depends on energy and confidence alone."""
+"""Stands for any pose: the choice depends on energy, confidence and motion alone."""
 
 
 def main() -> None:
@@ -65,22 +62,25 @@ def main() -> None:
     with Journal(chosen.folder / "stretches.jsonl", list(cells[0])) as journal:
         rows = run_sweep(measure_stretches, cells, journal, chosen_workers(None))
     stretches = [np.array(stretch) for row in rows for stretch in row["stretches"]]
-    forward = np.concatenate(stretches)[:, 2]
+    forward = np.concatenate([stretch[:-1] for stretch in stretches])[:, 2]
     print(f"{len(rows)} recordings, {len(stretches)} stretches, {len(forward)} frames, {forward.mean():.2f} mm forward")
-    for weight in WEIGHTS:
-        for gain in GAINS:
-            before, after = errors_with(stretches, BackwardOptions(confidence_weight=weight, gain=gain))
-            worse, better = (after > before + 1).sum(), (after < before - 1).sum()
-            lengths = np.array([len(each) for each in stretches])
-            mean = float((after * lengths).sum() / lengths.sum())
-            print(f"weight {weight} gain {gain}: {mean:.2f} mm, {better} better, {worse} worse")
+    for weight, gain, motion in product(WEIGHTS, GAINS, MOTIONS):
+        options = BackwardOptions(confidence_weight=weight, gain=gain, motion_weight=motion)
+        before, after = errors_with(stretches, options)
+        worse, better = (after > before + 1).sum(), (after < before - 1).sum()
+        lengths = np.array([len(each) - 1 for each in stretches])
+        mean = float((after * lengths).sum() / lengths.sum())
+        print(f"weight {weight} gain {gain} motion {motion}: {mean:.2f} mm, {better} better, {worse} worse")
 
 
 def errors_with(stretches: list[Array], options: BackwardOptions) -> tuple[Array, Array]:
     """Return the mean error of each stretch, mm, forward and as the options choose."""
     before, after = [], []
-    for ahead, back in ((stretch[:, :3], stretch[:, 3:]) for stretch in stretches):
-        change = change_of_direction(*([_estimate(row) for row in part] for part in (ahead, back)), 1.0, options)
+    for stretch in stretches:
+        ahead, back, moved = stretch[:-1, :3], stretch[:-1, 3:6], stretch[:, 6:].T
+        motion = Motion(moved[0], moved[1], moved[2, :-1])
+        found = ([_estimate(row) for row in part] for part in (ahead, back))
+        change = change_of_direction(*found, motion, 1.0, options)
         before.append(ahead[:, 2].mean())
         after.append(np.concatenate([ahead[:change, 2], back[change:, 2]]).mean())
     return np.array(before), np.array(after)
@@ -95,7 +95,8 @@ def _estimate(row: Array) -> Estimate:
 def measure_stretches(cell: Cell) -> Row:
     """Return the doubtful stretches of a recording.
 
-    Each frame has energy, confidence and error, forward and then backward; confidence -1 stands for no pose.
+    Each frame has energy, confidence and error, forward and then backward; confidence -1 stands for no pose. The three
+    distances of `Motion` follow, metres. The last row of a stretch is that of its anchor.
     """
     with made_recording(**cell) as sequence:
         rig = load_hand(Path(cell["rig"]), cell["side"])
@@ -132,7 +133,12 @@ def _stretches(sequence: Sequence, hand: HandShape, clip: range) -> list[Any]:
 
             found = track_stretch(stretch, forward, read, pipeline())
             backward = {place: each.estimate for place, each in found}
-            rows.append([[*row(forward[at], clip[at]), *row(backward[at], clip[at])] for at in range(*stretch)])
+            moved = motion_of(stretch, forward, backward, model.keypoints)
+            both = backward | {stretch.anchor: forward[stretch.anchor]}
+            places = range(stretch.first, stretch.anchor + 1)
+            pairs = [[*row(forward[at], clip[at]), *row(both[at], clip[at])] for at in places]
+            ways = zip(moved.forward.tolist(), moved.backward.tolist(), [*moved.change.tolist(), 0.0], strict=True)
+            rows.append([[*pair, *way] for pair, way in zip(pairs, ways, strict=True)])
     return rows
 
 

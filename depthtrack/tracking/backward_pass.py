@@ -8,64 +8,19 @@ estimates change from the forward to the backward ones, so that their costs are 
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
-from depthtrack.errors import InputError
-from depthtrack.options import check_ranges, option
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
-from depthtrack.tracking.configuration import HybridConfig, IkConfig, PsoConfig, TrackerConfig
+from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction
 from depthtrack.tracking.pipeline import Pipeline
 from depthtrack.tracking.tracker import Estimate
+from depthtrack.types import Array
 
 _READ_AT_ONCE = 16
 """Frames that are held in memory to be tracked in reverse order."""
-
-
-@dataclass(frozen=True)
-class BackwardOptions:
-    """Stretches that are tracked backwards, and the choice between both directions."""
-
-    doubtful: float = option(0.3, "A stretch with a pose of lower confidence is tracked backwards", most=1)
-    confident: float = option(0.5, "Confidence of the poses before and after a stretch", most=1)
-    confidence_weight: float = option(
-        0.5,
-        "Energy that a confidence of 1 makes up for",
-        unit="clamp",
-        source="tools/tune_backward.py on the tuning seeds 0 to 3 of the cross-model benchmark",
-        most=100,
-    )
-    gain: float = option(
-        0.05, "Energy by which a backward pose must be better", unit="clamp", source="as `confidence_weight`", most=100
-    )
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
-        if self.doubtful > self.confident:
-            raise InputError(f"doubtful must be at most confident, {self.confident:g}, found {self.doubtful:g}")
-
-
-def chosen_backward(choice: bool | BackwardOptions | None, tracker: TrackerConfig) -> BackwardOptions | None:
-    """Return the options of the backward pass; None for none.
-
-    choice: whether there is one, or its options. By default, the trackers of papers go forward alone, and so does one
-        with a deadline. A lift has no direction.
-
-    Raises:
-        InputError: the choice is of another type.
-    """
-    if isinstance(choice, BackwardOptions):
-        return choice
-    if choice is not None and not isinstance(choice, bool):
-        raise InputError(f"backward must be true, false, absent or BackwardOptions, found {choice!r:.40}")
-    if choice is None:
-        choice = isinstance(tracker, HybridConfig | IkConfig | PsoConfig)
-        choice = choice and getattr(tracker, "deadline", None) is None
-    return BackwardOptions() if choice else None
 
 
 class Stretch(NamedTuple):
@@ -109,6 +64,7 @@ def track_backwards(
     forward: Sequence[Estimate],
     frames: ReadFrames,
     pipeline: Callable[[], Pipeline],
+    keypoints: Callable[[Array], Array],
     clamp: float,
     options: BackwardOptions,
     progress: Callable[[int, int], None] | None = None,
@@ -117,6 +73,7 @@ def track_backwards(
 
     forward: estimates of all frames.
     pipeline: returns a new pipeline, each time with the same tracker, which has tracked nothing before.
+    keypoints: returns those of a pose, metres.
     clamp: energy of a pixel that disagrees completely, `Objective.clamp`.
     progress: called with the numbers of frames that are tracked backwards, and that will be.
     """
@@ -130,8 +87,9 @@ def track_backwards(
             if progress is not None:
                 progress(len(found), total)
         places = range(*stretch)
-        ahead, back = [forward[place] for place in places], {place: found[place].estimate for place in places}
-        change = change_of_direction(ahead, list(back.values()), clamp, options)
+        back = {place: found[place].estimate for place in places}
+        motion = motion_of(stretch, forward, back, keypoints)
+        change = change_of_direction(forward[slice(*stretch)], list(back.values()), motion, clamp, options)
         # A frame that has no backward pose, since something failed in it, keeps its forward one.
         better |= {place: back[place] for place in places[change:] if back[place].pose is not None}
         # A frame without a trusted pose has nothing to lose.
@@ -172,22 +130,22 @@ def track_stretch(
         known = None
 
 
-def change_of_direction(
-    forward: Sequence[Estimate], backward: Sequence[Estimate], clamp: float, options: BackwardOptions
-) -> int:
-    """Return the number of forward estimates to keep, so that the sum of the costs is least.
+def motion_of(
+    stretch: Stretch,
+    forward: Sequence[Estimate],
+    backward: Mapping[int, Estimate],
+    keypoints: Callable[[Array], Array],
+) -> Motion:
+    """Return the motion of both directions in a stretch.
 
-    The cost of an estimate is its energy, less a share for its confidence. Backward ones cost `gain` more: they must be
-    clearly better.
-
-    clamp: energy of a pixel that disagrees completely, `Objective.clamp`.
+    forward: estimates of all frames.
+    backward: of the frames of the stretch, by their places.
+    keypoints: returns those of a pose, metres.
     """
-    ahead = np.array([_cost(each, clamp, options) for each in forward])
-    back = np.array([_cost(each, clamp, options) + options.gain for each in backward])
-    before = np.concatenate([[0.0], np.cumsum(ahead)])
-    after = np.concatenate([np.cumsum(back[::-1])[::-1], [0.0]])
-    # Of equal sums the last one, which keeps most of the forward estimates.
-    return len(forward) - int(np.argmin((before + after)[::-1]))
+    first, anchor = stretch
+    before = forward[first - 1] if first else None
+    back = [backward[place] for place in range(first, anchor)]
+    return Motion.between(forward[first:anchor], back, (before, forward[anchor]), keypoints)
 
 
 def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
@@ -218,14 +176,6 @@ def _confidence(estimate: Estimate) -> float:
     if estimate.pose is None or not estimate.status.is_trusted:
         return 0.0
     return 1.0 if math.isnan(estimate.confidence) else estimate.confidence
-
-
-def _cost(estimate: Estimate, clamp: float, options: BackwardOptions) -> float:
-    """Return the cost of an estimate, in multiples of `clamp`; 1 without a pose."""
-    if estimate.pose is None:
-        return 1.0
-    confidence = 0.0 if math.isnan(estimate.confidence) else estimate.confidence
-    return min(estimate.energy / clamp, 1.0) - options.confidence_weight * confidence
 
 
 def _reversed(frames: ReadFrames, first: int, last: int) -> Iterator[Frame]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from depthtrack.closing import Closing
 from depthtrack.errors import InputError, is_text
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.keypoints import read_keypoints
 from depthtrack.recording.read_ahead import read_ahead
@@ -19,7 +20,8 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.strict_data import parse_json
-from depthtrack.tracking.backward_pass import BackwardOptions, doubtful_stretches, track_backwards
+from depthtrack.tracking.backward_pass import doubtful_stretches, track_backwards
+from depthtrack.tracking.change_of_direction import BackwardOptions
 from depthtrack.tracking.configuration import LiftConfig, MarkersConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, row_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker
@@ -131,6 +133,7 @@ class TrackingRun(Closing):
                 forward,
                 lambda places: self._frames([run.rows[place].index for place in places]),
                 lambda: self._pipeline(None, tracker),
+                HandModel(self.hand).keypoints,
                 tracking.scoring.objective.clamp,
                 options,
                 progress,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,14 +27,8 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking import guided_segmentation, pipeline
-from depthtrack.tracking.backward_pass import (
-    BackwardOptions,
-    change_of_direction,
-    chosen_backward,
-    doubtful_stretches,
-    track_backwards,
-    with_forward_status,
-)
+from depthtrack.tracking.backward_pass import doubtful_stretches, track_backwards, with_forward_status
+from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction, chosen_backward
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, Oikonomidis2011Config
 from depthtrack.tracking.guided_segmentation import segment
 from depthtrack.tracking.run import TrackingRun, configure
@@ -66,27 +61,65 @@ def test_frames_without_a_trusted_pose_are_doubtful_and_unknown_confidences_are_
     assert doubtful_stretches([estimate(math.nan)] * 3, OPTIONS) == []
 
 
-_ESTIMATES = st.builds(estimate, st.floats(0, 1), st.floats(0, 60)) | st.just(ABSENT)
+def moved(confidence: float, energy: float, x: float) -> Estimate:
+    """Return an estimate whose hand is moved to `x`, metres."""
+    pose = pose_at(0)
+    pose[0] = x
+    return replace(estimate(confidence, energy), pose=pose)
 
 
-@given(st.lists(st.tuples(_ESTIMATES, _ESTIMATES), max_size=8))
-def test_the_change_of_direction_has_the_least_sum_of_costs(pairs: list[tuple[Estimate, Estimate]]) -> None:
+def place(pose: Array) -> Array:
+    """Return one keypoint."""
+    return pose[None, :3]
+
+
+def motion_of(ahead: Sequence[Estimate], back: Sequence[Estimate], before: Estimate | None, after: Estimate) -> Motion:
+    return Motion.between(ahead, back, (before, after), place)
+
+
+_KNOWN = st.builds(moved, st.floats(0, 1), st.floats(0, 60), st.floats(-0.3, 0.3))
+_ESTIMATES = _KNOWN | st.just(ABSENT)
+
+
+@given(st.lists(st.tuples(_ESTIMATES, _ESTIMATES), max_size=8), st.none() | _KNOWN, _KNOWN, st.floats(0, 50))
+def test_the_change_of_direction_has_the_least_sum_of_costs(
+    pairs: list[tuple[Estimate, Estimate]], before: Estimate | None, after: Estimate, weight: float
+) -> None:
     ahead, back = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
 
     def cost(each: Estimate) -> float:
         return 1.0 if each.pose is None else min(each.energy / CLAMP, 1.0) - 0.5 * each.confidence
 
-    def total(change: int) -> float:
-        return sum(map(cost, ahead[:change])) + sum(cost(each) + 0.1 for each in back[change:])
+    def last_known(estimates: Sequence[Estimate | None]) -> Estimate | None:
+        return next((each for each in reversed(estimates) if each is not None and each.pose is not None), None)
 
-    options = replace(OPTIONS, confidence_weight=0.5, gain=0.1)
-    change = change_of_direction(ahead, back, CLAMP, options)
+    def way(change: int) -> float:
+        path = [before, *(last_known([before, *ahead[: n + 1]]) for n in range(change))]
+        path += [last_known([after, *back[n:][::-1]]) for n in range(change, len(back))]
+        known = [each.pose for each in (*path, after) if each is not None and each.pose is not None]
+        return sum(float(np.linalg.norm(other[:3] - one[:3])) for one, other in pairwise(known))
+
+    def total(change: int) -> float:
+        costs = sum(map(cost, ahead[:change])) + sum(cost(each) + 0.1 for each in back[change:])
+        return costs + weight * way(change)
+
+    options = replace(OPTIONS, confidence_weight=0.5, gain=0.1, motion_weight=weight)
+    change = change_of_direction(ahead, back, motion_of(ahead, back, before, after), CLAMP, options)
     assert total(change) == pytest.approx(min(map(total, range(len(pairs) + 1))))
 
 
 def test_equal_estimates_of_both_directions_stay_forward() -> None:
     same = [estimate(0.2), estimate(0.1)]
-    assert change_of_direction(same, same, CLAMP, replace(OPTIONS, gain=0.0)) == 2
+    motion = motion_of(same, same, None, estimate(0.9))
+    assert change_of_direction(same, same, motion, CLAMP, replace(OPTIONS, gain=0.0)) == 2
+
+
+def test_a_hand_does_not_leap_to_backward_poses_for_a_little_energy() -> None:
+    ahead = [moved(0.1, 16.0, 0.005 * n) for n in range(6)]
+    back = [moved(0.1, 14.0, 0.2) for n in range(4)] + [moved(0.1, 10.0, 0.005 * n) for n in (4, 5)]
+    motion = motion_of(ahead, back, ahead[0], ahead[-1])
+    assert change_of_direction(ahead, back, motion, CLAMP, OPTIONS) == 4
+    assert change_of_direction(ahead, back, motion, CLAMP, replace(OPTIONS, motion_weight=0.0)) == 0
 
 
 def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
@@ -303,6 +336,6 @@ def test_a_lost_frame_among_better_forward_ones_takes_the_backward_pose() -> Non
     def read(places: Sequence[int]) -> list[Frame]:
         return [Frame(place, 0.0, np.zeros((1, 1), np.float32), None, CAMERA) for place in places]
 
-    better, frames = track_backwards(forward, read, Backwards, CLAMP, OPTIONS)  # type: ignore[arg-type]
+    better, frames = track_backwards(forward, read, Backwards, place, CLAMP, OPTIONS)  # type: ignore[arg-type]
     assert list(better) == [2]
     assert {place: each.failure for place, each in sorted(frames.items())} == {1: None, 2: None, 3: "wrong"}
