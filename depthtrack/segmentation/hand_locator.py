@@ -100,9 +100,7 @@ class HandLocator:
             self._last = None
         found = None if self._last is None else self._follow(frame, self._last)
         if found is None:
-            self._reset_arm()
-            detected = self._detect(frame)
-            found = self._follow(frame, detected[0].centre) if detected else None
+            found = self._locate_anywhere(frame)
         if found is None:
             return None
         self._last_time = frame.timestamp
@@ -129,6 +127,18 @@ class HandLocator:
                 found = trial._follow(frame, hand.centre, shift)
                 if found is not None:
                     yield found[1], more
+
+    def _locate_anywhere(self, frame: Frame) -> tuple[SurfaceGrid, LocatedHand] | None:
+        """Return the surface and the hand at the most likely palm, or at another one of the same arm."""
+        self._reset_arm()
+        detected, reach = self._detect(frame), self._options.palm.tip_to_wrist
+        for hand in detected:
+            if np.linalg.norm(hand.centre - detected[0].centre) < reach:
+                found = self._follow(frame, hand.centre)
+                if found is not None:
+                    return found
+                self._reset_arm()
+        return None
 
     def _detect(self, frame: Frame) -> list[DetectedHand]:
         """Return the palms anywhere in the frame, the most likely first."""
@@ -158,7 +168,7 @@ class HandLocator:
             step = shift * arm.direction
             centre, wrist = centre - step, replace(wrist, point=wrist.point - step)
         arm_mask = None if arm is None or wrist is None else arm_nodes(surface.grid, palm, arm, wrist)
-        labels = label_hand(surface, palm, arm_mask, wrist, options)
+        labels = label_hand(surface, palm, centre, arm_mask, wrist, options)
         if not (labels == HAND).any():
             return None
         masks = hand_masks(surface, labels, wrist, options)

@@ -10,7 +10,7 @@ from depthtrack.segmentation.options import OutlineOptions, SegmentationOptions
 from depthtrack.segmentation.palm import Palm
 from depthtrack.segmentation.surface_grid import SurfaceGrid
 from depthtrack.segmentation.wrist import WristPlane
-from depthtrack.types import Depth, Labels, Mask
+from depthtrack.types import Array, Depth, Labels, Mask
 
 BACKGROUND, HAND, ARM, ATTACHED = 0, 1, 2, 4
 """Labels of nodes, one bit each; ATTACHED is connected to the hand but neither hand nor arm."""
@@ -21,19 +21,26 @@ reading of the hand."""
 
 
 def label_hand(
-    surface: SurfaceGrid, palm: Palm, arm: Mask | None, wrist: WristPlane | None, options: SegmentationOptions
+    surface: SurfaceGrid,
+    palm: Palm,
+    centre: Array,
+    arm: Mask | None,
+    wrist: WristPlane | None,
+    options: SegmentationOptions,
 ) -> Labels:
     """Return BACKGROUND, HAND, ARM or ATTACHED (rows, columns) for each node.
 
+    centre: (3,) of the palm, metres, camera frame. That of `palm`, where paths begin, may be nearer to the arm.
     arm: (rows, columns) nodes of the arm.
     """
     candidates = surface.candidates
-    hand = (candidates.depth > 0) & palm.paths.reached(options.palm.tip_to_wrist)
+    moved = float(np.linalg.norm(centre - palm.centre))
+    hand = (candidates.depth > 0) & palm.paths.reached(options.palm.tip_to_wrist + moved)
     # Fingertips behind a held object or behind other fingers are detached components within the hand's reach.
     components, _ = candidates.within(~hand).surfaces()
     nodes = np.flatnonzero(components >= 0)
     points, component = candidates.points[nodes], components.ravel()[nodes]
-    inside = np.linalg.norm(points - palm.centre, axis=1) < options.palm.hand_reach
+    inside = np.linalg.norm(points - centre, axis=1) < options.palm.hand_reach
     if wrist is not None:
         inside &= (points - wrist.point) @ wrist.normal < 0
     sizes = np.bincount(component)
