@@ -1,19 +1,21 @@
 """Choose when and where doubtful starts try other places of the hand.
 
-Usage: tune_starts.py FOLDER --rig RIG.glb [...] [--seeds N] [--every N] [--only OPTION ...]
+Usage: tune_starts.py FOLDER --rig RIG.glb [...] [--seeds N] [--every N]
 
-The recordings are those of the tuning seeds of the cross-model benchmark. Each value is tried alone, the other options
-have their defaults. Printed are the numbers of single-frame starts within 20 mm, and the mean CPU time of a start.
-Open and half-open hands are counted apart. The hand has the joints of the rig, so that no calibration takes part.
-The folder holds the counts, from which an interrupted choice continues.
+The recordings are those of the tuning seeds of the cross-model benchmark. `hybrid` starts in single frames, at all
+places of the hand, with two hands: one with the joints of the rig, and the average one. Each set of the options in
+`CHOICES` then chooses among these starts. Printed are the sets with the fewest wrong starts, and the default one. A
+wrong start has a mean joint error of 20 mm; open and half-open hands are counted apart. The number of other places
+that a start tries is that of further searches. The folder holds the starts, from which an interrupted choice continues.
 """
 
 import argparse
-import time
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,23 +30,46 @@ from depthtrack.hand.hand_file import load_hand
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ANGLES
 from depthtrack.hand.shape import HandShape
-from depthtrack.options import with_options
 from depthtrack.recording.sequence import Sequence
-from depthtrack.segmentation.options import SegmentationOptions
+from depthtrack.segmentation.options import DetectionOptions, SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
 from depthtrack.tracking.guided_segmentation import segment_start
+from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stage_tracker import StageTracker
+from depthtrack.tracking.start_choice import Start, is_doubtful, start_cost
+from depthtrack.types import Array
 
-CHOICES: dict[str, tuple[Any, ...]] = {
-    "thresholds.start_confidence": (0.0, 0.3, 0.4, 0.6),
-    "thresholds.place_cost": (0.0, 2.5, 5.0),
-    "detection.alternative_cost": (0.08, 0.12, 0.2),
-    "detection.alternative_shifts": ((), (0.04,), (0.04, 0.08)),
+CHOICES: dict[str, tuple[float, ...]] = {
+    "start_confidence": (0.3, 0.4, 0.5, 0.7),
+    "start_energy": (0.375, 0.5, 0.625, np.inf),
+    "start_confidence_weight": (0.0, 0.5, 1.0),
+    "place_cost": (0.0, 2.5, 5.0, 7.5),
+    "alternative_cost": (0.12, 0.2, 0.3),
 }
-"""Values of each option, the default among them; those of `detection` belong to the segmentation."""
-SETTING = ("options", "every")
-"""Entries of a cell that are no arguments of `made_recording`."""
+"""Values of each option; the last one belongs to the segmentation."""
+FARTHEST = max(CHOICES["alternative_cost"])
+WORST = 100.0
+"""Energy of a pose without an observation around it, in multiples of the clamp."""
+SHOWN = 10
+
+
+class Place(NamedTuple):
+    """A start at one place of the hand.
+
+    error: mean joint error, metres.
+    """
+
+    start: Start
+    error: float
+
+
+class Trial(NamedTuple):
+    """The starts of a single frame, the first one at the place that is tried first."""
+
+    is_open: bool
+    places: list[Place]
 
 
 def main() -> None:
@@ -53,68 +78,102 @@ def main() -> None:
     arguments.add_argument("--rig", nargs="+", required=True)
     arguments.add_argument("--seeds", type=int, default=6)
     arguments.add_argument("--every", type=int, default=10)
-    arguments.add_argument("--only", nargs="*", default=list(CHOICES))
+    arguments.add_argument("--jobs", type=int)
     chosen = arguments.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
     options = ExperimentOptions(repetitions=chosen.seeds, frames=90, rigs=tuple(chosen.rig), split="tuning")
-    setting = {"options": ",".join(chosen.only), "every": chosen.every}
-    cells = [recording | setting for recording in recording_cells(options)]
-    with Journal(chosen.folder / "starts.jsonl", list(cells[0])) as journal:
-        rows = run_sweep(count_starts, cells, journal, chosen_workers(None))
-    for name in chosen.only:
-        for value in CHOICES[name]:
-            counts = np.array([row[_key(name, value)] for row in rows]).sum(axis=0)
-            starts, right, is_open, open_right, seconds = counts.tolist()
-            print(
-                f"{name} {value}: {right:.0f} of {starts:.0f} right, {open_right:.0f} of {is_open:.0f} open hands, "
-                f"{seconds / starts:.2f} s of CPU a start"
-            )
+    cells = [recording | {"every": chosen.every} for recording in recording_cells(options)]
+    with Journal(chosen.folder / "places.jsonl", list(cells[0])) as journal:
+        rows = run_sweep(measure_places, cells, journal, chosen_workers(chosen.jobs))
+    trials = [trial for row in rows for trial in map(_trial, row["trials"])]
+    print(f"{len(trials)} starts, {sum(trial.is_open for trial in trials)} of open hands")
+    sets = [dict(zip(CHOICES, values, strict=True)) for values in product(*CHOICES.values())]
+    counts = {number: wrong_starts(trials, each) for number, each in enumerate(sets)}
+    best = sorted(counts, key=lambda number: counts[number])[:SHOWN]
+    for number in best:
+        print(_text(sets[number], counts[number]))
+    defaults = vars(TrackingThresholds()) | vars(DetectionOptions())
+    default = {name: defaults[name] for name in CHOICES}
+    print("default:", _text(default, wrong_starts(trials, default)))
 
 
-def count_starts(cell: Cell) -> Row:
-    """Return the counts of each value.
+def wrong_starts(trials: list[Trial], options: dict[str, float]) -> tuple[int, int, float]:
+    """Return the numbers of wrong starts, of those of open hands, and of places tried by one."""
+    farthest = options["alternative_cost"]
+    thresholds = TrackingThresholds(**{name: value for name, value in options.items() if name != "alternative_cost"})
+    wrong = wrong_open = tried = 0
+    for trial in trials:
+        best = trial.places[0] if trial.places else None
+        if best is not None and is_doubtful(best.start, thresholds):
+            near = [place for place in trial.places if place.start.place <= farthest]
+            best, tried = min(near, key=lambda place: start_cost(place.start, thresholds)), tried + len(near) - 1
+        is_wrong = best is None or best.error >= WRONG
+        wrong, wrong_open = wrong + is_wrong, wrong_open + (is_wrong and trial.is_open)
+    return wrong, wrong_open, tried / len(trials)
 
-    They are starts, right ones, open hands, right ones of them, and seconds.
+
+def _text(options: dict[str, float], counts: tuple[int, int, float]) -> str:
+    wrong, wrong_open, tried = counts
+    values = ", ".join(f"{name} {value:g}" for name, value in options.items())
+    return f"{values}: {wrong} wrong, {wrong_open} of open hands, {tried:.2f} other places tried by one"
+
+
+def _trial(row: list[Any]) -> Trial:
+    is_open, places = row
+    return Trial(is_open, [Place(Start(*figures), error) for *figures, error in places])
+
+
+def measure_places(cell: Cell) -> Row:
+    """Return the trials of a recording.
+
+    Each place has the fields of `Start` and its error.
     """
-    with made_recording(**{entry: cell[entry] for entry in cell if entry not in SETTING}) as sequence:
+    with made_recording(**{entry: cell[entry] for entry in cell if entry != "every"}) as sequence:
         rig = load_hand(Path(cell["rig"]), cell["side"])
-        hand = replace(rig, scale=rig.scale * cell["scale"], rig=None)
-        return {
-            _key(name, value): _counts(sequence, hand, name, value, cell["every"])
-            for name in cell["options"].split(",")
-            for value in CHOICES[name]
-        }
+        hands = replace(rig, scale=rig.scale * cell["scale"], rig=None), HandShape(side=rig.side)
+        trials = (trial for hand in hands for trial in _trials(sequence, hand, cell["every"]))
+        return {"trials": [[each.is_open, [[*start, error] for start, error in each.places]] for each in trials]}
 
 
-def _key(name: str, value: Any) -> str:
-    return f"{name}={value}"
-
-
-def _counts(sequence: Sequence, hand: HandShape, name: str, value: Any, every: int) -> list[float]:
-    segmentation, config = SegmentationOptions(), tracker_config("hybrid")
-    if name.startswith("detection."):
-        segmentation = with_options(segmentation, {name: value})
-    else:
-        config = tracker_config("hybrid", **{name: value})
-    model, truth, segmenter = HandModel(hand), sequence.ground_truth, Segmenter.for_sequence(sequence, segmentation)
+def _trials(sequence: Sequence, hand: HandShape, every: int) -> Iterator[Trial]:
+    model, truth = HandModel(hand), sequence.ground_truth
     assert truth is not None
     assert truth.poses is not None
     joints = np.array([true_joints(sequence, index) for index in range(len(sequence))])
     offsets = joint_offsets(model, fit_poses(model, joints).poses, joints)
-    indices = list(range(0, len(sequence), every))
-    poses, begun = np.full((len(indices), 27), np.nan), time.process_time()
-    with closing(create_tracker(config, hand)) as tracker:
-        for row, index in enumerate(indices):
+    segmenter = Segmenter.for_sequence(sequence, _farther(SegmentationOptions()))
+    with closing(create_tracker(tracker_config("hybrid"), hand)) as tracker:
+        assert isinstance(tracker, StageTracker)
+        for index in range(0, len(sequence), every):
             segmenter.reset()
-            observation = segment_start(sequence[index], segmenter)
-            pose = None if observation is None else tracker.start(observation).pose
-            if pose is not None:
-                poses[row] = pose
-    seconds = time.process_time() - begun
-    errors = np.linalg.norm(corrected_keypoints(model, poses, offsets) - joints[indices], axis=2).mean(axis=1)
-    flexions = truth.poses[indices][:, ANGLES].reshape(-1, 5, 4)[:, :, 1:].mean(axis=(1, 2))
-    right, is_open = errors < WRONG, flexions < HALF_OPEN
-    return [len(right), int(right.sum()), int(is_open.sum()), int((right & is_open).sum()), seconds]
+            flexions = truth.poses[index][ANGLES].reshape(5, 4)[:, 1:]
+            found = list(_starts(sequence, segmenter, model, tracker, index))
+            errors = [_error(model, pose, offsets, joints[index]) for _, pose in found]
+            places = [Place(start, error) for (start, _), error in zip(found, errors, strict=True)]
+            yield Trial(bool(flexions.mean() < HALF_OPEN), places)
+
+
+def _starts(
+    sequence: Sequence, segmenter: Segmenter, model: HandModel, tracker: StageTracker, index: int
+) -> Iterator[tuple[Start, Array]]:
+    """Yield the starts of a frame at all places of the hand, and their poses (27,)."""
+    first = segment_start(sequence[index], segmenter, model)
+    if first is None or first.resegmentation is None:
+        return
+    for each in (first, *first.resegmentation.elsewhere()):
+        pose = tracker.start(replace(each, resegmentation=None)).pose
+        if pose is not None:
+            start = tracker.start_at(pose, each.cost, first.resegmentation)
+            yield start._replace(energy=min(start.energy, WORST)), pose
+
+
+def _farther(options: SegmentationOptions) -> SegmentationOptions:
+    """Return options whose starts try every place that a set may choose."""
+    return replace(options, detection=replace(options.detection, alternative_cost=FARTHEST))
+
+
+def _error(model: HandModel, pose: Array, offsets: Array, joints: Array) -> float:
+    return float(np.linalg.norm(corrected_keypoints(model, pose[None], offsets)[0] - joints, axis=1).mean())
 
 
 if __name__ == "__main__":

@@ -129,7 +129,7 @@ class HandLocator:
                     yield found[1], more
 
     def _locate_anywhere(self, frame: Frame) -> tuple[SurfaceGrid, LocatedHand] | None:
-        """Return the surface and the hand at the most likely palm, or at another one of the same arm."""
+        """Return the surface and the hand at the most likely palm, or another one of its arm."""
         self._reset_arm()
         detected, reach = self._detect(frame), self._options.palm.tip_to_wrist
         for hand in detected:

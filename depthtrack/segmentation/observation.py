@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar, cast
+from typing import Protocol, TypeVar, cast
 
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import ImageKeypoints
@@ -16,6 +16,18 @@ from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.types import Array, Mask
 
 Made = TypeVar("Made")
+
+
+class Resegmentation(Protocol):
+    """Segments the frame of a start anew. The state of the segmenter stays."""
+
+    def elsewhere(self) -> "Iterator[Observation]":
+        """Yield observations of other places of the hand, with their costs."""
+        ...
+
+    def around(self, pose: Array) -> "Observation | None":
+        """Return the observation near a pose (27,), or None with too few readings there."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -32,8 +44,8 @@ class Observation(Target):
     cloud_options: options of the point cloud.
     keypoints: of the hand in the region, from elsewhere; None if there are none.
     arrived: time of `time.perf_counter` at which the frame arrived, seconds; NaN if unknown.
-    alternatives: makes other observations of the same frame, which a doubtful start tries; None if a prior was used.
-    cost: of such an observation beside the first one, as a distance, metres.
+    resegmentation: makes other observations of the same frame, for a start; None if a prior was used.
+    cost: of an observation elsewhere beside the first one, as a distance, metres.
     """
 
     frame_index: int
@@ -46,7 +58,7 @@ class Observation(Target):
     cloud_options: PointCloudOptions | None = None
     keypoints: ImageKeypoints | None = None
     arrived: float = math.nan
-    alternatives: Callable[[], Iterator["Observation"]] | None = None
+    resegmentation: Resegmentation | None = None
     cost: float = 0.0
 
     def arrived_at(self, arrived: float) -> "Observation":

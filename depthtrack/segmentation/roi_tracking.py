@@ -40,6 +40,11 @@ class RoiPrior:
     wrist: WristPlane
     hand: HandSize
 
+    @property
+    def to_surface(self) -> Array:
+        """Vector (3,) from the centre of the palm to its visible surface, metres."""
+        return -self.hand.palm_half_thickness * self.centre / np.linalg.norm(self.centre)
+
 
 def segment_roi(
     frame: Frame, prior: RoiPrior, skin: AdaptiveSkin | None, options: SegmentationOptions

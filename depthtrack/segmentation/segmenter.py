@@ -10,6 +10,7 @@ import numpy as np
 from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.flying_pixels import flying_pixels
 from depthtrack.segmentation.hand_locator import HandLocator, LocatedHand
+from depthtrack.segmentation.hand_size import HandSize
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.occluder import find_occluder
 from depthtrack.segmentation.options import SegmentationOptions
@@ -66,10 +67,19 @@ class Segmenter:
 
         prior: place of the hand by a trusted prediction.
         """
-        located = None if prior is None else self._segment_near(frame, prior)
-        if located is None:
-            located = self._locator.locate(frame)
-        return None if located is None else self._observation(frame, located)
+        if prior is not None:
+            located = self._near(frame, prior)
+            if located is not None:
+                wrist = prior.wrist.point + prior.to_surface
+                self._locator.set_position(located.surface_centre, wrist, prior.hand, frame.timestamp)
+                return self._observation(frame, located, prior.hand)
+        located = self._locator.locate(frame)
+        return None if located is None else self._observation(frame, located, self._locator.hand)
+
+    def around(self, frame: Frame, prior: RoiPrior) -> Observation | None:
+        """Return the observation near a prior, or None with too few readings there; the state stays."""
+        located = self._near(frame, prior)
+        return None if located is None else self._observation(frame, located, prior.hand)
 
     def alternatives(self, frame: Frame, first: Observation) -> Iterator[Observation]:
         """Yield other observations of a frame without a prior, which a doubtful start may try.
@@ -77,7 +87,7 @@ class Segmenter:
         first: what `segment` returned. The state stays.
         """
         for located, cost in self._locator.alternatives(frame):
-            other = self._observation(frame, located)
+            other = self._observation(frame, located, self._locator.hand)
             if other is not None and not (
                 other.region == first.region and np.array_equal(other.silhouette, first.silhouette)
             ):
@@ -94,18 +104,18 @@ class Segmenter:
         """Discard the last position, the sizes of the hand and the adaptation to its colours."""
         self._locator.reset()
 
-    def _segment_near(self, frame: Frame, prior: RoiPrior) -> LocatedHand | None:
+    def _near(self, frame: Frame, prior: RoiPrior) -> LocatedHand | None:
         masks = segment_roi(frame, prior, self._skin, self._options)
         if masks is None:
             return None
-        to_surface = -prior.hand.palm_half_thickness * prior.centre / np.linalg.norm(prior.centre)
-        surface_centre = prior.centre + to_surface
-        self._locator.set_position(surface_centre, prior.wrist.point + to_surface, prior.hand, frame.timestamp)
         radius = float(np.linalg.norm(prior.wrist.point - prior.centre))
-        return LocatedHand(masks, surface_centre, radius, None, prior.wrist)
+        return LocatedHand(masks, prior.centre + prior.to_surface, radius, None, prior.wrist)
 
-    def _observation(self, frame: Frame, located: LocatedHand) -> Observation | None:
-        """Return the observation of a located hand, or None if it has no reading."""
+    def _observation(self, frame: Frame, located: LocatedHand, hand: HandSize) -> Observation | None:
+        """Return the observation of a located hand, or None if it has no reading.
+
+        hand: its sizes.
+        """
         masks, occluder = located.masks, None
         has_colour = self._skin is not None and frame.colour is not None
         if not has_colour:
@@ -114,7 +124,7 @@ class Segmenter:
         if not masks.readings.any():
             return None
         if has_colour and self._options.occluder.find_occluder:
-            place = located.surface_centre, located.wrist, self._locator.hand
+            place = located.surface_centre, located.wrist, hand
             occluder = find_occluder(frame, masks, *place, self._options.occluder)
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)
         return Observation(
@@ -124,7 +134,7 @@ class Segmenter:
             frame_index=frame.index,
             timestamp=frame.timestamp,
             region=masks.region,
-            centre=located.surface_centre + self._locator.hand.palm_half_thickness * sight,
+            centre=located.surface_centre + hand.palm_half_thickness * sight,
             palm_radius=located.palm_radius,
             arm_direction=located.arm_direction,
             wrist=located.wrist,

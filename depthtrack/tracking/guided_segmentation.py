@@ -1,8 +1,7 @@
 """Segmentation of a frame around the predicted pose, or the pose of a start."""
 
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +40,7 @@ def segment(
     try:
         pose = guide.predicted_pose(frame.timestamp)
         prior = roi_prior(model, keypoints.pose(frame) if pose is None else pose)
-        observation = segment_start(frame, segmenter) if prior is None else segmenter.segment(frame, prior)
+        observation = segment_start(frame, segmenter, model) if prior is None else segmenter.segment(frame, prior)
     except Exception as error:
         failure = failure_of(error)
     if observation is not None:
@@ -49,13 +48,35 @@ def segment(
     return observation, 1e3 * (clock() - begun), failure
 
 
-def segment_start(frame: Frame, segmenter: Segmenter) -> Observation | None:
+@dataclass(frozen=True)
+class _Resegmentation:
+    """Segments the frame of a start anew, see `Resegmentation`.
+
+    first: the observation without a prior.
+    """
+
+    frame: Frame
+    first: Observation
+    segmenter: Segmenter
+    model: HandModel
+
+    def elsewhere(self) -> Iterator[Observation]:
+        return self.segmenter.alternatives(self.frame, self.first)
+
+    def around(self, pose: Array) -> Observation | None:
+        prior = roi_prior(self.model, pose)
+        return None if prior is None else self.segmenter.around(self.frame, prior)
+
+
+def segment_start(frame: Frame, segmenter: Segmenter, model: HandModel) -> Observation | None:
     """Return the observation of a frame without a prior; None without a hand.
 
-    It has alternatives.
+    It can be segmented anew.
     """
     first = segmenter.segment(frame, None)
-    return None if first is None else replace(first, alternatives=partial(segmenter.alternatives, frame, first))
+    if first is None:
+        return None
+    return replace(first, resegmentation=_Resegmentation(frame, first, segmenter, model))
 
 
 def around_start(
@@ -63,11 +84,11 @@ def around_start(
 ) -> tuple[Observation | None, str | None]:
     """Return the observation of a frame after its estimate, and an unexpected failure.
 
-    It has no alternatives any more.
+    It cannot be segmented anew any more.
 
-    A start elsewhere than the observed palm has chosen an alternative: the frame is segmented again around its pose.
+    A start elsewhere than the observed palm has chosen another place: the frame is segmented again around its pose.
     """
-    if observation is None or observation.alternatives is None:
+    if observation is None or observation.resegmentation is None:
         return observation, None
     if estimate.status is Status.STARTED and estimate.pose is not None:
         apart = float(np.linalg.norm(estimate.pose[POSITION] - observation.centre))
@@ -75,8 +96,8 @@ def around_start(
             try:
                 return segmenter.segment(frame, roi_prior(model, estimate.pose)), None
             except Exception as error:
-                return replace(observation, alternatives=None), failure_of(error)
-    return replace(observation, alternatives=None), None
+                return replace(observation, resegmentation=None), failure_of(error)
+    return replace(observation, resegmentation=None), None
 
 
 def roi_prior(model: HandModel, pose: Array | None) -> RoiPrior | None:

@@ -68,13 +68,27 @@ class TrackingThresholds:
     )
     start_confidence: float = option(
         0.4,
-        "A start with a lower confidence tries other places of the hand; 0: never",
-        source="single frames of the tuning seeds 0 to 5 of the cross-model benchmark",
+        "A start with a lower confidence tries other places of the hand",
+        source="tools/tune_starts.py on the tuning seeds 0 to 5 of the cross-model benchmark",
         most=1,
     )
+    start_energy: float = option(
+        0.5,
+        "A start with a higher energy tries other places too; infinite: never",
+        unit="clamp",
+        source="as `start_confidence`",
+        most=math.inf,
+    )
+    start_confidence_weight: float = option(
+        0.5,
+        "Energy that a confidence of 1 makes up for among places",
+        unit="clamp",
+        source="as `start_confidence`",
+        most=100,
+    )
     place_cost: float = option(
-        2.5,
-        "Energy of a metre of cost of such a place, see `detection`",
+        5.0,
+        "Energy of a metre of cost of a place, see `detection`",
         unit="clamp",
         source="as `start_confidence`",
         most=1000,

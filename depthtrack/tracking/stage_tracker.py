@@ -1,6 +1,7 @@
 """Tracker made of stages: lists of stages over candidates, and the state between frames."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -9,14 +10,15 @@ from numpy.typing import ArrayLike
 
 from depthtrack.recording.branches import Branch
 from depthtrack.recording.status import Status
-from depthtrack.segmentation.observation import Observation
-from depthtrack.tracking.candidate import Candidate, seen_part
+from depthtrack.segmentation.observation import Observation, Resegmentation
+from depthtrack.tracking.candidate import Candidate, evaluate, seen_part
 from depthtrack.tracking.confidence import Evidence, evidence_of, fitted_model
 from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.stages.stage import Stage
+from depthtrack.tracking.start_choice import Start, is_doubtful, start_cost, tries_places
 from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.timing import Deadline, StageClock
 from depthtrack.tracking.tracker import ABSENT, Estimate
@@ -106,6 +108,18 @@ class StageTracker:
         """Return the pose (27,) predicted for `timestamp` (s); None for no ROI prior."""
         return self._state.predicted_pose(timestamp)
 
+    def start_at(self, pose: Array, place: float, resegmentation: Resegmentation) -> Start:
+        """Return a start in the region of interest of its pose (27,).
+
+        place: cost of the place of the hand, metres.
+        """
+        around, tools = resegmentation.around(pose), self._tools
+        if around is None:
+            return Start(math.inf, 0.0, place)
+        tools.set_target(around)
+        found = self._assessed(evaluate(tools.scorer, pose[None])[0])
+        return Start(found.candidate.energy / tools.scoring.objective.clamp, found.confidence, place)
+
     def close(self) -> None:
         """Free the renderers."""
         self._tools.close()
@@ -126,8 +140,8 @@ class StageTracker:
             estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
             self._state.update(estimate)
             return estimate
-        if begins and self._deadline is None and best.confidence < self._thresholds.start_confidence:
-            best = min([best, *self._elsewhere(observation, lists, clock)], key=self._cost)
+        if begins and self._deadline is None and observation.resegmentation is not None:
+            best = self._best_place(best, observation.resegmentation, lists, clock)
         self.evidence = best.evidence
         return self._state.commit(
             *best.candidate,
@@ -141,19 +155,30 @@ class StageTracker:
             best.seen,
         )
 
-    def _elsewhere(
-        self, observation: Observation, lists: dict[Status, Sequence[Stage]], clock: StageClock
-    ) -> Iterator[_Proposal]:
-        """Yield the best candidate at each other place of the hand."""
-        for other in observation.alternatives() if observation.alternatives is not None else ():
+    def _best_place(
+        self,
+        first: _Proposal,
+        resegmentation: Resegmentation,
+        lists: dict[Status, Sequence[Stage]],
+        clock: StageClock,
+    ) -> _Proposal:
+        """Return the best of a start and, if it is doubtful, of those at other places of the hand."""
+        if not tries_places(self._thresholds):
+            return first
+        start = self.start_at(first.candidate.pose, first.place, resegmentation)
+        clock.lap("target")
+        if not is_doubtful(start, self._thresholds):
+            return first
+        best, least = first, start_cost(start, self._thresholds)
+        for other in resegmentation.elsewhere():
             found = self._propose(other, lists, clock)
-            if found is not None:
-                yield found
-
-    def _cost(self, proposal: _Proposal) -> float:
-        """Return the energy of a candidate, and of its place."""
-        place = self._thresholds.place_cost * self._tools.scoring.objective.clamp * proposal.place
-        return proposal.candidate.energy + place
+            if found is None:
+                continue
+            cost = start_cost(self.start_at(found.candidate.pose, found.place, resegmentation), self._thresholds)
+            clock.lap("target")
+            if cost < least:
+                best, least = found, cost
+        return best
 
     def _propose(
         self,
@@ -181,6 +206,12 @@ class StageTracker:
         if not found:
             return None
         best, status, branches = min(found, key=lambda pair: pair[0].energy)
+        assessed = self._assessed(best)
+        clock.lap("confidence")
+        return assessed._replace(status=status, branches=branches, place=observation.cost)
+
+    def _assessed(self, best: Candidate) -> _Proposal:
+        """Return a candidate with its evidence, as a start without branches at no cost of its place."""
         tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
         seen = seen_part(best, rendered, target, tools.scoring.objective)
         bones = bones_in_view(tools.model, best.pose, rendered, target)
@@ -188,7 +219,5 @@ class StageTracker:
         if target.occluder is not None:
             unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
         evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
-        confidence = self._confidence(evidence)
-        clock.lap("confidence")
         figures = tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
-        return _Proposal(best, status, branches, seen, evidence, confidence, *figures, observation.cost)
+        return _Proposal(best, Status.STARTED, (), seen, evidence, self._confidence(evidence), *figures, 0.0)

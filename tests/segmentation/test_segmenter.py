@@ -1,7 +1,9 @@
 """Segmentation of synthetic frames: silhouette, wrist, other objects, and borders."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +13,14 @@ from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.primitives import SPHERE, sphere
 from depthtrack.recording.sequence import Frame
 from depthtrack.rendering.raycast import raycast
+from depthtrack.segmentation.hand_detection import DetectedHand, HandDetector
+from depthtrack.segmentation.hand_size import AVERAGE_HAND
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.options import SearchWindowOptions, SegmentationOptions
+from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.segmentation.skin_colour import SkinColourModel
+from depthtrack.segmentation.wrist import WristPlane
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
 
 Mask = np.ndarray
@@ -121,6 +127,39 @@ def test_the_arm_points_from_hand_to_forearm() -> None:
     along = wrist - found.centre
     assert along @ found.arm_direction > 0.9 * np.linalg.norm(along)
     assert np.linalg.norm(along) == pytest.approx(0.06, abs=0.03)
+
+
+def test_a_hand_is_found_at_another_palm_of_the_same_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The most likely palm lies where the region near it shows none."""
+    frame, mask, _ = made(CLUTTERED, 0)
+    usual = Segmenter(SkinColourModel.default()).segment(frame)
+    assert usual is not None
+    detect = HandDetector.detect
+
+    def with_bad_first(step: float) -> Callable[..., list[DetectedHand]]:
+        def detected(self: HandDetector, *arguments: Any) -> list[DetectedHand]:
+            found = detect(self, *arguments)
+            return [DetectedHand(found[0].centre - [0, 0, step], -1.0), *found]
+
+        return detected
+
+    monkeypatch.setattr(HandDetector, "detect", with_bad_first(0.18))
+    assert iou(Segmenter(SkinColourModel.default()).segment(frame), mask) == pytest.approx(iou(usual, mask), abs=0.02)
+    monkeypatch.setattr(HandDetector, "detect", with_bad_first(0.4))
+    assert Segmenter(SkinColourModel.default()).segment(frame) is None
+
+
+def test_a_segmentation_around_a_prior_leaves_the_state() -> None:
+    one, other = Segmenter(SkinColourModel.default()), Segmenter(SkinColourModel.default())
+    for index in range(0, 12, 3):
+        frame, mask, wrist = made(CLUTTERED, index)
+        expected, found = one.segment(frame), other.segment(frame)
+        assert expected is not None
+        assert found is not None
+        np.testing.assert_array_equal(found.depth, expected.depth)
+        to_arm = (wrist - found.centre) / np.linalg.norm(wrist - found.centre)
+        prior = RoiPrior(found.centre, WristPlane(wrist, to_arm), AVERAGE_HAND)
+        assert iou(other.around(frame, prior), mask) > 0.9
 
 
 def test_an_empty_room_has_no_hand() -> None:

@@ -1,5 +1,6 @@
 """A doubtful start tries other places of the hand."""
 
+import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -22,7 +23,7 @@ from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, replay_frames, 
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 CLUTTERED = Synthesis(motion="everyday", sensor="kinect1", background="room", model="skin", seed=22)
-NEVER = TrackingThresholds(start_confidence=0)
+NEVER = TrackingThresholds(start_confidence=0, start_energy=math.inf)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +98,7 @@ def test_without_alternatives_it_stays_there(made: Synthesiser) -> None:
 def test_the_frame_is_segmented_around_the_start_in_a_replay_too(made: Synthesiser) -> None:
     first, *_ = tracked = track(made, "ik", ForearmFirst(made))
     assert first.observation is not None
-    assert first.observation.alternatives is None
+    assert first.observation.resegmentation is None
     with closing(create_tracker(tracker_config("ik"), made.options.hand)) as guide:
         pairs = [(each.frame, each.estimate) for each in tracked]
         replayed = replay_frames(pairs, guide, ForearmFirst(made), made.options.hand)

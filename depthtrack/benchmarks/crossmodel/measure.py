@@ -82,7 +82,7 @@ def _starts(sequence: Sequence, found: Calibration, joints: Array) -> Row:
     with closing(create_tracker(tracker_config("hybrid"), found.hand)) as tracker:
         for index in range(0, len(sequence), START_EVERY):
             segmenter.reset()
-            observation = segment_start(sequence[index], segmenter)
+            observation = segment_start(sequence[index], segmenter, model)
             pose = None if observation is None else tracker.start(observation).pose
             poses.append(np.full(27, np.nan) if pose is None else pose)
             indices.append(index)

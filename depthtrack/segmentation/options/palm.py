@@ -96,9 +96,9 @@ class DetectionOptions:
     )
     farthest_wrist: float = option(0.21, "Distance beyond which this cost does not grow", unit="m", source=_CHOSEN)
     no_arm_cost: float = option(0.1, "Cost of a candidate without a visible arm", unit="m", source=_CHOSEN)
-    alternatives: int = option(4, "Palm candidates that a doubtful start tries, at most", most=100)
+    alternatives: int = option(6, "Palm candidates that a doubtful start tries, at most", most=100)
     alternative_cost: float = option(
-        0.12, "Cost beside that of the first candidate up to which they are tried", unit="m", source=_TUNED
+        0.2, "Cost beside that of the first candidate up to which they are tried", unit="m", source=_TUNED
     )
     alternative_shifts: tuple[float, ...] = option(
         (0.04, 0.08), "Distances away from the forearm at which the first palm is tried too", unit="m", source=_TUNED
