@@ -220,6 +220,14 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         """Return whether code of these types lacks an entry from Python; `ahead_compiler` makes such code."""
         return False
 
+    @staticmethod
+    def wait_for(function: Callable[..., Any], types: Any) -> bool:
+        """Wait until another process has compiled code of these types; return whether one does.
+
+        `precompilation` sets it.
+        """
+        return False
+
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         locator = self._impl.locator
@@ -238,6 +246,10 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         numba would load the implementations of all its functions before, which compilation alone needs: 0.2 s.
         """
         rtsys.initialize(target_context)
+        found = self._loaded(sig, target_context)
+        return self._loaded(sig, target_context) if found is None and self.wait_for(self._py_func, sig) else found
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
         try:
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)

@@ -1,113 +1,24 @@
 """Compilation of kernels ahead of their first use, in several processes.
 
-`kernels.json` lists the kernels that trackers, searches for layouts and calibration call, with the types of their
-arguments. Each process compiles one after the other into the folder of `compilation`, parts of others first. A kernel
-that is not listed, or whose process fails, is compiled at its first use.
+Each process compiles listed kernels one after the other into the folder of `compilation`, parts of others first. A
+kernel that is not listed, or whose process fails, is compiled at its first use.
 """
 
-import re
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
-from os import environ, pathsep
-from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, NamedTuple
+from typing import Any
 
-from numba import types
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
 
-from depthtrack.ahead_compiler import take_shortcuts
-from depthtrack.compilation import cache_folder
+from depthtrack import kernel_processes
+from depthtrack.closing import Closing
+from depthtrack.compilation import KernelCache
+from depthtrack.kernel_list import Kernel
+from depthtrack.kernel_processes import Child, request
 from depthtrack.machine import usable_cores
-from depthtrack.strict_data import json_text, parse_json
-
-LIST = Path(__file__).with_name("kernels.json")
-_ROOT = Path(__file__).parents[1]
-_ARRAY = re.compile(r"(\w+)\[(\d)([ACF])\]( readonly)?")
-
-
-class Kernel(NamedTuple):
-    """A compiled function and the types of its arguments.
-
-    arguments: a text for a scalar or an array, a list for a tuple, a dictionary with one key for a named tuple.
-    seconds: time to compile it, for the order alone.
-    """
-
-    module: str
-    name: str
-    arguments: list[Any]
-    seconds: float
-
-    @property
-    def dispatcher(self) -> Any:
-        """The function as numba sees it."""
-        return getattr(import_module(self.module), self.name)
-
-    @property
-    def signature(self) -> tuple[types.Type, ...]:
-        """Numba types of the arguments."""
-        return tuple(map(type_of, self.arguments))
-
-    @property
-    def is_kept(self) -> bool:
-        """Whether the folder for compiled code has it."""
-        dispatcher = self.dispatcher
-        return bool(dispatcher._cache.keeps(self.signature, dispatcher.targetctx))
-
-
-def listed_kernels() -> list[Kernel]:
-    """Return the kernels of the list, those that take longest first."""
-    return [Kernel(**entry) for entry in parse_json(LIST.read_text(encoding="utf-8"))]
-
-
-def type_of(text: Any) -> types.Type:
-    """Return the numba type that a description of `kernels.json` names.
-
-    Raises:
-        ValueError: if it describes none.
-    """
-    if isinstance(text, list):
-        return types.BaseTuple.from_types([type_of(each) for each in text])
-    if isinstance(text, dict):
-        ((name, members),) = text.items()
-        module, _, attribute = name.rpartition(".")
-        named = getattr(import_module(module), attribute)
-        return types.BaseTuple.from_types([type_of(each) for each in members], named)
-    if match := _ARRAY.fullmatch(text):
-        return types.Array(type_of(match[1]), int(match[2]), match[3], readonly=match[4] is not None)
-    scalar = getattr(types, text, None)
-    if not isinstance(scalar, types.Number | types.Boolean):
-        raise ValueError(f"no type is named {text!r}")
-    return scalar
-
-
-def text_of(found: types.Type) -> Any:
-    """Return the description of a numba type, from which `type_of` makes it.
-
-    Raises:
-        ValueError: if `kernels.json` has no description of such types.
-    """
-    if isinstance(found, types.BaseNamedTuple):
-        members = found.types if isinstance(found, types.NamedTuple) else [found.dtype] * found.count
-        name = f"{found.instance_class.__module__}.{found.instance_class.__qualname__}"
-        return {name: [text_of(each) for each in members]}
-    if isinstance(found, types.BaseTuple):
-        return [text_of(each) for each in found]
-    if isinstance(found, types.Array):
-        return f"{text_of(found.dtype)}[{found.ndim}{found.layout}]" + ("" if found.mutable else " readonly")
-    if not isinstance(found, types.Number | types.Boolean):
-        raise ValueError(f"a kernel takes {found}: extend precompilation.text_of")
-    return "boolean" if found == types.boolean else str(found)
-
-
-def absent_kernels(kernels: Sequence[Kernel]) -> list[Kernel]:
-    """Return the kernels that the folder for compiled code lacks; none without a folder."""
-    return [] if cache_folder() is None else [kernel for kernel in kernels if not kernel.is_kept]
 
 
 class PartsFirst:
@@ -162,106 +73,89 @@ def _parts_of(kernel: Any) -> set[Any]:
     return found
 
 
+class CompilationAhead(Closing):
+    """Compilation of kernels in processes, while this process goes on.
+
+    A call of a kernel that is not finished waits for it. At most one process per core compiles. They end with `close`,
+    also if that comes early.
+    """
+
+    def __init__(self, kernels: Sequence[Kernel]) -> None:
+        self._kernels, self._waiting, self._is_over = kernels, PartsFirst(kernels), False
+        self._events = {(each.module, each.name, each.signature): threading.Event() for each in kernels}
+        self._unfinished, self._finished = sum(each.seconds for each in kernels), SimpleQueue[Kernel | None]()
+        self.processes = min(usable_cores(), len(kernels))
+        """Number of processes."""
+        if kernels:
+            cpu_target.target_context.refresh()  # once, before processes are forked
+        self._children: list[Child] = [kernel_processes.start_for(kernels) for _ in range(self.processes)]
+        self._working, self._pool = self.processes, ThreadPoolExecutor(max(self.processes, 1))
+        self._threads = [self._pool.submit(self._work, child) for child in tuple(self._children)]
+        _await_kernels(self._wait_for)
+
+    def wait(self, seconds: float = 0.0, compiled: Callable[[Kernel], None] = lambda kernel: None) -> None:
+        """Wait until kernels of so many seconds of compilation remain.
+
+        compiled: receives each kernel that is compiled.
+        """
+        while self._working and self._unfinished > seconds:
+            kernel = self._finished.get()
+            if kernel is None:
+                self._working -= 1
+            else:
+                self._unfinished -= kernel.seconds
+                compiled(kernel)
+        for thread in self._threads:
+            if thread.done():
+                thread.result()
+
+    def close(self) -> None:
+        """End all processes."""
+        self._is_over = True
+        _await_kernels(lambda function, types: False)
+        self._waiting.stop()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for child in self._children:
+            child.kill()
+        for child in self._children:
+            child.wait()
+        for event in self._events.values():
+            event.set()
+
+    def _work(self, child: Child) -> None:
+        try:
+            while (number := self._waiting.take()) is not None:
+                kernel = self._kernels[number]
+                if not request(child, kernel) and not self._is_over:
+                    # The other one has failed, perhaps by its shortcuts: its kernel is compiled at its first use.
+                    child = kernel_processes.start_for(None)
+                    self._children.append(child)
+                self._waiting.finish(number)
+                self._events[kernel.module, kernel.name, kernel.signature].set()
+                self._finished.put(kernel)
+        finally:
+            self._finished.put(None)
+
+    def _wait_for(self, function: Callable[..., Any], types: Any) -> bool:
+        """Wait for a kernel; return whether it is among those that were compiled."""
+        event = self._events.get((function.__module__, function.__name__, tuple(types)))
+        while event is not None and not event.wait(1.0):
+            if all(thread.done() for thread in self._threads):
+                return False
+        return event is not None
+
+
+def _await_kernels(wait_for: Callable[[Callable[..., Any], Any], bool]) -> None:
+    """Set the function that waits for code of other processes."""
+    kept: Any = KernelCache
+    kept.wait_for = staticmethod(wait_for)
+
+
 def compile_kernels(kernels: Sequence[Kernel], compiled: Callable[[Kernel], None] = lambda kernel: None) -> int:
     """Compile kernels into the folder for compiled code; return the number of processes.
 
     compiled: receives each kernel that is compiled.
-
-    At most one process per core compiles. They end with this call, also if it is interrupted.
     """
-    count = min(usable_cores(), len(kernels))
-    children = [_start_for(kernels) for _ in range(count)]
-    waiting, finished = PartsFirst(kernels), SimpleQueue[Kernel | None]()
-
-    def work(child: "subprocess.Popen[str]") -> None:
-        try:
-            while (number := waiting.take()) is not None:
-                if not _request(child, kernels[number]) and not is_over:
-                    # The other one has failed, perhaps by its shortcuts: its kernel is compiled at its first use.
-                    child = _start_for(None)
-                    children.append(child)
-                waiting.finish(number)
-                finished.put(kernels[number])
-        finally:
-            finished.put(None)
-
-    is_over, pool, working = False, ThreadPoolExecutor(max(count, 1)), count
-    try:
-        threads = [pool.submit(work, child) for child in tuple(children)]
-        while working:
-            kernel = finished.get()
-            if kernel is None:
-                working -= 1
-            else:
-                compiled(kernel)
-        for thread in threads:
-            thread.result()
-    finally:
-        is_over = True
-        waiting.stop()
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in children:
-            child.kill()
-        for child in children:
-            child.wait()
-    return count
-
-
-def _request(child: "subprocess.Popen[str]", kernel: Kernel) -> bool:
-    """Return whether a process has answered the request to compile a kernel."""
-    assert child.stdout is not None
-    return _send(child, kernel._asdict()) and bool(child.stdout.readline())
-
-
-def _send(child: "subprocess.Popen[str]", content: Any) -> bool:
-    """Write a line to a process; return whether it can be written."""
-    assert child.stdin is not None
-    try:
-        child.stdin.write(json_text(content) + "\n")
-        child.stdin.flush()
-    except OSError:
-        return False
-    return True
-
-
-def _start_for(kernels: Sequence[Kernel] | None) -> "subprocess.Popen[str]":
-    """Start a process that compiles kernels on request.
-
-    kernels: those that have an entry from Python, while all others have none; None for an entry of each, without
-        shortcuts in numba.
-    """
-    child = _start()
-    _send(child, None if kernels is None else [kernel._asdict() for kernel in kernels])
-    return child
-
-
-def _start() -> "subprocess.Popen[str]":
-    """Start a process that compiles the kernels that it reads."""
-    path = pathsep.join([str(_ROOT), *filter(None, [environ.get("PYTHONPATH")])])
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "depthtrack.precompilation"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={**environ, "PYTHONPATH": path},
-        text=True,
-    )
-
-
-def _serve() -> None:
-    """Compile the kernels that the input describes, a line each, and answer each with a line.
-
-    The first line lists all of them, or is null: see `_start_for`.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
-    listed = parse_json(sys.stdin.readline() or "null")
-    if listed is not None:
-        take_shortcuts({(each.module, each.name, each.signature) for each in (Kernel(**entry) for entry in listed)})
-    for line in sys.stdin:
-        kernel = Kernel(**parse_json(line))
-        kernel.dispatcher.compile(kernel.signature)
-        print(kernel.name, flush=True)
-
-
-if __name__ == "__main__":
-    _serve()
+    with CompilationAhead(kernels) as running:
+        running.wait(compiled=compiled)
+    return running.processes

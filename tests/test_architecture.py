@@ -17,6 +17,8 @@ LAYERS = (
     ("machine", "memory"),
     ("compilation",),
     ("ahead_compiler",),
+    ("kernel_list",),
+    ("kernel_processes",),
     ("precompilation",),
     ("geometry",),
     ("simd",),

@@ -13,13 +13,15 @@ import pytest
 from numba import types
 from numba.core.dispatcher import Dispatcher
 
-from depthtrack import precompilation
+from depthtrack import kernel_processes
 from depthtrack.compilation import _Files
-from depthtrack.precompilation import Kernel, PartsFirst, compile_kernels, listed_kernels, text_of, type_of
+from depthtrack.kernel_list import Kernel, listed_kernels, text_of, type_of
+from depthtrack.precompilation import PartsFirst, compile_kernels
 
 ROOT = Path(__file__).parents[1]
 SMALL = """
-from depthtrack.precompilation import absent_kernels, compile_kernels, listed_kernels
+from depthtrack.kernel_list import absent_kernels, listed_kernels
+from depthtrack.precompilation import compile_kernels
 kernels = [kernel for kernel in listed_kernels() if kernel.name in {"is_complete", "submit", "limit_gradients"}]
 assert absent_kernels(kernels) == kernels
 shown = []
@@ -34,7 +36,8 @@ POSES = """
 import sys
 import numpy as np
 from depthtrack.hand.compiled_tangent import retract, retract_rows
-from depthtrack.precompilation import compile_kernels, listed_kernels
+from depthtrack.kernel_list import listed_kernels
+from depthtrack.precompilation import compile_kernels
 if "ahead" in sys.argv:
     compile_kernels([kernel for kernel in listed_kernels() if kernel.name == "retract_rows"])
 poses, steps = np.random.default_rng(0).normal(size=(2, 50, 27))
@@ -46,19 +49,33 @@ retract(poses[0], steps[0, :26], row)  # a part of the kernel, whose code has no
 assert np.array_equal(row, moved[0])
 sys.stdout.buffer.write(moved.tobytes())
 """
+WAITING = """
+import numpy as np
+from depthtrack.kernel_list import absent_kernels, listed_kernels
+from depthtrack.precompilation import CompilationAhead
+from depthtrack.solver.swarm import keep_lowest
+kernels = [kernel for kernel in listed_kernels() if kernel.name in {"keep_lowest", "score_poses"}]
+with CompilationAhead(kernels) as running:
+    (kernel,) = [kernel for kernel in kernels if kernel.name == "keep_lowest"]
+    keep_lowest.compile(kernel.signature)
+    assert sum(keep_lowest.stats.cache_hits.values()) == 1
+    running.wait(5.0)
+assert [kernel.name for kernel in absent_kernels(kernels)] == ["score_poses"]  # it was cut short
+"""
 WITHOUT_SHORTCUTS = """
 import subprocess
 import sys
 from subprocess import PIPE
-from depthtrack import precompilation
-from depthtrack.precompilation import absent_kernels, compile_kernels, listed_kernels
-start_for, failed = precompilation._start_for, []
+from depthtrack import kernel_processes
+from depthtrack.kernel_list import absent_kernels, listed_kernels
+from depthtrack.precompilation import compile_kernels
+start_for, failed = kernel_processes.start_for, []
 def start(kernels):
     if kernels is None:
         return start_for(None)
     failed.append(kernels)
     return subprocess.Popen([sys.executable, "-c", ""], stdin=PIPE, stdout=PIPE, text=True)
-precompilation._start_for = start
+kernel_processes.start_for = start
 kernels = [kernel for kernel in listed_kernels() if kernel.name in {"is_complete", "submit", "limit_gradients"}]
 compile_kernels(kernels)
 assert len(absent_kernels(kernels)) == len(failed)
@@ -116,13 +133,19 @@ def test_kernels_that_are_compiled_ahead_return_the_same_bits(tmp_path: Path) ->
 
 
 def test_processes_that_fail_leave_their_kernels_to_the_first_use(monkeypatch: pytest.MonkeyPatch) -> None:
-    def start() -> "subprocess.Popen[str]":
+    def start(kernels: object) -> "subprocess.Popen[str]":
         return subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
-    monkeypatch.setattr(precompilation, "_start", start)
+    monkeypatch.setattr(kernel_processes, "start_for", start)
     shown: list[Kernel] = []
     compile_kernels(listed_kernels()[:3], shown.append)
     assert len(shown) == 3
+
+
+def test_a_call_waits_for_its_kernel(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_each_kernel_follows_its_parts() -> None:

@@ -30,12 +30,12 @@ from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.size_parameters import COUNT
 from depthtrack.hand.skin.mesh import Skin
+from depthtrack.kernel_list import LIST, Kernel, text_of
 from depthtrack.markers.layout.candidates import Candidates
 from depthtrack.markers.layout.expected_error import expected_errors
 from depthtrack.markers.layout.options import OBJECTIVES, LayoutOptions, QualityOptions
 from depthtrack.markers.layout.quality import LayoutQuality
 from depthtrack.markers.layout.search import find_layout_of
-from depthtrack.precompilation import LIST, Kernel, text_of
 from depthtrack.rendering.triangles import rasterise
 from depthtrack.segmentation.observation import Observation
 from depthtrack.solver.options import SwarmOptions

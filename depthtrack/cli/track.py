@@ -74,15 +74,26 @@ class TrackCommand:
         raise NotImplementedError
 
     def run(self) -> None:
+        from depthtrack.cli.warmup import compiled_ahead
+
+        tracker = self.tracker_config  # checked before the recording is opened
+        with compiled_ahead(tracker.name, self._stored is None and self.hands.hand is None) as wait_for_kernels:
+            sequence = self._open()
+            configuration = self._configuration(sequence, tracker)
+            wait_for_kernels()
+            if self._stored is None:
+                configuration = dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
+            rate = self._track(sequence, configuration)
+        self._report(sequence, rate)
+
+    def _track(self, sequence: "Recording", configuration: "RunConfiguration") -> str:
+        """Write the run folder; return the rate."""
         from time import perf_counter
 
         from depthtrack.cli.progress import counter
         from depthtrack.machine import usable_cores
         from depthtrack.tracking.run import TrackingRun
 
-        tracker = self.tracker_config  # checked before the recording is opened
-        sequence = self._open()
-        configuration = self._configuration(sequence, tracker)
         with (
             TrackingRun(configuration, sequence, self.threads or usable_cores()) as run,
             counter(len(run), leave=True) as shown,
@@ -97,7 +108,7 @@ class TrackCommand:
                 times.append(perf_counter())
                 shown.update(each.frame.index + 1 - shown.n)
                 shown.set_postfix_str(each.estimate.status)
-        self._report(sequence, _rate_text(times))
+        return _rate_text(times)
 
     def _open(self) -> "Recording":
         """Return the recording, seen through the camera of `--config` unless another one is given."""
@@ -132,7 +143,7 @@ class TrackCommand:
         return options.chosen(sequence, choice)
 
     def _configuration(self, sequence: "Recording", tracker: TrackerConfig) -> "RunConfiguration":
-        from depthtrack.cli.warmup import compile_for_first_use
+        """Return the checked configuration, with the stored, given or average hand."""
         from depthtrack.tracking.run import check_run, configure
 
         configuration = configure(
@@ -149,8 +160,7 @@ class TrackCommand:
         )
         # To measure the hand takes long, so everything else is checked before.
         check_run(configuration, sequence, self.out, self.resume)
-        compile_for_first_use(tracker.name)
-        return dataclasses.replace(configuration, hand=self._hand(sequence).to_fields())
+        return configuration
 
     def _backward(self, tracker: TrackerConfig) -> "BackwardOptions | None":
         """Return the options of the backward pass: of the run that is repeated, or the usual ones."""

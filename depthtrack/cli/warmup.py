@@ -1,15 +1,20 @@
 """`depthtrack warmup`: compile the kernels ahead of the first run."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from depthtrack.precompilation import Kernel
+    from collections.abc import Callable, Iterator, Sequence
+
+    from depthtrack.kernel_list import Kernel
 
 _FEW = 3.0
-"""Seconds of compilation that start no processes: they take a second or two to load the program."""
-_OTHER_COMMANDS = ("depthtrack.calibration", "depthtrack.synthesis", "depthtrack.markers")
-"""Packages that no tracker calls."""
+"""Seconds of compilation that start no processes, and that are left when tracking begins."""
+_OTHER_COMMANDS = ("depthtrack.recording", "depthtrack.synthesis", "depthtrack.markers")
+"""Packages that no tracker calls; a recording is opened before its kernel would be compiled ahead."""
+_MEASURING = ("depthtrack.calibration", "depthtrack.rendering.triangles", "depthtrack.rendering.raycast")
+"""Packages whose kernels measure a hand."""
 _OTHER_TRACKERS = (
     "depthtrack.solver.gauss_newton",
     "depthtrack.solver.linear_algebra",
@@ -42,35 +47,59 @@ class Command:
         print(f"kernels compiled in {perf_counter() - begun:.0f} s{shared}; they are kept in {folder}")
 
 
-def compile_absent(few: float = 0.0, without: tuple[str, ...] = ()) -> int:
-    """Compile the listed kernels that are not kept yet; return the number of processes.
+def compile_absent() -> int:
+    """Compile the listed kernels that are not kept yet; return the number of processes."""
+    from depthtrack.kernel_list import absent_kernels, listed_kernels
+    from depthtrack.precompilation import compile_kernels
 
-    few: seconds of compilation up to which nothing is done.
-    without: packages to leave out.
+    absent = absent_kernels(listed_kernels())
+    with _counter(absent) as show:
+        return compile_kernels(absent, show)
+
+
+@contextmanager
+def compiled_ahead(tracker: str = "", measures: bool = False) -> "Iterator[Callable[[], None]]":
+    """Compile the absent kernels of a tracker in several processes, if there are cores.
+
+    Yields a function that waits for nearly all of them, behind a progress bar.
+
+    tracker: its name; the kernels of all if it is empty.
+    measures: whether the hand is measured as well.
     """
-    from depthtrack.cli.progress import counter
-    from depthtrack.precompilation import absent_kernels, compile_kernels, listed_kernels
+    from depthtrack.compilation import cache_folder
+    from depthtrack.machine import usable_cores
 
+    if usable_cores() == 1 or cache_folder() is None:
+        yield lambda: None
+        return
+    from depthtrack.kernel_list import absent_kernels, listed_kernels
+    from depthtrack.precompilation import CompilationAhead
+
+    without = _OTHER_COMMANDS + (() if measures else _MEASURING)
+    without += _OTHER_TRACKERS if tracker in _SKIN_TRACKERS else ()
     absent = absent_kernels([each for each in listed_kernels() if not each.module.startswith(without)])
-    if sum(each.seconds for each in absent) <= few:
-        return 0
-    with counter(len(absent), unit="kernel") as shown:
+    if sum(each.seconds for each in absent) <= _FEW:
+        yield lambda: None
+        return
+
+    def wait() -> None:
+        with _counter(absent) as show:
+            running.wait(_FEW, show)
+
+    with CompilationAhead(absent) as running:
+        yield wait  # kernels that are not finished at the end of a short run were not called
+
+
+@contextmanager
+def _counter(kernels: "Sequence[Kernel]") -> "Iterator[Callable[[Kernel], None]]":
+    """Yield a function that shows the kernels that were compiled."""
+    from depthtrack.cli.progress import counter
+
+    with counter(len(kernels), unit="kernel") as shown:
         shown.set_description_str("compiling, once")
 
         def show(kernel: "Kernel") -> None:
             shown.set_postfix_str(kernel.name)
             shown.update()
 
-        return compile_kernels(absent, show)
-
-
-def compile_for_first_use(tracker: str = "") -> None:
-    """Compile the absent kernels of a tracker in several processes, if there are cores.
-
-    tracker: its name; the kernels of all if it is empty.
-    """
-    from depthtrack.compilation import cache_folder
-    from depthtrack.machine import usable_cores
-
-    if usable_cores() > 1 and cache_folder() is not None:
-        compile_absent(_FEW, _OTHER_COMMANDS + (_OTHER_TRACKERS if tracker in _SKIN_TRACKERS else ()))
+        yield show
