@@ -1,8 +1,7 @@
 """Shortcuts in numba for a process that compiles kernels into the cache, and calls none.
 
 Most functions are parts: kernels alone call them. numba makes an entry from Python, optimal code and machine code of
-each part nevertheless, and optimises it again inside each kernel. It also looks up the type of each call several times,
-and compares options one by one.
+each part nevertheless, and optimises it again inside each kernel.
 """
 
 import gc
@@ -10,10 +9,11 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from llvmlite.binding import ffi, parse_bitcode
-from numba.core import ir, lowering, targetconfig, types
+from numba.core import callwrapper, ir, lowering, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import cpu_target
 
+from depthtrack.ahead_analysis import shorten_analysis
 from depthtrack.compilation import KernelCache
 
 Entry = tuple[str, str, tuple[types.Type, ...]]
@@ -28,7 +28,8 @@ def take_shortcuts(entries: Collection[Entry]) -> None:
     codegen._library_class = _Library
     codegen.set_env = lambda name, environment: None  # no kernel runs
     _compile_parts(lambda module, name, arguments: (module, name, tuple(arguments)) not in entries)
-    _look_up_types_once()
+    _call_without_optimising()
+    shorten_analysis()
     _list_variables_quickly()
 
 
@@ -42,7 +43,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
             super()._optimize_functions(ll_module)
             return
         ll_module.data_layout = self._codegen._data_layout
-        passes, builder = self._codegen._function_pass_manager()
+        passes, builder = self._codegen._function_pass_manager(opt=1)
         for function in ll_module.functions:
             if not function.is_declaration:
                 passes.run(function, builder)
@@ -94,24 +95,18 @@ def _compile_parts(is_part: Callable[[str, str, Any], bool]) -> None:
     kept.is_part = staticmethod(lambda function, types: is_part(function.__module__, function.__name__, types))
 
 
-def _look_up_types_once() -> None:
-    """Keep the types that calls of numba's own functions have, and compare options at once."""
-    options: Any = targetconfig.TargetConfig
-    function: Any = types.Function
-    compare, find, found = options.__eq__, function.get_call_type, dict[Any, Any]()
+def _call_without_optimising() -> None:
+    """Leave the entries from Python as they are: they run once a call, and are as long as many kernels."""
+    wrapper: Any = callwrapper.PyCallWrapper
+    build = wrapper.build
 
-    def is_equal(self: Any, other: Any) -> Any:
-        return (type(self) is type(other) and self._values == other._values) or compare(self, other)
+    def build_plainly(self: Any) -> None:
+        build(self)
+        entry = self.module.get_global(self.fndesc.llvm_cpython_wrapper_name)
+        entry.attributes.add("noinline")
+        entry.attributes.add("optnone")
 
-    def call_type(self: Any, context: Any, arguments: Any, keywords: Any) -> Any:
-        key = id(self), context, tuple(arguments), tuple(keywords.items()), targetconfig.ConfigStack.top_or_none()
-        if key not in found:
-            found[key] = find(self, context, arguments, keywords), self  # it lives, so that its id stays its own
-        return found[key][0]
-
-    options.__eq__ = is_equal
-    options.__hash__ = lambda self: hash(type(self))  # numba hashes the names of the options
-    function.get_call_type = call_type
+    wrapper.build = build_plainly
 
 
 def _list_variables_quickly() -> None:

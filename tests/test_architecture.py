@@ -16,6 +16,7 @@ LAYERS = (
     ("files", "options", "outputs", "resources", "text_table", "selection"),
     ("machine", "memory"),
     ("compilation",),
+    ("ahead_analysis",),
     ("ahead_compiler",),
     ("kernel_list",),
     ("kernel_processes",),
