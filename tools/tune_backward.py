@@ -133,7 +133,7 @@ def _stretches(sequence: Sequence, hand: HandShape, clip: range) -> list[Any]:
 
             found = track_stretch(stretch, forward, read, pipeline())
             backward = {place: each.estimate for place, each in found}
-            moved = motion_of(stretch, forward, backward, model.keypoints)
+            moved = motion_of(stretch, forward, backward, model.keypoints, options)
             both = backward | {stretch.anchor: forward[stretch.anchor]}
             places = range(stretch.first, stretch.anchor + 1)
             pairs = [[*row(forward[at], clip[at]), *row(both[at], clip[at])] for at in places]

@@ -88,7 +88,7 @@ def track_backwards(
                 progress(len(found), total)
         places = range(*stretch)
         back = {place: found[place].estimate for place in places}
-        motion = motion_of(stretch, forward, back, keypoints)
+        motion = motion_of(stretch, forward, back, keypoints, options)
         change = change_of_direction(forward[slice(*stretch)], list(back.values()), motion, clamp, options)
         # A frame that has no backward pose, since something failed in it, keeps its forward one.
         better |= {place: back[place] for place in places[change:] if back[place].pose is not None}
@@ -135,6 +135,7 @@ def motion_of(
     forward: Sequence[Estimate],
     backward: Mapping[int, Estimate],
     keypoints: Callable[[Array], Array],
+    options: BackwardOptions,
 ) -> Motion:
     """Return the motion of both directions in a stretch.
 
@@ -145,7 +146,7 @@ def motion_of(
     first, anchor = stretch
     before = forward[first - 1] if first else None
     back = [backward[place] for place in range(first, anchor)]
-    return Motion.between(forward[first:anchor], back, (before, forward[anchor]), keypoints)
+    return Motion.between(forward[first:anchor], back, (before, forward[anchor]), keypoints, options.pause)
 
 
 def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:

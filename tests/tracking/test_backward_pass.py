@@ -118,8 +118,18 @@ def test_a_hand_does_not_leap_to_backward_poses_for_a_little_energy() -> None:
     ahead = [moved(0.1, 16.0, 0.005 * n) for n in range(6)]
     back = [moved(0.1, 14.0, 0.2) for n in range(4)] + [moved(0.1, 10.0, 0.005 * n) for n in (4, 5)]
     motion = motion_of(ahead, back, ahead[0], ahead[-1])
-    assert change_of_direction(ahead, back, motion, CLAMP, OPTIONS) == 4
-    assert change_of_direction(ahead, back, motion, CLAMP, replace(OPTIONS, motion_weight=0.0)) == 0
+    options = replace(OPTIONS, gain=0.0)
+    assert change_of_direction(ahead, back, motion, CLAMP, options) == 4
+    assert change_of_direction(ahead, back, motion, CLAMP, replace(options, motion_weight=0.0)) == 0
+
+
+def test_the_way_during_a_pause_costs_nothing() -> None:
+    places = [replace(moved(0.5, 10.0, 0.1 * n), timestamp=time) for n, time in enumerate((0.0, 0.1, 1.1, 1.2))]
+    motion = Motion.between(places[1:3], [ABSENT, places[2]], (places[0], places[3]), place, OPTIONS.pause)
+    np.testing.assert_allclose(motion.forward, [0.1, 0.0, 0.1])
+    np.testing.assert_allclose(motion.backward, [0.0, 0.0, 0.1])
+    np.testing.assert_allclose(motion.change, [0.0, 0.0])
+    assert motion.totals()[2] == pytest.approx(0.2)
 
 
 def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
