@@ -1,7 +1,9 @@
 """Surface of the 37 spheres and cylinders that hypotheses are rendered with."""
 
 import numpy as np
+from numpy.typing import NDArray
 
+from depthtrack.compilation import compiled
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
@@ -74,15 +76,40 @@ def inside_others(primitives: Primitives, T: Array, local: Array, owner: Index) 
     T: (16, 4, 4) frames of the bodies.
     local: points in the frames of their bodies, metres.
     """
-    homogeneous = np.column_stack([local, np.ones(len(local))])
-    points = np.einsum("nij,nj->ni", T[primitives.bodies[owner]], homogeneous)
     inside = np.zeros(len(local), np.bool_)
-    for number, placed in enumerate(primitives.transforms(T)):
-        rows = np.flatnonzero(~inside & (owner != number))
-        x, y, z, w = np.linalg.inv(placed) @ points[rows].T
-        if primitives.kinds[number] == SPHERE:
-            within = x * x + y * y + z * z < (INSIDE * w) ** 2
-        else:
-            within = (x * x + y * y < (INSIDE * w) ** 2) & (z * w > 0) & (z * w < w * w)
-        inside[rows[within]] = True
+    into_units = np.linalg.inv(primitives.transforms(T))
+    mark_inside(into_units, primitives.kinds == SPHERE, T[primitives.bodies], local, owner, inside)
     return inside
+
+
+@compiled(nogil=True)
+def mark_inside(
+    into_units: Array, is_sphere: Mask, T: Array, local: Array, owner: Index, inside: NDArray[np.bool_]
+) -> None:
+    """Mark the points (N, 3) that lie inside another unit primitive than their owner.
+
+    into_units: (P, 4, 4) from the camera to each unit primitive, possibly projective.
+    T: (P, 4, 4) rigid frames of the bodies of the primitives.
+    """
+    square = INSIDE * INSIDE
+    for n in range(local.shape[0]):
+        frame, a, b, c = T[owner[n]], local[n, 0], local[n, 1], local[n, 2]
+        px = frame[0, 0] * a + frame[0, 1] * b + frame[0, 2] * c + frame[0, 3]
+        py = frame[1, 0] * a + frame[1, 1] * b + frame[1, 2] * c + frame[1, 3]
+        pz = frame[2, 0] * a + frame[2, 1] * b + frame[2, 2] * c + frame[2, 3]
+        for k in range(into_units.shape[0]):
+            if k == owner[n]:
+                continue
+            m = into_units[k]
+            x = m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz + m[0, 3]
+            y = m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz + m[1, 3]
+            z = m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz + m[2, 3]
+            w = m[3, 0] * px + m[3, 1] * py + m[3, 2] * pz + m[3, 3]
+            across = x * x + y * y
+            if is_sphere[k]:
+                found = across + z * z < square * w * w
+            else:
+                found = across < square * w * w and z * w > 0.0 and z * w < w * w
+            if found:
+                inside[n] = True
+                break

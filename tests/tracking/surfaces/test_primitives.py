@@ -12,7 +12,7 @@ from depthtrack.hand.primitives import SPHERE, Primitives
 from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.raycast import raycast
 from depthtrack.solver.surface_points import SurfacePoints
-from depthtrack.tracking.surfaces.primitives import primitive_points, sample_primitive
+from depthtrack.tracking.surfaces.primitives import INSIDE, inside_others, primitive_points, sample_primitive
 from tests.support.surface_points import Posed, posed_points
 
 SHAPES = {"average": HandShape(), "left, small": HandShape(side="left", scale=0.8)}
@@ -23,6 +23,29 @@ def implicit(kind: int, T: np.ndarray, x: np.ndarray) -> np.ndarray:
     unit = np.column_stack([x, np.ones(len(x))]) @ np.linalg.inv(T).T
     unit = unit[:, :3] / unit[:, 3:]
     return np.asarray((unit**2).sum(axis=1) - 1 if kind == SPHERE else (unit[:, :2] ** 2).sum(axis=1) - 1)
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+@pytest.mark.parametrize("posture", ["open", "fist"])
+def test_hidden_points_lie_inside_another_primitive(shape: HandShape, posture: str) -> None:
+    primitives = Primitives.of(shape)
+    T = HandModel(shape).transforms(make_pose([0, 0, 0.5], [1, 0, 0, 0], POSTURES[posture]))
+    owner = np.repeat(np.arange(len(primitives.kinds)), 40)
+    local = np.concatenate(
+        [sample_primitive(int(k), U)[0][::40] for k, U in zip(primitives.kinds, primitives.T_body_unit, strict=True)]
+    )
+    points = np.einsum("nij,nj->ni", T[primitives.bodies[owner]], np.column_stack([local, np.ones(len(local))]))
+    wanted = np.zeros(len(local), np.bool_)
+    for number, placed in enumerate(primitives.transforms(T)):
+        x, y, z, w = np.linalg.inv(placed) @ points.T
+        if primitives.kinds[number] == SPHERE:
+            within = x * x + y * y + z * z < (INSIDE * w) ** 2
+        else:
+            within = (x * x + y * y < (INSIDE * w) ** 2) & (z * w > 0) & (z * w < w * w)
+        wanted |= within & (owner != number)
+    found = inside_others(primitives, T, local, owner)
+    assert np.array_equal(found, wanted)
+    assert 0 < found.sum() < len(found)
 
 
 def test_samples_lie_on_the_primitives_with_outward_normals() -> None:
