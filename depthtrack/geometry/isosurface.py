@@ -10,6 +10,7 @@ that the mesh is always a closed manifold.
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from depthtrack.types import Array, Faces, Index, Mask
@@ -46,10 +47,10 @@ def surface_nets(values: Array) -> tuple[Array, Index]:
 
     values: (nx, ny, nz), of either sign.
     """
-    cells = _cell_values(values)
-    inside = cells < 0
-    crossed = inside.any(axis=-1) & ~inside.all(axis=-1)
-    corner = cells[crossed]
+    codes = _inside_corners(values)
+    crossed = (codes > 0) & (codes < 255)
+    places = np.argwhere(crossed)
+    corner = values[tuple(np.moveaxis(places[:, None] + _CORNERS, -1, 0))]
     total, count = np.zeros((len(corner), 3)), np.zeros((len(corner), 1))
     for a, b in _EDGES:
         cuts = (corner[:, a] < 0) != (corner[:, b] < 0)
@@ -57,7 +58,7 @@ def surface_nets(values: Array) -> tuple[Array, Index]:
         point = _CORNERS[a] + t[:, None] * (_CORNERS[b] - _CORNERS[a])
         total += cuts[:, None] * point
         count += cuts[:, None]
-    vertices = np.argwhere(crossed) + total / count
+    vertices = places + total / count
     index = np.full(crossed.shape, -1, dtype=np.int64)
     index[crossed] = np.arange(len(corner))
     return vertices, np.concatenate([_quads_across(values < 0, index, axis) for axis in range(3)])
@@ -76,17 +77,21 @@ def _quads_across(inside: Mask, index: Index, axis: int) -> Index:
     return np.concatenate([quads[forward], quads[crossed & ~outward][:, ::-1]])
 
 
-def _cell_values(values: Array) -> Array:
-    """Return the values (nx - 1, ny - 1, nz - 1, 8) at the corners of every cell."""
+def _inside_corners(values: Array) -> NDArray[np.uint8]:
+    """Return the negative corners of each cell (nx - 1, ny - 1, nz - 1), one bit each."""
+    inside = (values < 0).astype(np.uint8)
     nx, ny, nz = values.shape
-    return np.stack([values[i : nx - 1 + i, j : ny - 1 + j, k : nz - 1 + k] for i, j, k in _CORNERS], axis=-1)
+    codes = np.zeros((nx - 1, ny - 1, nz - 1), np.uint8)
+    for bit, (i, j, k) in enumerate(_CORNERS):
+        codes |= inside[i : nx - 1 + i, j : ny - 1 + j, k : nz - 1 + k] << bit
+    return codes
 
 
 def without_ambiguous_cells(values: Array) -> Array:
     """Return the grid with the corners of ambiguous cells made negative until none is left."""
-    values, bits = values.copy(), 1 << np.arange(8)
+    values = values.copy()
     while True:
-        double = _AMBIGUOUS[(_cell_values(values) < 0) @ bits]
+        double = _AMBIGUOUS[_inside_corners(values)]
         if not double.any():
             return values
         nodes = (np.argwhere(double)[:, None] + _CORNERS).reshape(-1, 3)
