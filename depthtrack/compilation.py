@@ -137,6 +137,7 @@ def _is_usable(folder: Path) -> bool:
     return True
 
 
+@cache
 def source_digest(file: Path) -> str:
     """Return the SHA-256 of the sources that the compiled code of a file depends on."""
     digest = hashlib.sha256()

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, TypeVar, get_type_hints
+from weakref import ref
 
 from depthtrack.errors import InputError
 from depthtrack.ranges import SEEDS, Range, range_of
@@ -18,6 +19,8 @@ T = TypeVar("T")
 
 _MEANING, _UNIT, _SOURCE, _ADVANCED = "meaning", "unit", "source", "advanced"
 _LEAST, _MOST = "least", "most"
+_checked: dict[int, "ref[Any]"] = {}
+"""Frozen groups whose ranges were checked, by their id; they stay right."""
 
 
 def option(
@@ -96,6 +99,8 @@ def check_ranges(configuration: Any) -> None:
     Raises:
         InputError: if one is not.
     """
+    if (checked := _checked.get(id(configuration))) is not None and checked() is configuration:
+        return
     kind: Any = type(configuration)
     for name, found in _ranges(kind).items():
         value = getattr(configuration, name)
@@ -104,6 +109,9 @@ def check_ranges(configuration: Any) -> None:
         for part in value if isinstance(value, tuple) else (value,):
             if dataclasses.is_dataclass(part):
                 check_ranges(part)
+    if kind.__dataclass_params__.frozen and hasattr(configuration, "__weakref__"):
+        number = id(configuration)
+        _checked[number] = ref(configuration, lambda _: _checked.pop(number, None))
 
 
 @cache

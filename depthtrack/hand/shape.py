@@ -7,6 +7,7 @@ All sizes are stored for a right hand; a left hand is its mirror image in x.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self, cast, get_args
 
@@ -149,6 +150,10 @@ class HandShape:
 
     def to_json(self) -> str:
         """Return the text of `hand.json`, sizes in millimetres."""
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
         return compact_json(self.to_fields())
 
     def to_fields(self) -> dict[str, Any]:

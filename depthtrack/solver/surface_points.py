@@ -58,16 +58,16 @@ class PointBlocks(NamedTuple):
         share = np.zeros((len(points.rest), BODY_COUNT))
         np.add.at(share, (np.arange(len(share))[:, None], points.bodies), points.weights)
         sets, member = np.unique(share > 0, axis=0, return_inverse=True)
-        movers, rows, padding = list[Index](), list[Index](), list[Mask]()
+        movers, rows, padding = np.zeros((len(sets), 4), np.int64), list[Index](), list[Mask]()
         for number, used in enumerate(sets):
             found = np.flatnonzero(member.reshape(-1) == number)
             missing = -len(found) % LANES
-            rows.append(np.pad(found, (0, missing), mode="edge"))
+            rows.append(np.append(found, np.repeat(found[-1:], missing)))
             padding.append(np.arange(len(found) + missing) >= len(found))
-            movers += (len(rows[-1]) // LANES) * [np.flatnonzero(used)]
+            movers[number, : used.sum()] = np.flatnonzero(used)
         row, unused = np.concatenate(rows), np.concatenate(padding)
-        counts = np.array([len(used) for used in movers])
-        padded = np.stack([np.pad(used, (0, 4 - len(used))) for used in movers])
+        blocks = [len(each) // LANES for each in rows]
+        counts, padded = np.repeat(sets.sum(axis=1), blocks), np.repeat(movers, blocks, axis=0)
         weights = np.take_along_axis(share[row], np.repeat(padded, LANES, axis=0), axis=1)
         rest = np.column_stack([points.rest[row], points.normals[row]])
         rest[unused, 3:] = 0.0
