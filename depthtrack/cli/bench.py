@@ -121,7 +121,7 @@ class Pipeline:
     """
 
     recording: tyro.conf.OmitArgPrefixes[RecordingOptions]
-    trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("hybrid", "ik", "pso")
+    trackers: Annotated[tuple[str, ...], stated_default(metavar="NAME ...")] = ("hybrid", "ik", "pso")
     """Trackers to measure."""
     hand: Annotated[str | None, stated_default(metavar="HAND")] = None
     """Hand to track with: a file, "truth" or "average" (default: the recording's own, or the average one)."""
@@ -153,7 +153,7 @@ class Starts:
     A row has the share of right starts, the same among the sure ones, and that of the method of Maycock et al. 2015.
     """
 
-    layouts: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LAYOUT ...")] = ("13", "16", "19", "26")
+    layouts: Annotated[tuple[str, ...], stated_default(metavar="LAYOUT ...")] = ("13", "16", "19", "26")
     """Layouts of the synthetic frames."""
     trials: Annotated[int, number(1, 10**6)] = 36
     """Frames a row: of synthetic motions, or spread over the capture."""
@@ -161,7 +161,7 @@ class Starts:
     """Seed of the first frame."""
     capture: Annotated[Path | None, stated_default(metavar="CAPTURE")] = None
     """Labelled capture to use without its labels, in place of synthetic frames."""
-    models: Annotated[tuple[str, ...], tyro.conf.arg(aliases=("-m",), metavar="MODEL ...")] = ()
+    models: Annotated[tuple[str, ...], stated_default(aliases=("-m",), metavar="MODEL ...")] = ()
     """Models to find in the capture: layouts such as left:16, or files from `markers model`."""
     json: bool = False
     """Print JSON instead of a table."""

@@ -25,11 +25,11 @@ class Command:
     evaluate DIR/runs/* --report DIR`. Times are CPU times, since runs share the machine.
     """
 
-    sequences: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SEQUENCE ...")]
+    sequences: Annotated[tuple[Path, ...], tyro.conf.Positional, stated_default(metavar="SEQUENCE ...")]
     """Recordings to track."""
     out: Annotated[Path, OUTPUT_FOLDER, tyro.conf.arg(aliases=("-o",), metavar="DIR")]
     """Folder to write to."""
-    trackers: Annotated[tuple[str, ...], tyro.conf.arg(metavar="hybrid,pso,ik")] = ("hybrid,pso,ik",)
+    trackers: Annotated[tuple[str, ...], stated_default(metavar="hybrid,pso,ik")] = ("hybrid,pso,ik",)
     """Trackers, each with options after a colon, as in  hybrid,ik:subsample=2 ; or a .toml file with a
     table per tracker: [label], tracker = "ik", and its options."""
     repeats: Annotated[int, number(1, 1000, metavar="N")] = 1
@@ -40,7 +40,7 @@ class Command:
     seed: Annotated[int, number(0, MOST_SEED)] = 0
     """Seed of the first run."""
 
-    keypoints: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.csv ...")] = ()
+    keypoints: Annotated[tuple[Path, ...], stated_default(metavar="FILE.csv ...")] = ()
     """2D keypoints from another detector, a file for each recording in their order (docs/keypoints.md)."""
 
     recordings: tyro.conf.OmitArgPrefixes[SourceOptions] = field(default_factory=SourceOptions)

@@ -26,7 +26,7 @@ class Command:
     prediction file of a public benchmark instead.
     """
 
-    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN ...")] = ()
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional, stated_default(metavar="RUN ...")] = ()
     """Run folders from `depthtrack track`, marker folders from `depthtrack markers`, or capture files with linked
     trajectories."""
     sequence: Annotated[Path | None, stated_default(metavar="PATH")] = None

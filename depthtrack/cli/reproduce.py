@@ -25,7 +25,7 @@ class Command:
     The same command continues an interrupted one. After a change of the code, choose a new DIR.
     """
 
-    figures: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FIGURE ...")]
+    figures: Annotated[tuple[str, ...], tyro.conf.Positional, stated_default(metavar="FIGURE ...")]
     """Figures by name, as schroeder-8 or fig8; an author, as schroeder, for a whole paper; all; `crossmodel` for hands
     that the trackers do not know; or `list` to print the names."""
     out: Annotated[Path | None, OUTPUT_FOLDER, stated_default(aliases=("-o",), metavar="DIR")] = None

@@ -24,7 +24,7 @@ class Fit:
     recordings and run folders. Joint positions are converted by inverse kinematics, with sizes fitted to each hand.
     """
 
-    postures: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POSTURES ...")]
+    postures: Annotated[tuple[Path, ...], tyro.conf.Positional, stated_default(metavar="POSTURES ...")]
     """Files or folders of postures."""
     out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=["-o"], metavar="FILE.json")]
     """File to write."""

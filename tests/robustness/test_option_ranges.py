@@ -3,7 +3,7 @@
 import math
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -107,6 +107,21 @@ def test_every_number_of_the_command_line_has_a_range() -> None:
             assert bool(ranges) == bool({int, float} & set(types_in(hint))), f"{entry.module}: {name}"
             checked += len(ranges)
     assert checked > 300
+
+
+def test_the_help_of_a_list_shows_no_empty_default() -> None:
+    lists = 0
+    for entry in (COMMANDS | MARKER_COMMANDS).values():
+        module = import_module(entry.module)
+        if entry.module == "depthtrack.cli.markers":
+            continue
+        kind = module.command([])[0] if hasattr(module, "command") else module.Command
+        for name, hint in arguments_of(kind):
+            if any(Ellipsis in get_args(each) for each in types_in(hint)):
+                marks = [getattr(mark, "help_behavior_hint", None) for mark in getattr(hint, "__metadata__", ())]
+                assert any(isinstance(mark, ShownDefault) for mark in marks), f"{entry.module}: {name}"
+                lists += 1
+    assert lists > 10
 
 
 @pytest.mark.parametrize(

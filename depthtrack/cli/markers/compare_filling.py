@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import tyro
 
-from depthtrack.cli.stated_default import number
+from depthtrack.cli.stated_default import number, stated_default
 from depthtrack.errors import InputError
 from depthtrack.ranges import MOST_SEED
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class FoldersArgument:
     """Folders of labelled markers."""
 
-    paths: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(name="folders", metavar="FOLDER ...")]
+    paths: Annotated[tuple[Path, ...], tyro.conf.Positional, stated_default(name="folders", metavar="FOLDER ...")]
     """Folders that `markers label` or `markers solve` wrote."""
 
 
@@ -37,7 +37,7 @@ class Command:
     """Seeds of the places; each cuts the whole capture once."""
     together: Annotated[int, number(1, 1000)] = 1
     """Neighbouring markers that lose overlapping stretches, as where something hides a finger."""
-    methods: Annotated[tuple[str, ...], tyro.conf.arg(metavar="METHOD ...")] = (
+    methods: Annotated[tuple[str, ...], stated_default(metavar="METHOD ...")] = (
         "smooth",
         "paper",
         "spline",

@@ -31,7 +31,7 @@ class Command:
     beside it, LAYOUT.png, is to print.
     """
 
-    motion: Annotated[tuple[str, ...], tyro.conf.arg(metavar="MOTION ...")]
+    motion: Annotated[tuple[str, ...], stated_default(metavar="MOTION ...")]
     """Motions by name, as grasp, motion files, or recorded postures: .mat, .csv, .npz, recordings and run folders."""
     markers: Annotated[int, number(1, 64, aliases=("-k",), metavar="K")]
     """Number of markers, without the one at the wrist."""

@@ -30,7 +30,7 @@ class Command:
     capture: tyro.conf.OmitArgPrefixes[CaptureOptions]
     out: Annotated[Path, OUTPUT_FILE, tyro.conf.arg(aliases=("-o",), metavar="MODEL.json")]
     """File to write."""
-    body: Annotated[tuple[str, ...], tyro.conf.arg(metavar="LABEL ...")] = ()
+    body: Annotated[tuple[str, ...], stated_default(metavar="LABEL ...")] = ()
     """Markers of a rigid body; the first one is its origin."""
     frame: Annotated[int | None, number(1, 10**9, metavar="FRAME")] = None
     """Frame that the body is taken from, counted from 1 (default: the median of all frames)."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 class ModelOptions:
     """Models to find in a capture."""
 
-    models: Annotated[tuple[str, ...], tyro.conf.arg(aliases=("-m",), metavar="MODEL ...")] = field(
+    models: Annotated[tuple[str, ...], stated_default(aliases=("-m",), metavar="MODEL ...")] = field(
         default_factory=tuple
     )
     """Each a layout such as 26 or left:16, a layout file, or the file of a model from `markers model` or `solve`.
