@@ -141,5 +141,7 @@ def stretches(shape: HandShape, other: HandShape) -> Array:
 def _beyond(mask: Mask) -> Array:
     """Return the signed distance (h, w) to the outline of the mask in pixels, negative inside."""
     parts = (part.astype(np.uint8) for part in (~mask, mask))
-    outside, inside = (cv2.distanceTransform(p, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64) for p in parts)
+    found = (cv2.distanceTransform(part, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64) for part in parts)
+    # OpenCV's last bit depends on the place in memory. Squares of distances are whole numbers.
+    outside, inside = (np.sqrt(np.rint(each * each)) for each in found)
     return np.where(mask, 0.5 - inside, outside - 0.5)
