@@ -25,6 +25,7 @@ import depthtrack
 from depthtrack.calibration.joint_optimisation import fit_jointly
 from depthtrack.calibration.residuals import CalibrationView
 from depthtrack.geometry.camera import Camera
+from depthtrack.hand.displacement_grid import NODES
 from depthtrack.hand.pose import make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
@@ -102,13 +103,14 @@ def search_layouts() -> None:
 
 
 def calibrate() -> None:
-    """Fit sizes and pose of a hand to one rendered view of it."""
+    """Fit sizes, skin and pose of a hand to one rendered view of it."""
     camera, skin = Camera(120, 120, 240, 240, 60, 60), Skin.of(HandShape())
     pose = make_pose([0, 0, 0.5], [0, 1, 0, 0], POSTURES["open"])
     vertices = skin.at(pose)
     depth = rasterise(camera, vertices, skin.faces, skin.normals(vertices), skin.face_bodies).depth.astype(np.float32)
     seen = Observation(camera, depth > 0, depth, 0, 0.0, camera.rect, pose[:3].copy(), palm_radius=0.04)
-    fit_jointly([CalibrationView(seen)], pose[None], np.zeros(COUNT), "right", iterations=1)
+    for count, exact in ((COUNT, False), (COUNT + NODES, True)):
+        fit_jointly([CalibrationView(seen)], pose[None], np.zeros(count), "right", iterations=1, exact=exact)
 
 
 def calls() -> dict[Call, tuple[float, bool]]:

@@ -17,11 +17,12 @@ _MEASURING = ("depthtrack.calibration", "depthtrack.rendering.triangles", "depth
 """Packages whose kernels measure a hand."""
 _OTHER_TRACKERS = (
     "depthtrack.solver.gauss_newton",
-    "depthtrack.solver.linear_algebra",
     "depthtrack.tracking.surfaces.capsules",
     "depthtrack.tracking.visible_centroid",
 )
 """Modules whose kernels trackers of the skin do not call: of cylinders, swarms alone, and keypoints."""
+_MEASURING_AND_TRACKING = ("depthtrack.solver.linear_algebra",)
+"""Modules that the measurement of a hand and other trackers call."""
 _SKIN_TRACKERS = ("hybrid", "ik")
 
 
@@ -77,6 +78,7 @@ def compiled_ahead(tracker: str = "", measures: bool = False) -> "Iterator[Calla
 
     without = _OTHER_COMMANDS + (() if measures else _MEASURING)
     without += _OTHER_TRACKERS if tracker in _SKIN_TRACKERS else ()
+    without += _MEASURING_AND_TRACKING if tracker in _SKIN_TRACKERS and not measures else ()
     absent = absent_kernels([each for each in listed_kernels() if not each.module.startswith(without)])
     if sum(each.seconds for each in absent) <= _FEW:
         yield lambda: None

@@ -53,6 +53,9 @@ class Camera:
             raise InputError(
                 f"camera depth_scale must be metres per depth unit (0.001 for millimetres), found {self.depth_scale!r}"
             )
+        # Whole numbers would be other types to kernels, which would be compiled for them as well.
+        for name in ("fx", "fy", "cx", "cy", "depth_scale"):
+            object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def shape(self) -> tuple[int, int]:
