@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -191,6 +192,29 @@ def test_a_hidden_finger_needs_more_evidence_for_another_posture(
     frame = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0)
     found = stage(frame, [Candidate(made.poses[0], 100.0, 0.9)])[0]
     np.testing.assert_array_equal(found.pose, other if accepted else made.poses[0])
+
+
+@pytest.mark.parametrize(("energy", "kept"), [(80.0, True), (85.0, False)])
+def test_a_searched_posture_stays_if_its_fit_is_clearly_worse(
+    made: Synthesiser, energy: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The fit costs 85; 0.98 of it is 83.3."""
+    searched, fitted = made.poses[1], made.poses[2]
+    costs = {searched.tobytes(): energy, fitted.tobytes(): 85.0}
+    monkeypatch.setattr(recover, "search_one_finger", lambda *_: Candidate(searched, -1.0, 0.9))
+    monkeypatch.setattr(FrameContext, "fitter", lambda *_: SimpleNamespace(fit=lambda pose, prior: fitted))
+    monkeypatch.setattr(
+        FrameContext, "evaluate", lambda self, poses: [Candidate(poses[0], costs[poses[0].tobytes()], 0.9)]
+    )
+    config, tools = HybridConfig(), Toolkit(HandShape(), HybridConfig().scoring)
+    observation = observe(made, 0)
+    tools.set_target(observation)
+    stage = recover.RefineFingers(
+        SwarmSearch(SwarmSearchOptions(refine=False)), RecoveryOptions(), FingerOptions(), config.fit
+    )
+    frame = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0)
+    found = stage(frame, [Candidate(made.poses[0], 100.0, 0.9)])[0]
+    np.testing.assert_array_equal(found.pose, searched if kept else fitted)
 
 
 def test_the_visibility_of_fingers_follows_the_pose(made: Synthesiser) -> None:

@@ -92,13 +92,17 @@ class RefineFingers:
     def _refitted(
         self, frame: FrameContext, refit: SurfaceFitOptions, scorer: Scorer, best: Candidate, found: Candidate
     ) -> Candidate:
-        """Return the surface fit of `found` if its energy is low at low resolution, else `best`."""
+        """Return the surface fit of `found` if its energy is low at low resolution, else `best`.
+
+        A fit may pull the finger back to other points. Then its energy is clearly higher, and `found` stays.
+        """
         if found.energy >= self.recovery.accept_finger * scorer.score(best.pose[None])[0]:
             return best
         # The prior holds the angles that no correspondence constrains near where the search found them.
         prior = prior_near(found.pose[ANGLES], frame.posture_kept(refit.icp), refit.icp)
         fitted = frame.fitter(refit).fit(found.pose, prior=prior)
-        return frame.evaluate(fitted[None])[0]
+        fit, kept = (frame.evaluate(pose[None])[0] for pose in (fitted, found.pose))
+        return kept if kept.energy < self.recovery.accept_finger * fit.energy else fit
 
     def _accepted(self, frame: FrameContext, best: Candidate, other: Candidate, finger: int) -> Candidate:
         """Return `other` if its energy is low enough, else `best`.
