@@ -9,7 +9,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 from depthtrack.recording.sequence import Frame
@@ -100,11 +99,17 @@ def track_backwards(
 def doubtful_stretches(estimates: Sequence[Estimate], options: BackwardOptions) -> list[Stretch]:
     """Return the stretches between confident poses that hold a doubtful one.
 
-    The last stretch counts only if a confident pose follows it. A frame without a trusted pose is doubtful.
+    The last stretch counts only if a confident pose follows it. A frame without a trusted pose is doubtful. A stretch
+    begins after its last pause: a hand is not followed through one.
     """
     confidences = [_confidence(each) for each in estimates]
-    anchors = [index for index, value in enumerate(confidences) if value >= options.confident]
-    stretches = [Stretch(before + 1, anchor) for before, anchor in pairwise([-1, *anchors])]
+    stretches, first = list[Stretch](), 0
+    for index, value in enumerate(confidences):
+        if _is_after_pause(estimates, index, options):
+            first = index
+        if value >= options.confident:
+            stretches.append(Stretch(first, index))
+            first = index + 1
     return [each for each in stretches if min(confidences[slice(*each)], default=1.0) < options.doubtful]
 
 
@@ -144,9 +149,9 @@ def motion_of(
     keypoints: returns those of a pose, metres.
     """
     first, anchor = stretch
-    before = forward[first - 1] if first else None
+    before = None if first == 0 or _is_after_pause(forward, first, options) else forward[first - 1]
     back = [backward[place] for place in range(first, anchor)]
-    return Motion.between(forward[first:anchor], back, (before, forward[anchor]), keypoints, options.pause)
+    return Motion.between(forward[first:anchor], back, (before, forward[anchor]), keypoints)
 
 
 def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Estimate]) -> dict[int, Estimate]:
@@ -165,6 +170,11 @@ def with_forward_status(forward: Sequence[Estimate], backward: Mapping[int, Esti
         if begins and estimate.status.is_trusted:
             ordered[after] = replace(forward[after], status=Status.TRACKED)
     return ordered
+
+
+def _is_after_pause(estimates: Sequence[Estimate], place: int, options: BackwardOptions) -> bool:
+    """Return whether the frame of an estimate is the first one after a pause."""
+    return place > 0 and estimates[place].timestamp - estimates[place - 1].timestamp > options.pause
 
 
 def _is_better_than_none(forward: Estimate, backward: Estimate) -> bool:

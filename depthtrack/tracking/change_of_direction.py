@@ -34,7 +34,7 @@ class BackwardOptions:
     motion_weight: float = option(
         20.0, "Energy of each metre that the keypoints move", unit="clamp/m", source="as `confidence_weight`", most=1000
     )
-    pause: float = option(0.3, "Time between two poses beyond which their distance costs nothing", unit="s")
+    pause: float = option(0.3, "Time between two frames beyond which a hand is not followed backwards", unit="s")
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -61,18 +61,10 @@ def chosen_backward(choice: bool | BackwardOptions | None, tracker: TrackerConfi
     return BackwardOptions() if choice else None
 
 
-class _Place(NamedTuple):
-    """Keypoints (21, 3), metres, at a time, seconds."""
-
-    points: Array
-    timestamp: float
-
-
 class Motion(NamedTuple):
     """Mean distances that the keypoints of a stretch of N frames move, metres.
 
-    Number n is the way from the frame before number n of the stretch to it. The last one leads to the anchor. A way
-    during a pause is 0.
+    Number n is the way from the frame before number n of the stretch to it. The last one leads to the anchor.
 
     forward: (N + 1,) between forward estimates.
     backward: (N + 1,) between backward estimates. The first one is not used.
@@ -90,28 +82,24 @@ class Motion(NamedTuple):
         backward: Sequence[Estimate],
         ends: tuple[Estimate | None, Estimate],
         keypoints: Callable[[Array], Array],
-        pause: float = math.inf,
     ) -> Self:
         """Return the motion in a stretch.
 
         ends: the estimates before it, None at the beginning of a recording, and after it.
         keypoints: returns those of a pose, metres.
-        pause: shortest time of one, seconds.
         """
 
-        def place(estimate: Estimate | None) -> _Place | None:
-            if estimate is None or estimate.pose is None:
-                return None
-            return _Place(keypoints(estimate.pose), estimate.timestamp)
+        def points(estimate: Estimate | None) -> Array | None:
+            return None if estimate is None or estimate.pose is None else keypoints(estimate.pose)
 
         before, anchor = ends
         # An absent pose is the last one known in its direction.
-        ahead = list(accumulate(map(place, (before, *forward)), _known))
-        back = list(accumulate(map(place, (anchor, *reversed(backward))), _known))[::-1]
+        ahead = list(accumulate(map(points, (before, *forward)), _known))
+        back = list(accumulate(map(points, (anchor, *reversed(backward))), _known))[::-1]
         return cls(
-            np.array([_distance(*pair, pause) for pair in pairwise([*ahead, back[-1]])]),
-            np.array([_distance(*pair, pause) for pair in pairwise([None, *back])]),
-            np.array([_distance(*pair, pause) for pair in zip(ahead[:-1], back[:-1], strict=True)]),
+            np.array([_distance(*pair) for pair in pairwise([*ahead, back[-1]])]),
+            np.array([_distance(*pair) for pair in pairwise([None, *back])]),
+            np.array([_distance(*pair) for pair in zip(ahead[:-1], back[:-1], strict=True)]),
         )
 
     def totals(self) -> Array:
@@ -152,13 +140,11 @@ def _cost(estimate: Estimate, clamp: float, options: BackwardOptions) -> float:
     return min(estimate.energy / clamp, 1.0) - options.confidence_weight * confidence
 
 
-def _known(before: _Place | None, found: _Place | None) -> _Place | None:
+def _known(before: Array | None, found: Array | None) -> Array | None:
     """Return what is found, or what was known before."""
     return before if found is None else found
 
 
-def _distance(one: _Place | None, other: _Place | None, pause: float) -> float:
-    """Return the mean distance of keypoints, metres; 0 if some are unknown, and after a pause."""
-    if one is None or other is None or other.timestamp - one.timestamp > pause:
-        return 0.0
-    return float(np.linalg.norm(other.points - one.points, axis=1).mean())
+def _distance(one: Array | None, other: Array | None) -> float:
+    """Return the mean distance of keypoints, metres; 0 if some are unknown."""
+    return 0.0 if one is None or other is None else float(np.linalg.norm(other - one, axis=1).mean())

@@ -123,13 +123,12 @@ def test_a_hand_does_not_leap_to_backward_poses_for_a_little_energy() -> None:
     assert change_of_direction(ahead, back, motion, CLAMP, replace(options, motion_weight=0.0)) == 0
 
 
-def test_the_way_during_a_pause_costs_nothing() -> None:
-    places = [replace(moved(0.5, 10.0, 0.1 * n), timestamp=time) for n, time in enumerate((0.0, 0.1, 1.1, 1.2))]
-    motion = Motion.between(places[1:3], [ABSENT, places[2]], (places[0], places[3]), place, OPTIONS.pause)
-    np.testing.assert_allclose(motion.forward, [0.1, 0.0, 0.1])
-    np.testing.assert_allclose(motion.backward, [0.0, 0.0, 0.1])
-    np.testing.assert_allclose(motion.change, [0.0, 0.0])
-    assert motion.totals()[2] == pytest.approx(0.2)
+def test_a_stretch_begins_after_its_last_pause() -> None:
+    times = (0.0, 0.1, 1.1, 1.2, 2.2, 2.3)
+    doubtful = [replace(estimate(0.1), timestamp=time) for time in times]
+    ended = replace(estimate(0.9), timestamp=2.4)
+    assert [tuple(each) for each in doubtful_stretches([*doubtful, ended], OPTIONS)] == [(4, 6)]
+    assert doubtful_stretches([*doubtful, replace(ended, timestamp=3.3)], OPTIONS) == []
 
 
 def test_a_trusted_pose_after_a_frame_without_one_starts_the_track() -> None:
