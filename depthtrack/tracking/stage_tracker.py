@@ -142,6 +142,8 @@ class StageTracker:
             return estimate
         if begins and self._deadline is None and observation.resegmentation is not None:
             best = self._best_place(best, observation.resegmentation, lists, clock)
+        if len(lists) > 1 and self._deadline is None and best.confidence < self._thresholds.start_confidence:
+            best = self._start_again(best, observation, clock)
         self.evidence = best.evidence
         return self._state.commit(
             *best.candidate,
@@ -154,6 +156,11 @@ class StageTracker:
             best.branches,
             best.seen,
         )
+
+    def _start_again(self, best: _Proposal, observation: Observation, clock: StageClock) -> _Proposal:
+        """Return the better one of a doubtful estimate after a pause and of another start."""
+        again = self._propose(observation, {Status.STARTED: self._stages.start}, clock, repeat=1)
+        return best if again is None or again.candidate.energy >= best.candidate.energy else again
 
     def _best_place(
         self,
@@ -186,15 +193,20 @@ class StageTracker:
         lists: dict[Status, Sequence[Stage]],
         clock: StageClock,
         pose: Array | None = None,
+        repeat: int = 0,
     ) -> _Proposal | None:
-        """Return the best candidate of some lists of stages, or None without any."""
+        """Return the best candidate of some lists of stages, or None without any.
+
+        repeat: number of the repetition, which has other random numbers.
+        """
         deadline = Deadline.after(self._deadline, observation.arrived)
         self._tools.set_target(observation)
         clock.lap("target")
         found: list[tuple[Candidate, Status, tuple[Branch, ...]]] = []
         interrupted: InterruptedSearch | None = None
         for status, stages in lists.items():
-            frame = FrameContext(observation, self._tools, self._state, self._seed, pose, deadline=deadline)
+            seed = self._seed + repeat
+            frame = FrameContext(observation, self._tools, self._state, seed, pose, deadline=deadline)
             candidates = list[Candidate]()
             for stage in stages:
                 candidates = stage(frame, candidates)

@@ -7,14 +7,20 @@ import cv2
 import numpy as np
 import pytest
 
+from depthtrack.hand.pose import ANGLES
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.configuration import HybridConfig
+from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame
 from depthtrack.tracking.registry import create_tracker, tracker_config
+from depthtrack.tracking.stage_tracker import Stages, StageTracker
 from depthtrack.tracking.state import TrackState
+from depthtrack.types import Array
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +58,37 @@ def test_a_hand_that_stayed_during_a_pause_is_followed(made: Synthesiser) -> Non
     frames = [Frame(index, 2.0 * index, depth, None, made.sensor.camera) for index in range(3)]
     energies = [each.estimate.energy for each in track(made, "ik", frames)]
     assert max(energies) < 1.1 * energies[0]
+
+
+class BySeed:
+    """Stage that finds the hand with another seed than 0."""
+
+    name = "search"
+
+    def __init__(self, wrong: Array, right: Array) -> None:
+        self._poses = wrong, right
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        return frame.evaluate(self._poses[frame.seed != 0][None])
+
+
+@pytest.mark.parametrize(("deadline", "repeated"), [(None, True), (33.0, False)])
+def test_a_doubtful_start_after_a_pause_is_repeated(made: Synthesiser, deadline: float | None, repeated: bool) -> None:
+    right = made[0].pose
+    wrong = right.copy()
+    wrong[ANGLES.start + 5] += 0.7  # index finger
+    config, search = HybridConfig(), BySeed(wrong, right)
+    tools, thresholds = Toolkit(made.options.hand, config.scoring), replace(config.thresholds, start_confidence=0.9)
+    tracker = StageTracker("hybrid", Stages([search], [search], [search]), tools, thresholds, 0, deadline)
+    with closing(tracker):
+        energies = []
+        for time in (0.0, 0.1, 5.0):
+            frame = Frame(0, time, made[0].depth.astype(np.float32), None, made.sensor.camera)
+            observation = Segmenter(None).segment(frame)
+            assert observation is not None
+            energies.append(tracker.track(observation).energy)
+    assert energies[0] == energies[1]
+    assert (energies[2] < energies[1]) == repeated
 
 
 @pytest.mark.parametrize(
