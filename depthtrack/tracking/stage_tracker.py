@@ -129,12 +129,14 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
-        It is absent if the stages find no candidate. A doubtful start tries other places of the hand.
+        It is absent if the stages find no candidate. A doubtful start tries other places of the hand; after a pause, it
+        searches again.
 
         pose: (27,) given by the user.
         """
         clock = StageClock(self.stages)
         begins = pose is None and self._state.begins(observation.timestamp)
+        after_pause = Status.TRACKED in lists and Status.STARTED in lists
         best = self._propose(observation, lists, clock, pose)
         if best is None:
             estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
@@ -142,7 +144,7 @@ class StageTracker:
             return estimate
         if begins and self._deadline is None and observation.resegmentation is not None:
             best = self._best_place(best, observation.resegmentation, lists, clock)
-        if len(lists) > 1 and self._deadline is None and best.confidence < self._thresholds.start_confidence:
+        if after_pause and self._deadline is None and best.confidence < self._thresholds.start_confidence:
             best = self._start_again(best, observation, clock)
         self.evidence = best.evidence
         return self._state.commit(
