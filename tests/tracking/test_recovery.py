@@ -194,9 +194,9 @@ def test_a_hidden_finger_needs_more_evidence_for_another_posture(
     np.testing.assert_array_equal(found.pose, other if accepted else made.poses[0])
 
 
-@pytest.mark.parametrize(("energy", "kept"), [(80.0, True), (85.0, False)])
-def test_a_searched_posture_stays_if_its_fit_is_clearly_worse(
-    made: Synthesiser, energy: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("energy", "starts", "kept"), [(80.0, True, True), (85.0, True, False), (80.0, False, False)])
+def test_a_searched_posture_stays_in_a_start_if_its_fit_is_clearly_worse(
+    made: Synthesiser, energy: float, starts: bool, kept: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The fit costs 85; 0.98 of it is 83.3."""
     searched, fitted = made.poses[1], made.poses[2]
@@ -212,8 +212,10 @@ def test_a_searched_posture_stays_if_its_fit_is_clearly_worse(
     stage = recover.RefineFingers(
         SwarmSearch(SwarmSearchOptions(refine=False)), RecoveryOptions(), FingerOptions(), config.fit
     )
-    frame = FrameContext(observation, tools, TrackState(config.thresholds, 40.0), 0)
-    found = stage(frame, [Candidate(made.poses[0], 100.0, 0.9)])[0]
+    state = TrackState(config.thresholds, 40.0)
+    if not starts:
+        state.commit(made.poses[0], 10.0, 0.9, Status.TRACKED, {}, observation.timestamp, 0.9)
+    found = stage(FrameContext(observation, tools, state, 0), [Candidate(made.poses[0], 100.0, 0.9)])[0]
     np.testing.assert_array_equal(found.pose, searched if kept else fitted)
 
 

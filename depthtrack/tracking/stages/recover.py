@@ -94,7 +94,8 @@ class RefineFingers:
     ) -> Candidate:
         """Return the surface fit of `found` if its energy is low at low resolution, else `best`.
 
-        A fit may pull the finger back to other points. Then its energy is clearly higher, and `found` stays.
+        A fit may pull the finger back to other points. Then its energy is clearly higher, and `found` stays in a start.
+        A track has the next frames to find the finger, and would keep the inaccuracy of a searched posture.
         """
         if found.energy >= self.recovery.accept_finger * scorer.score(best.pose[None])[0]:
             return best
@@ -102,7 +103,8 @@ class RefineFingers:
         prior = prior_near(found.pose[ANGLES], frame.posture_kept(refit.icp), refit.icp)
         fitted = frame.fitter(refit).fit(found.pose, prior=prior)
         fit, kept = (frame.evaluate(pose[None])[0] for pose in (fitted, found.pose))
-        return kept if kept.energy < self.recovery.accept_finger * fit.energy else fit
+        starts = frame.state.pose is None or frame.state.is_stale(frame.observation.timestamp)
+        return kept if starts and kept.energy < self.recovery.accept_finger * fit.energy else fit
 
     def _accepted(self, frame: FrameContext, best: Candidate, other: Candidate, finger: int) -> Candidate:
         """Return `other` if its energy is low enough, else `best`.
