@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from depthtrack.synthesis.marker_capture import MarkerSynthesis as MarkerSynthesis
     from depthtrack.synthesis.marker_capture import SyntheticMarkers as SyntheticMarkers
     from depthtrack.synthesis.marker_measurement import MeasurementErrors as MeasurementErrors
-    from depthtrack.tracking.change_of_direction import BackwardOptions as BackwardOptions
+    from depthtrack.tracking.backward_options import BackwardOptions as BackwardOptions
     from depthtrack.tracking.pipeline import TrackedFrame as TrackedFrame
     from depthtrack.tracking.registry import tracker_config as tracker_config
     from depthtrack.tracking.tracker import Estimate as Estimate
@@ -126,7 +126,7 @@ _MODULES = {
     "synthesis.generate": ("Synthesis",),
     "synthesis.marker_capture": ("MarkerSynthesis", "SyntheticMarkers"),
     "synthesis.marker_measurement": ("MeasurementErrors",),
-    "tracking.change_of_direction": ("BackwardOptions",),
+    "tracking.backward_options": ("BackwardOptions",),
     "tracking.pipeline": ("TrackedFrame",),
     "tracking.registry": ("tracker_config",),
     "tracking.tracker": ("Estimate",),

@@ -26,7 +26,7 @@ from depthtrack.markers.layout.options import LayoutOptions
 from depthtrack.markers.layout.reconstruction import ReconstructionOptions
 from depthtrack.options import Parameter, parameters
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.change_of_direction import BackwardOptions
+from depthtrack.tracking.backward_options import BackwardOptions
 from depthtrack.tracking.configuration import CONFIGURATIONS, DEFAULT_TRACKER
 
 ROOT = Path(__file__).parents[1]

@@ -34,8 +34,9 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.recording.status import Status
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.solver.keypoints import fit_poses
+from depthtrack.tracking.backward_options import BackwardOptions
 from depthtrack.tracking.backward_pass import doubtful_stretches, motion_of, track_stretch
-from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction
+from depthtrack.tracking.change_of_direction import Motion, change_of_direction
 from depthtrack.tracking.pipeline import Pipeline, track_frames
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.tracker import ABSENT, Estimate

@@ -24,7 +24,7 @@ from depthtrack.hand.one_euro import OneEuroOptions
 from depthtrack.machine import usable_cores
 from depthtrack.recording.run_folder import Run
 from depthtrack.segmentation.options import SegmentationOptions
-from depthtrack.tracking.change_of_direction import BackwardOptions, chosen_backward
+from depthtrack.tracking.backward_options import BackwardOptions, chosen_backward
 from depthtrack.tracking.configuration import DEFAULT_TRACKER, TrackerConfig
 from depthtrack.tracking.pipeline import TrackedFrame
 from depthtrack.tracking.run import TrackingRun, check_run, configure

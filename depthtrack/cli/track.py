@@ -24,7 +24,7 @@ from depthtrack.tracking.configuration import TrackerConfig, TrackerName
 if TYPE_CHECKING:
     from depthtrack.hand.shape import HandShape
     from depthtrack.recording.sequence import Sequence as Recording
-    from depthtrack.tracking.change_of_direction import BackwardOptions
+    from depthtrack.tracking.backward_options import BackwardOptions
     from depthtrack.tracking.run_configuration import RunConfiguration
 
 
@@ -164,7 +164,7 @@ class TrackCommand:
 
     def _backward(self, tracker: TrackerConfig) -> "BackwardOptions | None":
         """Return the options of the backward pass: of the run that is repeated, or the usual ones."""
-        from depthtrack.tracking.change_of_direction import chosen_backward
+        from depthtrack.tracking.backward_options import chosen_backward
 
         stored = None if self.config is None else _load(self.config).backward
         if self.backward == "auto" and self.config is not None:

@@ -13,7 +13,8 @@ from typing import NamedTuple, Protocol
 
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
-from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction
+from depthtrack.tracking.backward_options import BackwardOptions
+from depthtrack.tracking.change_of_direction import Motion, change_of_direction
 from depthtrack.tracking.pipeline import Pipeline
 from depthtrack.tracking.tracker import Estimate
 from depthtrack.types import Array

@@ -20,8 +20,8 @@ from depthtrack.recording.sequence import Frame, Sequence
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.strict_data import parse_json
+from depthtrack.tracking.backward_options import BackwardOptions
 from depthtrack.tracking.backward_pass import doubtful_stretches, track_backwards
-from depthtrack.tracking.change_of_direction import BackwardOptions
 from depthtrack.tracking.configuration import LiftConfig, MarkersConfig, TrackerConfig
 from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, estimates_of, row_of, track_frames, write_run
 from depthtrack.tracking.registry import create_tracker

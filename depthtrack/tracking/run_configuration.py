@@ -26,7 +26,7 @@ from depthtrack.recording.sequence import OnDamage
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.segmentation.skin_colour import MAX_BYTES as MAX_SKIN_BYTES
 from depthtrack.solver.options import SurfaceName
-from depthtrack.tracking.change_of_direction import BackwardOptions
+from depthtrack.tracking.backward_options import BackwardOptions
 from depthtrack.tracking.configuration import (
     RUN_CONFIGURATIONS,
     HybridConfig,

@@ -27,8 +27,9 @@ from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
 from depthtrack.tracking import guided_segmentation, pipeline
+from depthtrack.tracking.backward_options import BackwardOptions, chosen_backward
 from depthtrack.tracking.backward_pass import doubtful_stretches, track_backwards, with_forward_status
-from depthtrack.tracking.change_of_direction import BackwardOptions, Motion, change_of_direction, chosen_backward
+from depthtrack.tracking.change_of_direction import Motion, change_of_direction
 from depthtrack.tracking.configuration import HybridConfig, IkConfig, Oikonomidis2011Config
 from depthtrack.tracking.guided_segmentation import segment
 from depthtrack.tracking.run import TrackingRun, configure
