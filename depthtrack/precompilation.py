@@ -48,6 +48,12 @@ class PartsFirst:
                 self._changed.wait()
             return None
 
+    def hurry(self, number: int) -> None:
+        """Put a kernel that waits, and its parts, before all others."""
+        with self._changed:
+            wanted = {number} | self._parts[number]
+            self._waiting.sort(key=lambda n: n not in wanted)
+
     def finish(self, number: int) -> None:
         """State that a kernel was compiled, or never will be."""
         with self._changed:
@@ -82,7 +88,8 @@ class CompilationAhead(Closing):
 
     def __init__(self, kernels: Sequence[Kernel]) -> None:
         self._kernels, self._waiting, self._is_over = kernels, PartsFirst(kernels), False
-        self._events = {(each.module, each.name, each.signature): threading.Event() for each in kernels}
+        self._numbers = {(each.module, each.name, each.signature): n for n, each in enumerate(kernels)}
+        self._events = [threading.Event() for _ in kernels]
         self._unfinished, self._finished = sum(each.seconds for each in kernels), SimpleQueue[Kernel | None]()
         self.processes = min(usable_cores(), len(kernels))
         """Number of processes."""
@@ -119,7 +126,7 @@ class CompilationAhead(Closing):
             child.kill()
         for child in self._children:
             child.wait()
-        for event in self._events.values():
+        for event in self._events:
             event.set()
 
     def _work(self, child: Child) -> None:
@@ -131,18 +138,21 @@ class CompilationAhead(Closing):
                     child = kernel_processes.start_for(None)
                     self._children.append(child)
                 self._waiting.finish(number)
-                self._events[kernel.module, kernel.name, kernel.signature].set()
+                self._events[number].set()
                 self._finished.put(kernel)
         finally:
             self._finished.put(None)
 
     def _wait_for(self, function: Callable[..., Any], types: Any) -> bool:
-        """Wait for a kernel; return whether it is among those that were compiled."""
-        event = self._events.get((function.__module__, function.__name__, tuple(types)))
-        while event is not None and not event.wait(1.0):
+        """Wait for a kernel, which is compiled next; return whether it is among those that were compiled."""
+        number = self._numbers.get((function.__module__, function.__name__, tuple(types)))
+        if number is None:
+            return False
+        self._waiting.hurry(number)
+        while not self._events[number].wait(1.0):
             if all(thread.done() for thread in self._threads):
                 return False
-        return event is not None
+        return True
 
 
 def _await_kernels(wait_for: Callable[[Callable[..., Any], Any], bool]) -> None:

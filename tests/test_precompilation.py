@@ -171,6 +171,20 @@ def test_each_kernel_follows_its_parts() -> None:
     assert len(set(running)) == 3
 
 
+def test_a_kernel_that_is_waited_for_comes_next_with_its_parts() -> None:
+    kernels = [kernel for kernel in listed_kernels() if kernel.name in {"score_poses", "submit", "solve", "fit_rounds"}]
+    number = {kernel.name: n for n, kernel in enumerate(kernels)}
+    waiting = PartsFirst(kernels)
+    waiting.hurry(number["submit"])
+    assert waiting.take() == number["submit"]
+    waiting.hurry(number["fit_rounds"])
+    assert waiting.take() == number["solve"]
+    waiting.finish(number["solve"])
+    assert waiting.take() == number["fit_rounds"]
+    waiting.hurry(number["submit"])  # it is taken already
+    assert waiting.take() == number["score_poses"]
+
+
 def test_no_kernel_is_taken_after_a_stop() -> None:
     waiting = PartsFirst(listed_kernels())
     waiting.stop()

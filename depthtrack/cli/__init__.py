@@ -62,6 +62,8 @@ COMMANDS = {
 _HELP = ("-h", "--help", "help")
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables of the libraries that numpy and scipy multiply matrices with; read when numpy is imported."""
+_NEW_OBJECTS = 20_000
+"""New objects after which Python looks for garbage. By default 700: imports make 300,000, and hardly any is garbage."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,6 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     The code is 0 on success, and 2 for an error that the user can correct. It is 130 after an interrupt (Ctrl-C), and
     143 after SIGTERM. It is 141 if the reader of the output closes it before the end of the work.
     """
+    gc.set_threshold(_NEW_OBJECTS)
     atexit.register(gc.freeze)  # at its end Python would look for garbage among all objects: a quarter of a second
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     name = arguments[0] if arguments else "--help"

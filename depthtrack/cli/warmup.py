@@ -11,9 +11,14 @@ if TYPE_CHECKING:
 
 _FEW = 3.0
 """Seconds of compilation that start no processes, and that are left when tracking begins."""
-_OTHER_COMMANDS = ("depthtrack.recording", "depthtrack.synthesis", "depthtrack.markers")
-"""Packages that no tracker calls; a recording is opened before its kernel would be compiled ahead."""
-_MEASURING = ("depthtrack.calibration", "depthtrack.rendering.triangles", "depthtrack.rendering.raycast")
+_OTHER_COMMANDS = ("depthtrack.synthesis", "depthtrack.markers")
+"""Packages that no tracker calls."""
+_MEASURING = (
+    "depthtrack.calibration",
+    "depthtrack.hand.skin.displacement",
+    "depthtrack.rendering.triangles",
+    "depthtrack.rendering.raycast",
+)
 """Packages whose kernels measure a hand."""
 _OTHER_TRACKERS = (
     "depthtrack.solver.gauss_newton",
