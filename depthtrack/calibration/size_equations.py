@@ -24,6 +24,7 @@ _KNUCKLES, _THUMB_BASE = (TANGENT_SIZE + part.start for part in (KNUCKLES, THUMB
 _BLOCK = 32
 _MOST = 24 + TOUCHED
 """Bound on the parameters that one residual depends on."""
+_AVERAGE = HandShape()
 
 
 class SizedHand(NamedTuple):
@@ -46,9 +47,9 @@ class SizedHand(NamedTuple):
     @staticmethod
     def at(model: HandModel, pose: Array) -> "SizedHand":
         """Return a hand in a pose (27,)."""
-        shape, average = model.shape, HandShape()
-        breadth, length = shape.palm_breadth / average.palm_breadth, shape.palm_length / average.palm_length
-        grown = average.bases * [breadth, length, 1.0]
+        shape = model.shape
+        breadth, length = shape.palm_breadth / _AVERAGE.palm_breadth, shape.palm_length / _AVERAGE.palm_length
+        grown = _AVERAGE.bases * [breadth, length, 1.0]
         bodies, grid = BodyPoses.at(model.chain, pose), DisplacementGrid.of(shape)
         return SizedHand(bodies, model.lengths, grown, shape.scale, float(shape.mirror), grid)
 

@@ -19,6 +19,7 @@ from depthtrack.hand.displacement_grid import NODES, displacement_fields, displa
 from depthtrack.hand.pose import FINGERS
 from depthtrack.hand.rig_file import RigFile
 from depthtrack.hand.rig_file import Side as Side
+from depthtrack.strict_data import exact_json_text
 from depthtrack.types import Array
 
 # Phalanx lengths and soft tissue at the tips: Buryanov and Kotiuk, "Proportions of hand segments", Int. J. Morphol.
@@ -119,10 +120,10 @@ class HandShape:
             raise InputError(f"the skin's displacement must be {NODES} numbers within 20 mm")
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, HandShape) and self.to_json() == other.to_json()
+        return isinstance(other, HandShape) and self._text == other._text
 
     def __hash__(self) -> int:
-        return hash(self.to_json())
+        return hash(self._text)
 
     @property
     def mirror(self) -> float:
@@ -150,11 +151,12 @@ class HandShape:
 
     def to_json(self) -> str:
         """Return the text of `hand.json`, sizes in millimetres."""
-        return self._text
+        return compact_json(self.to_fields())
 
     @cached_property
     def _text(self) -> str:
-        return compact_json(self.to_fields())
+        """The contents of `hand.json` in one line: hands with equal ones are equal."""
+        return exact_json_text(self.to_fields())
 
     def to_fields(self) -> dict[str, Any]:
         """Return the contents of `hand.json`, sizes in millimetres."""
