@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from depthtrack.calibration.acceptance import check_resembles_hand
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.errors import InputError
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording import sequence as recording
+from depthtrack.recording.kept_frames import KeptFrames
 from depthtrack.segmentation.options import SegmentationOptions
 from depthtrack.tracking.configuration import TrackerConfig
 from depthtrack.tracking.stretches import (
@@ -39,10 +41,22 @@ class CalibrationSource:
 
         starts: estimates to begin them with.
         """
-        stretches = self._stretches
         return track_stretches(
-            self.sequence, hand, self.segmentation, self.threads, self.frames, stretches, progress, starts
+            self.sequence,
+            hand,
+            self.segmentation,
+            self.threads,
+            self.frames,
+            self._stretches,
+            progress,
+            starts,
+            self.kept.frames,
         )
+
+    @cached_property
+    def kept(self) -> KeptFrames:
+        """The frames, which each track reads again."""
+        return KeptFrames(self.sequence)
 
     @property
     def first_frames(self) -> list[int]:

@@ -90,6 +90,7 @@ def track_stretches(
     options: StretchOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
     starts: Starts = _NO_STARTS,
+    read: Callable[[Iterable[int]], Iterable[Frame]] | None = None,
 ) -> TrackedStretches:
     """Track a hand in the stretches of a recording.
 
@@ -97,8 +98,9 @@ def track_stretches(
     progress: called with the number of tracked frames, and of all frames to track.
     starts: estimates to begin stretches with; that of the lowest energy in the first frame is used. Stretches without
         any go on with the track before them.
+    read: returns the frames of the recording with some indices; None to decode them.
     """
-    return track_hands(sequence, [hand], segmentation, threads, frames, options, progress, [starts])[0]
+    return track_hands(sequence, [hand], segmentation, threads, frames, options, progress, [starts], read)[0]
 
 
 def track_hands(
@@ -110,6 +112,7 @@ def track_hands(
     options: StretchOptions | None = None,
     progress: Callable[[int, int], None] | None = None,
     starts: Iterable[Starts] = (),
+    read: Callable[[Iterable[int]], Iterable[Frame]] | None = None,
 ) -> list[TrackedStretches]:
     """Track several hands in the same stretches of a recording, side by side.
 
@@ -145,7 +148,7 @@ def track_hands(
                 if progress is not None:
                     progress(done, len(indices))
 
-        reader = read_ahead(sequence.frames(indices), _AHEAD)
+        reader = read_ahead((read or sequence.frames)(indices), _AHEAD)
         for _, stretch in groupby(reader, lambda frame: bisect_right(first, frame.index)):
             images = list(stretch)
             waiting.append([hand.submit(images, pool) for hand in tracked])
