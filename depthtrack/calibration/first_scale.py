@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from depthtrack.calibration.recorded_views import CalibrationSource
+from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
+from depthtrack.tracking.guided_segmentation import segment_start
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stretches import Starts
 from depthtrack.tracking.tracker import Estimate
@@ -104,7 +106,7 @@ def lowest_of_parabola(x: Array, y: Array) -> float:
 
 
 class _Start(NamedTuple):
-    """An observation, and a pose (27,) in it."""
+    """An observation around a pose (27,), and that pose."""
 
     observation: Observation
     pose: Array
@@ -118,12 +120,16 @@ def _starts(source: CalibrationSource, hand: HandShape, pool: ThreadPoolExecutor
 
 def _start(source: CalibrationSource, hand: HandShape, frame: Frame) -> _Start | None:
     """Return the start of a hand in a frame, if it shows one."""
-    observation = Segmenter.for_sequence(source.sequence, source.segmentation).segment(frame)
+    segmenter = Segmenter.for_sequence(source.sequence, source.segmentation)
+    observation = segment_start(frame, segmenter, HandModel(hand))
     if observation is None:
         return None
     with closing(create_tracker(source.tracker, hand)) as tracker:
         pose = tracker.start(observation).pose
-    return None if pose is None else _Start(observation, pose)
+    if pose is None:
+        return None
+    around = observation.resegmentation.around(pose) if observation.resegmentation is not None else None
+    return _Start(observation if around is None else around, pose)
 
 
 def _fit(source: CalibrationSource, hand: HandShape, start: _Start) -> Estimate:

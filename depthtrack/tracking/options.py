@@ -66,6 +66,14 @@ class TrackingThresholds:
         unit="m/s",
         most=math.inf,
     )
+    start_shifts: tuple[float, ...] = option(
+        (-0.03, 0.03),
+        "Distances along the hand by which a start is moved, to be fitted there too; empty: none",
+        unit="m",
+        source="as `start_confidence`",
+        least=-1,
+        most=1,
+    )
     start_confidence: float = option(
         0.4,
         "A start with a lower confidence tries other places of the hand",

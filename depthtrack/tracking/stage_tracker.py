@@ -18,7 +18,7 @@ from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.stages.stage import Stage
-from depthtrack.tracking.start_choice import Start, is_doubtful, start_cost, tries_places
+from depthtrack.tracking.start_choice import Start, StartChoice
 from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.timing import Deadline, StageClock
 from depthtrack.tracking.tracker import ABSENT, Estimate
@@ -129,8 +129,8 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
-        It is absent if the stages find no candidate. A doubtful start tries other places of the hand; after a pause, it
-        searches again.
+        It is absent if the stages find no candidate. A start is moved along the hand; a doubtful one tries other places
+        of the hand, and after a pause it searches again.
 
         pose: (27,) given by the user.
         """
@@ -143,7 +143,7 @@ class StageTracker:
             self._state.update(estimate)
             return estimate
         if begins and self._deadline is None and observation.resegmentation is not None:
-            best = self._best_place(best, observation.resegmentation, lists, clock)
+            best = self._best_start(best, observation.resegmentation, lists, clock)
         if after_pause and self._deadline is None and best.confidence < self._thresholds.start_confidence:
             best = self._start_again(best, observation, clock)
         self.evidence = best.evidence
@@ -164,29 +164,23 @@ class StageTracker:
         again = self._propose(observation, {Status.STARTED: self._stages.start}, clock, repeat=1)
         return best if again is None or again.candidate.energy >= best.candidate.energy else again
 
-    def _best_place(
+    def _best_start(
         self,
         first: _Proposal,
         resegmentation: Resegmentation,
         lists: dict[Status, Sequence[Stage]],
         clock: StageClock,
     ) -> _Proposal:
-        """Return the best of a start and, if it is doubtful, of those at other places of the hand."""
-        if not tries_places(self._thresholds):
-            return first
-        start = self.start_at(first.candidate.pose, first.place, resegmentation)
+        """Return the best of a start and of those at other places of the hand."""
+        refine = {Status.STARTED: self._stages.refine}
+        choice = StartChoice[_Proposal](
+            self._thresholds,
+            search=lambda other: self._propose(other, lists, clock),
+            refine=lambda around, pose: self._propose(around, refine, clock, pose),
+            judge=self.start_at,
+        )
+        best = choice.best(first, resegmentation)
         clock.lap("target")
-        if not is_doubtful(start, self._thresholds):
-            return first
-        best, least = first, start_cost(start, self._thresholds)
-        for other in resegmentation.elsewhere():
-            found = self._propose(other, lists, clock)
-            if found is None:
-                continue
-            cost = start_cost(self.start_at(found.candidate.pose, found.place, resegmentation), self._thresholds)
-            clock.lap("target")
-            if cost < least:
-                best, least = found, cost
         return best
 
     def _propose(

@@ -1,12 +1,24 @@
 """The choice of a start among places of the hand.
 
-A forearm can resemble a hand, and the segmentation without a prior may leave fingers out. So a start is judged in the
-region of interest of its own pose, as the next frame is: what the hand leaves unexplained there counts.
+A forearm can resemble a hand, and the segmentation without a prior may leave fingers out or include too much of the
+forearm. So a start is judged in the region of interest of its own pose, as the next frame is: what the hand leaves
+unexplained there counts.
+
+Along the forearm, the energy of an observation without a prior hardly changes: the hand may slide there, with
+stretched fingers in the place of its palm. So a start is also moved along the hand, and fitted there. A doubtful start
+tries other places of the hand too, each with a search.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from depthtrack.geometry.rotations import rotation_matrix
+from depthtrack.hand.pose import ORIENTATION, POSITION
+from depthtrack.segmentation.observation import Observation, Resegmentation
+from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.options import TrackingThresholds
+from depthtrack.types import Array
 
 
 class Start(NamedTuple):
@@ -20,6 +32,73 @@ class Start(NamedTuple):
     energy: float
     confidence: float
     place: float
+
+
+class Proposal(Protocol):
+    """A candidate that a start may be.
+
+    place: cost of the place of the hand, see `Observation.cost`, metres.
+    """
+
+    @property
+    def candidate(self) -> Candidate: ...
+
+    @property
+    def place(self) -> float: ...
+
+
+P = TypeVar("P", bound=Proposal)
+
+
+@dataclass(frozen=True)
+class StartChoice(Generic[P]):
+    """Choice of the start that costs least.
+
+    search: returns the best proposal in an observation, or None.
+    refine: returns a pose (27,) fitted to an observation, or None.
+    judge: returns the start of a pose (27,) at a place of some cost, see `StageTracker.start_at`.
+    """
+
+    thresholds: TrackingThresholds
+    search: Callable[[Observation], P | None]
+    refine: Callable[[Observation, Array], P | None]
+    judge: Callable[[Array, float, Resegmentation], Start]
+
+    def best(self, first: P, resegmentation: Resegmentation) -> P:
+        """Return the best of a proposal, of those moved along the hand, and of other places if it is doubtful."""
+        if not (self.thresholds.start_shifts or tries_places(self.thresholds)):
+            return first
+        best, start = self._moved(first, resegmentation)
+        if not is_doubtful(start, self.thresholds):
+            return best
+        for other in resegmentation.elsewhere():
+            if (found := self.search(other)) is not None:
+                found, there = self._moved(found, resegmentation)
+                best, start = min((best, start), (found, there), key=self._cost)
+        return best
+
+    def _moved(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
+        """Return the best of a proposal and of those moved along the hand, each in the ROI of its pose."""
+        pose = first.candidate.pose
+        best = first, self.judge(pose, first.place, resegmentation)
+        for shift in self.thresholds.start_shifts:
+            moved = moved_along_hand(pose, shift)
+            around = resegmentation.around(moved)
+            found = None if around is None else self.refine(around, moved)
+            if found is not None:
+                start = self.judge(found.candidate.pose, first.place, resegmentation)
+                best = min(best, (found, start), key=self._cost)
+        return best
+
+    def _cost(self, proposed: tuple[P, Start]) -> float:
+        return start_cost(proposed[1], self.thresholds)
+
+
+def moved_along_hand(pose: Array, shift: float) -> Array:
+    """Return a pose (27,) moved by `shift` (m) from the wrist towards the fingers."""
+    moved = pose.copy()
+    moved[POSITION] += shift * rotation_matrix(pose[ORIENTATION])[:, 1]
+    return moved
 
 
 def tries_places(thresholds: TrackingThresholds) -> bool:

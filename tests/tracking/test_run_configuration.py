@@ -60,8 +60,8 @@ def _other(parameter: Parameter) -> Any:
         return max(1, value - 1) if value > 1 else value + 1
     if isinstance(value, float):
         return 0.9 * value + 0.001 if math.isfinite(value) else 1.0
-    if isinstance(value, tuple) and value and isinstance(value[0], float):
-        return tuple(0.9 * part + 0.001 for part in value)
+    if parameter.kind == tuple[float, ...] or (isinstance(value, tuple) and value and isinstance(value[0], float)):
+        return tuple(0.9 * part + 0.001 for part in value) or (0.01,)
     assert isinstance(value, tuple), parameter
     return [part if isinstance(part, str) else to_data(part) for part in value[1:]]
 

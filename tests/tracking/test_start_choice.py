@@ -6,23 +6,31 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.hand.kinematics import HandModel
+from depthtrack.hand.pose import make_pose
+from depthtrack.hand.postures import POSTURES
+from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesis, Synthesiser
+from depthtrack.tracking.candidate import Candidate
+from depthtrack.tracking.configuration import HybridConfig
+from depthtrack.tracking.frame import FrameContext, Toolkit
 from depthtrack.tracking.guided_segmentation import segment_start
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.stage_tracker import StageTracker
-from depthtrack.tracking.start_choice import Start, is_doubtful, start_cost, tries_places
+from depthtrack.tracking.start_choice import Start, is_doubtful, moved_along_hand, start_cost, tries_places
+from depthtrack.tracking.trackers.hybrid import hybrid
 from depthtrack.types import Array
 
 OPTIONS = TrackingThresholds()
-NEVER = TrackingThresholds(start_confidence=0, start_energy=math.inf)
+NEVER = TrackingThresholds(start_shifts=(), start_confidence=0, start_energy=math.inf)
 STARTS = st.builds(Start, st.floats(0, 3), st.floats(0, 1), st.floats(0, 1))
 
 
@@ -81,3 +89,44 @@ def test_a_start_is_judged_where_its_pose_is() -> None:
         half = Segmenter(None).segment(replace(frame, depth=cut))
         assert tracker.start_at(pose, 0.0, Around(half)).energy > 3 * right.energy
         assert tracker.start_at(pose, 0.0, Around(None)) == Start(math.inf, 0.0, 0.0)
+
+
+@given(st.floats(-0.1, 0.1))
+def test_a_move_along_the_hand_moves_all_joints_from_the_wrist_to_the_fingers(shift: float) -> None:
+    model, pose = HandModel(HandShape()), make_pose([0.1, 0.2, 0.5], [0.5, -0.1, 0.7, 0.5], POSTURES["open"])
+    wrist, knuckle = model.keypoints(pose)[[0, 9]]
+    moves = model.keypoints(moved_along_hand(pose, shift)) - model.keypoints(pose)
+    np.testing.assert_allclose(moves, np.broadcast_to(moves[0], moves.shape), atol=1e-12)
+    assert np.linalg.norm(moves[0]) == pytest.approx(abs(shift), abs=1e-12)
+    assert moves[0] @ (knuckle - wrist) * shift >= 0
+
+
+class Slides:
+    """Stage that finds the hand of a frame, moved along the forearm."""
+
+    name = "search"
+
+    def __init__(self, pose: Array) -> None:
+        self._pose = pose
+
+    def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
+        return frame.evaluate(self._pose[None])
+
+
+@pytest.mark.parametrize("slide", [-0.03, 0.03])
+def test_a_hand_that_slid_along_its_forearm_is_moved_back(slide: float) -> None:
+    made = Synthesiser(Synthesis(motion="everyday", model="skin", forearm=True, frames=1))
+    frame = Frame(0, 0.0, made[0].depth.astype(np.float32), None, made.sensor.camera)
+    hand, config = made.options.hand, HybridConfig()
+    errors = []
+    for thresholds in (config.thresholds, NEVER):
+        tools = Toolkit(hand, config.scoring)
+        stages = replace(hybrid(config, tools), start=[Slides(moved_along_hand(made[0].pose, slide))])
+        with closing(StageTracker("hybrid", stages, tools, thresholds, 0)) as tracker:
+            observation = segment_start(frame, Segmenter(None), HandModel(hand))
+            assert observation is not None
+            pose = tracker.start(observation).pose
+            assert pose is not None
+            errors.append(float(np.linalg.norm(HandModel(hand).keypoints(pose) - made[0].joints, axis=-1).mean()))
+    assert errors[0] < 0.003
+    assert errors[1] > 0.02
