@@ -1,4 +1,4 @@
-"""Choose how far starts are moved along the hand, and when and where doubtful ones try other places.
+"""Choose how starts are moved along the hand, and when doubtful ones try other places.
 
 Usage: tune_starts.py FOLDER --rig RIG.glb [...] [--seeds N] [--every N]
 

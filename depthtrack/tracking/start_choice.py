@@ -65,7 +65,10 @@ class StartChoice(Generic[P]):
     judge: Callable[[Array, float, Resegmentation], Start]
 
     def best(self, first: P, resegmentation: Resegmentation) -> P:
-        """Return the best of a proposal, of those moved along the hand, and of other places if it is doubtful."""
+        """Return the best of a proposal and of those moved along the hand.
+
+        A doubtful one tries other places too.
+        """
         if not (self.thresholds.start_shifts or tries_places(self.thresholds)):
             return first
         best, start = self._moved(first, resegmentation)
@@ -78,7 +81,10 @@ class StartChoice(Generic[P]):
         return best
 
     def _moved(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
-        """Return the best of a proposal and of those moved along the hand, each in the ROI of its pose."""
+        """Return the best of a proposal and of those moved along the hand.
+
+        Each is judged in the region of interest of its pose.
+        """
         pose = first.candidate.pose
         best = first, self.judge(pose, first.place, resegmentation)
         for shift in self.thresholds.start_shifts:
