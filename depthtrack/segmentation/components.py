@@ -28,7 +28,7 @@ class Runs(NamedTuple):
 def without_small_components(mask: Mask, share: float) -> Mask:
     """Return a mask (h, w) without 8-connected components below `share` of the largest one."""
     kept = np.zeros(mask.shape, np.bool_)
-    _paint_large(np.ascontiguousarray(mask), share, kept)
+    _paint_large(np.ascontiguousarray(mask).view(np.uint8), share, kept)
     return kept
 
 
@@ -86,9 +86,9 @@ def _unite(root: NDArray[np.int32], a: int, b: int) -> None:
 
 
 @compiled(nogil=True)
-def _paint_large(mask: Mask, share: float, out: Mask) -> None:
+def _paint_large(labels: Labels, share: float, out: Mask) -> None:
     """Set the components of at least `share` of the largest one's pixels in `out` (h, w)."""
-    runs = runs_of(mask)
+    runs = runs_of(labels)
     area, largest = np.zeros(runs.root.shape[0], np.int64), 0
     for k in range(runs.root.shape[0]):
         area[runs.root[k]] += runs.end[k] - runs.begin[k]

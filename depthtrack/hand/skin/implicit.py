@@ -30,9 +30,8 @@ from depthtrack.hand.skin.implicit_field import (
     Field,
     Web,
     WebTable,
-    finger_distance,
     hand_distance,
-    palm_distance,
+    part_distances,
 )
 from depthtrack.types import Array
 
@@ -99,13 +98,13 @@ class ImplicitHand:
         """Return the signed distance (N,) of points (N, 3) to the skin."""
         return np.asarray(hand_distance(self._field, np.ascontiguousarray(points)))
 
-    def finger_distance(self, points: Array, finger: int) -> Array:
-        """Return the signed distance (N,) of points (N, 3) to one finger alone."""
-        return np.asarray(finger_distance(self._field, np.ascontiguousarray(points), finger))
+    def part_distances(self, points: Array) -> tuple[Array, Array]:
+        """Return the signed distances of points (N, 3) to parts of the hand.
 
-    def palm_distance(self, points: Array) -> Array:
-        """Return the signed distance (N,) of points (N, 3) to the palm without muscles and webs."""
-        return np.asarray(palm_distance(self._field, np.ascontiguousarray(points)))
+        They are the palm without muscles and webs (N,), and each finger alone (N, 5).
+        """
+        parts = part_distances(self._field, np.ascontiguousarray(points))
+        return parts[0], np.ascontiguousarray(parts[1:].T)
 
     def bounds(self) -> tuple[Array, Array]:
         """Return the two corners (3,) of a bounding box of the hand."""

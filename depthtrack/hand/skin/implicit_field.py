@@ -167,18 +167,16 @@ def hand_distance(field: Field, points: Array) -> Array:
 
 
 @compiled(nogil=True, error_model="numpy")
-def finger_distance(field: Field, points: Array, finger: int) -> Array:
-    """Return the signed distance (N,) of points (N, 3) to one finger alone."""
-    out = np.empty(len(points))
-    _finger(field, finger, np.ascontiguousarray(points.T), np.empty(len(points)), out)
-    return out
+def part_distances(field: Field, points: Array) -> Array:
+    """Return the signed distances (6, N) of points (N, 3) to parts of the hand.
 
-
-@compiled(nogil=True, error_model="numpy")
-def palm_distance(field: Field, points: Array) -> Array:
-    """Return the signed distance (N,) of points (N, 3) to the palm without muscles and webs."""
-    out = np.empty(len(points))
-    _palm(field, np.ascontiguousarray(points.T), np.empty(len(points)), out)
+    They are the palm without muscles and webs, and each finger alone.
+    """
+    p, one = np.ascontiguousarray(points.T), np.empty(len(points))
+    out = np.empty((6, len(points)))
+    _palm(field, p, one, out[0])
+    for finger in range(5):
+        _finger(field, finger, p, one, out[1 + finger])
     return out
 
 

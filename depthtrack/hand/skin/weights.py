@@ -18,8 +18,7 @@ _BLEND = (1.4, 1.0, 1.0)
 
 def skin_weights(solid: ImplicitHand, vertices: Array, faces: Faces) -> Array:
     """Return convex weights (V, 16) of vertices (V, 3) on the skin at rest, palm frame, metres."""
-    to_finger = np.stack([solid.finger_distance(vertices, finger) for finger in range(5)], axis=-1)
-    to_palm = solid.palm_distance(vertices)
+    to_palm, to_finger = solid.part_distances(vertices)
     weights = np.zeros((len(vertices), BODY_COUNT))
 
     # The thumb shares its muscles with the palm: half each at equal distance.

@@ -62,7 +62,8 @@ def test_distances_are_those_of_numpy(shape: HandShape) -> None:
     points = low + (high - low) * np.random.default_rng(1).random((1001, 3))
     np.testing.assert_allclose(hand.distance(points), _whole(hand, points), atol=1e-15)
     np.testing.assert_allclose(hand.distance(points[:, ::-1][:, ::-1]), hand.distance(points), atol=0)
-    np.testing.assert_allclose(hand.palm_distance(points), _palm(hand, points), atol=1e-15)
+    to_palm, to_fingers = hand.part_distances(points)
+    np.testing.assert_allclose(to_palm, _palm(hand, points), atol=1e-15)
     for finger in range(5):
-        np.testing.assert_allclose(hand.finger_distance(points, finger), _finger(hand, points, finger), atol=1e-15)
+        np.testing.assert_allclose(to_fingers[:, finger], _finger(hand, points, finger), atol=1e-15)
     assert len(hand.distance(points[:0])) == 0
