@@ -79,28 +79,32 @@ def incidence_at(depth: Array, normal: Array, intrinsics: tuple[float, float, fl
     normal: (h, w, 3) unit vectors, camera frame.
     intrinsics: fx, fy, cx, cy, pixels.
     """
-    if depth[v, u] <= 0.0:
-        return math.pi / 2
     fx, fy, cx, cy = intrinsics
-    x, y = (u - cx) / fx, (v - cy) / fy
-    cosine = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2]) / math.sqrt(x * x + y * y + 1.0)
+    return incidence_along(depth[v, u], normal[v, u], (u - cx) / fx, (v - cy) / fy)
+
+
+@compiled(nogil=True, error_model="numpy")
+def incidence_along(depth: float, normal: Array, x: float, y: float) -> float:
+    """Return the `incidence` at a depth, metres, along the viewing ray (x, y, 1).
+
+    normal: (3,) unit vector, camera frame.
+    """
+    if depth <= 0.0:
+        return math.pi / 2
+    cosine = -(normal[0] * x + normal[1] * y + normal[2]) / math.sqrt(x * x + y * y + 1.0)
     return math.acos(min(max(cosine, 0.0), 1.0))
 
 
 @compiled(nogil=True, error_model="numpy")
-def steep_incidence_at(
-    depth: Array, normal: Array, intrinsics: tuple[float, float, float, float], v: int, u: int
-) -> float:
-    """Return the `incidence_at` of a pixel if it may reach 60 degrees, else 0.
+def steep_incidence_along(depth: float, normal: Array, x: float, y: float) -> float:
+    """Return the `incidence_along` a viewing ray if it may reach 60 degrees, else 0.
 
     Most angles are smaller, and take no root then.
     """
-    fx, fy, cx, cy = intrinsics
-    x, y = (u - cx) / fx, (v - cy) / fy
-    along = -(normal[v, u, 0] * x + normal[v, u, 1] * y + normal[v, u, 2])
-    if depth[v, u] > 0.0 and along > 0.0 and along * along > SURELY_FLAT * (x * x + y * y + 1.0):
+    along = -(normal[0] * x + normal[1] * y + normal[2])
+    if depth > 0.0 and along > 0.0 and along * along > SURELY_FLAT * (x * x + y * y + 1.0):
         return 0.0
-    return incidence_at(depth, normal, intrinsics, v, u)
+    return incidence_along(depth, normal, x, y)
 
 
 @compiled(nogil=True)

@@ -29,9 +29,9 @@ from depthtrack.synthesis.sensors.geometry import (
     SURELY_FLAT,
     dropout_probability,
     edges,
-    incidence_at,
+    incidence_along,
     shadow,
-    steep_incidence_at,
+    steep_incidence_along,
 )
 from depthtrack.types import Array, Array32, Mask
 
@@ -111,26 +111,27 @@ def _read(
 ) -> None:
     height, width = depth.shape
     places, quantiles = wander
-    plain, x = np.empty(width, np.bool_), np.empty(width)
+    plain, x, y = np.empty(width, np.bool_), np.empty(width), np.empty(height)
     for u in range(width):
         x[u] = (u - lens[2]) / lens[0]
     for v in range(height):
-        y = (v - lens[3]) / lens[1]
-        _read_plain(depth[v], normal[v], x, y, edge[v], dark[v], error[v], limits, plain, out[v])
+        y[v] = (v - lens[3]) / lens[1]
+    for v in range(height):
+        _read_plain(depth[v], normal[v], x, y[v], edge[v], dark[v], error[v], limits, plain, out[v])
         for u in range(width):
             if plain[u]:
                 continue
             z, row, column = depth[v, u], v, u
             # Lateral noise: near a silhouette, a pixel may read the surface beside it.
             if edge[v, u] or z <= 0.0:
-                sigma = lateral_noise(incidence_at(depth, normal, lens, v, u) if z > 0.0 else 0.0)
+                sigma = lateral_noise(incidence_along(z, normal[v, u], x[u], y[v]) if z > 0.0 else 0.0)
                 us = min(max(u + round(sigma * quantiles[places[0, v, u]]), 0), width - 1)
                 vs = min(max(v + round(sigma * quantiles[places[1, v, u]]), 0), height - 1)
                 if abs(depth[vs, us] - z) > JUMP * z:
                     z, row, column = depth[vs, us], vs, us
             if z <= 0.0 or dark[row, column]:
                 continue
-            angle = steep_incidence_at(depth, normal, lens, row, column)
+            angle = steep_incidence_along(z, normal[row, column], x[column], y[row])
             dropout = dropout_probability(edge[v, u], angle, _EDGE_DROPOUT, _GRAZING[0], _GRAZING[1])
             if uniform_of(words[v, u]) < dropout:
                 continue
