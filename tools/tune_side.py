@@ -3,12 +3,14 @@
 Usage: tune_side.py FOLDER --rig RIG.glb [...] [--first-seed N] [--seeds N] [--frames N] [--motion NAME ...]
 
 The recordings are those of the tuning seeds of the cross-model benchmark. Hands of both sides are calibrated on those
-whose side the average hands leave open. Printed for each weight are the right sides, the sides called sure, and the
-right ones of those. The folder holds the figures of each recording, from which an interrupted choice continues.
+whose side the average hands leave open. Printed for each weight and largest factor of the sizes are the right sides,
+the sides called sure, and the right ones of those. The folder holds the figures of each recording, from which an
+interrupted choice continues.
 """
 
 import argparse
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +32,7 @@ from depthtrack.hand.size_parameters import COUNT, size_deviation
 from depthtrack.tracking.side_choice import SideOptions, choose_side, mean_energies
 
 WEIGHTS = (0.0, 0.005, 0.01, 0.02, 0.03, 0.05)
+COSTS = (1.2, 1.3, 1.5, 2.0)
 OPTIONS = CalibrationOptions()
 
 
@@ -52,25 +55,25 @@ def main() -> None:
     cells = [cell for cell in recording_cells(options) if cell["motion"] in chosen.motion]
     with Journal(chosen.folder / "sides.jsonl", list(cells[0])) as journal:
         rows = run_sweep(measure_sides, cells, journal, chosen_workers(None))
-    for weight in WEIGHTS:
-        margins = np.array([margin(row, weight) for row in rows])
+    for weight, cost in product(WEIGHTS, COSTS):
+        margins = np.array([margin(row, replace(OPTIONS, size_weight=weight, size_cost=cost)) for row in rows])
         needed = np.array([OPTIONS.sure_margin if row["open"] else SideOptions().sure_margin for row in rows])
         sure = (np.abs(margins) >= np.log1p(needed)) & (margins * np.array([row["average"] for row in rows]) >= 0)
         print(
-            f"weight {weight:g}: {(margins > 0).sum()} of {len(rows)} sides right, {sure.sum()} sure, "
-            f"{(margins[sure] > 0).sum()} of them right; least margin of a right one that is sure "
+            f"weight {weight:g}, at most {cost:g}: {(margins > 0).sum()} of {len(rows)} sides right, "
+            f"{sure.sum()} sure, {(margins[sure] > 0).sum()} of them right; least margin of a right one that is sure "
             f"{np.expm1(margins[sure & (margins > 0)].min()):.2f}, largest of a wrong one "
             f"{np.expm1(-margins.min()) if (margins < 0).any() else 0:.2f}"
         )
 
 
-def margin(row: Row, weight: float) -> float:
+def margin(row: Row, options: CalibrationOptions) -> float:
     """Return the logarithm of the cost of the wrong side over that of the right one."""
     if not row["open"]:
         return float(row["margin"])
     sides: tuple[Side, Side] = ("right", "left")
     deviations = {side: float(row[f"{side}_deviation"]) for side in sides}
-    factors = size_costs(deviations, replace(OPTIONS, size_weight=weight))
+    factors = size_costs(deviations, options)
     side: Side = row["side"]
     return float(row["margin"] + np.log(factors[other_side(side)] / factors[side]))
 
