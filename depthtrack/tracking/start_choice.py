@@ -83,18 +83,22 @@ class StartChoice(Generic[P]):
     def _moved(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
         """Return the best of a proposal and of those moved along the hand.
 
-        Each is judged in the region of interest of its pose.
+        Each is judged in the region of interest of its pose. The best one is fitted there too.
         """
         pose = first.candidate.pose
-        best = first, self.judge(pose, first.place, resegmentation)
+        unmoved = best = first, self.judge(pose, first.place, resegmentation)
         for shift in self.thresholds.start_shifts:
-            moved = moved_along_hand(pose, shift)
-            around = resegmentation.around(moved)
-            found = None if around is None else self.refine(around, moved)
-            if found is not None:
-                start = self.judge(found.candidate.pose, first.place, resegmentation)
-                best = min(best, (found, start), key=self._cost)
-        return best
+            found = self._fitted(moved_along_hand(pose, shift), first.place, resegmentation)
+            best = best if found is None else min(best, found, key=self._cost)
+        if best is unmoved:
+            return best
+        return self._fitted(best[0].candidate.pose, first.place, resegmentation) or best
+
+    def _fitted(self, pose: Array, place: float, resegmentation: Resegmentation) -> tuple[P, Start] | None:
+        """Return a pose (27,) fitted in the region of interest around it, or None."""
+        around = resegmentation.around(pose)
+        found = None if around is None else self.refine(around, pose)
+        return None if found is None else (found, self.judge(found.candidate.pose, place, resegmentation))
 
     def _cost(self, proposed: tuple[P, Start]) -> float:
         return start_cost(proposed[1], self.thresholds)
