@@ -21,11 +21,13 @@ from depthtrack.types import Array
 class SideOptions:
     """Frames that both sides are tracked in, and the margin of a certain side."""
 
-    stretches: StretchOptions = option(StretchOptions(), "Frames that both sides are tracked in")
+    stretches: StretchOptions = option(StretchOptions(anew=True), "Frames that both sides are tracked in")
     sure_margin: float = option(0.25, "Share by which the other side's energy is higher if the side is certain")
 
 
 DEFAULTS = SideOptions()
+_MOST = 1.5
+"""Multiple of its median that an energy counts as at most. A track of the right side may have begun wrong."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +99,13 @@ def track_sides(
 def mean_energies(tracked: Mapping[Side, Array]) -> tuple[dict[Side, float], int]:
     """Return the mean energy of each side, and the number of frames with both poses.
 
-    tracked: energies (N,) of each side in the same frames; NaN without a pose. Such frames do not count.
+    tracked: energies (N,) of each side in the same frames; NaN without a pose. Such frames do not count. Energies far
+        above the median count less.
     """
     energies: Array = np.array(list(tracked.values()))
     known = np.isfinite(energies).all(axis=0)
     if not known.any():
         return dict.fromkeys(tracked, np.inf), 0
-    means = energies[:, known].mean(axis=1).tolist()
+    energies = energies[:, known]
+    means = np.minimum(energies, _MOST * np.median(energies, axis=1, keepdims=True)).mean(axis=1).tolist()
     return dict(zip(tracked, means, strict=True)), int(known.sum())

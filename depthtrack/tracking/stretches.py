@@ -41,6 +41,7 @@ class StretchOptions:
     stretches: int = option(8, "Stretches of the recording, evenly spread")
     stretch_frames: int = option(20, "Frames of each stretch", unit="frames")
     views: int = option(32, "Frames kept as views, at most, evenly spread over those", unit="frames")
+    anew: bool = option(False, "Begin each stretch anew too; the track of the lower energy goes on")
     tracker: TrackerConfig = option(HybridConfig(), "Tracker")
 
     def ranges(self, length: int) -> list[range]:
@@ -136,7 +137,7 @@ def track_hands(
 
         pool = stack.enter_context(ThreadPoolExecutor(threads, "stretches"))
         tracked = [
-            _Tracked(partial(begun, hand), known[number] if known else _NO_STARTS, every)
+            _Tracked(partial(begun, hand), known[number] if known else _NO_STARTS, every, options.anew)
             for number, hand in enumerate(hands)
         ]
 
@@ -195,13 +196,15 @@ class _Tracked:
     begun: returns a new pipeline.
     starts: estimates to begin stretches with.
     every: every n-th frame may become a view.
+    anew: whether each stretch begins anew too.
     """
 
-    def __init__(self, begun: Callable[[], Pipeline], starts: Starts, every: int) -> None:
-        self._begun, self._starts, self._every = begun, starts, every
+    def __init__(self, begun: Callable[[], Pipeline], starts: Starts, every: int, anew: bool) -> None:
+        self._begun, self._starts, self._every, self._anew = begun, starts, every, anew
         self._stretches, self._frames = list[_Stretch](), 0
         self._pipeline: Pipeline | None = None
         self._before: Future[int] | None = None
+        self._last: Estimate | None = None
 
     def submit(self, frames: list[Frame], pool: ThreadPoolExecutor) -> Future[int]:
         """Track the next stretch in a thread; the result is the number of its frames."""
@@ -228,12 +231,15 @@ class _Tracked:
         """Track the hand in frames, the first one with this number, if those before are finished."""
         if before is not None:
             before.result()
+        if self._anew and before is not None and self._last is not None:
+            starts = (self._last, self._begun().step(frames[0]).estimate)
         if starts:
             pipeline.restore([self._best(starts, frames[0])])
         for number, frame in enumerate(frames, first):
             tracked = pipeline.step(frame)
             estimate, observation = tracked.estimate, tracked.observation
             stretch.energies.append(estimate.energy)
+            self._last = estimate
             trusted = estimate if estimate.status.is_trusted else None
             if frame.index in stretch.frames:
                 stretch.ends.append(trusted)

@@ -1,5 +1,7 @@
 """The side of a hand, from tracks of both sides."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,11 @@ from depthtrack.hand.size_parameters import COUNT, SCALE, prior_covariance, size
 from depthtrack.recording import SequenceWriter, open_sequence
 from depthtrack.recording.run_folder import Run
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking import stretches
 from depthtrack.tracking.run_configuration import RunConfiguration
-from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side
+from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies
 from depthtrack.tracking.stretches import Starts, StretchOptions, track_hands, track_stretches
+from depthtrack.tracking.tracker import ABSENT, Estimate
 
 OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
 
@@ -67,6 +71,50 @@ def test_stretches_begin_with_estimates_of_their_first_frames(tmp_path: Path) ->
     assert reported == 3 * [(3, 6), (6, 6)]
 
 
+@dataclass
+class Stepped:
+    """What a pipeline states about a frame."""
+
+    estimate: Estimate
+    observation: None = None
+
+
+class Stuck:
+    """Pipeline that keeps the energy that it begins with."""
+
+    def __init__(self, energy: float) -> None:
+        self._estimate = replace(ABSENT, energy=energy)
+
+    def restore(self, estimates: Sequence[Estimate]) -> None:
+        self._estimate = estimates[-1]
+
+    def step(self, frame: object) -> Stepped:
+        return Stepped(self._estimate)
+
+
+@pytest.mark.parametrize(("anew", "energies"), [(True, [3, 3, 1, 1, 1, 1]), (False, [3] * 6)])
+def test_a_track_that_began_wrong_begins_anew_in_the_next_stretch(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, anew: bool, energies: list[float]
+) -> None:
+    begun = iter([3.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+    monkeypatch.setattr(stretches, "Pipeline", lambda *rest: Stuck(next(begun)))
+    write_recording(Synthesiser(Synthesis(frames=6)), tmp_path / "recording")
+    options = StretchOptions(stretches=3, stretch_frames=2, anew=anew)
+    found = track_stretches(open_sequence(tmp_path / "recording"), HandShape(), options=options)
+    assert found.energies.tolist() == energies
+
+
+def test_frames_that_began_wrong_make_no_side_certain() -> None:
+    right, left = np.full(40, 14.0), np.full(40, 14.5)
+    left[:10] = 48.0
+    means, count = mean_energies({"right": right, "left": left})
+    assert count == 40
+    assert means["right"] == 14.0
+    assert means["left"] / means["right"] - 1 < SideOptions().sure_margin
+    worse, _ = mean_energies({"right": right, "left": left + 5})
+    assert worse["left"] > means["left"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_side_is_found_and_its_hand_tracked(tmp_path: Path, side: Side, capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,8 +159,6 @@ def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys:
 
 @pytest.mark.parametrize("sure", [True, False])
 def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.MonkeyPatch, sure: bool) -> None:
-    from dataclasses import dataclass
-
     @dataclass(frozen=True)
     class Measured:
         hand: HandShape
@@ -160,8 +206,8 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
 
 def test_uncommon_sizes_raise_the_cost_of_a_side_up_to_a_limit() -> None:
     options = CalibrationOptions()
-    factors = sides.size_costs({"right": 40.0, "left": 60.0}, options)
-    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(20 * options.size_weight))}
+    factors = sides.size_costs({"right": 40.0, "left": 50.0}, options)
+    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(10 * options.size_weight))}
     assert sides.size_costs({"right": 1e9, "left": 0.0}, options) == {"right": options.size_cost, "left": 1.0}
     # One standard deviation of the scale of people, and none of another size.
     values = np.zeros(COUNT)
