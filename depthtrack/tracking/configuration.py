@@ -268,7 +268,9 @@ class Oikonomidis2011Config:
     search: GlobalSearchOptions = option(GlobalSearchOptions(follow_arm=False), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(refine=False), "Swarms of a search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(longest_gap=math.inf, start_shifts=(), start_confidence=0, start_energy=math.inf),
+        TrackingThresholds(
+            longest_gap=math.inf, start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf
+        ),
         "Trust in a pose; not part of the paper",
         advanced=True,
     )
@@ -294,7 +296,9 @@ class Schroeder2014Config:
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(longest_gap=math.inf, start_shifts=(), start_confidence=0, start_energy=math.inf),
+        TrackingThresholds(
+            longest_gap=math.inf, start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf
+        ),
         "Trust in a pose; not part of the paper",
         advanced=True,
     )

@@ -74,6 +74,14 @@ class TrackingThresholds:
         least=-1,
         most=1,
     )
+    start_bends: tuple[float, ...] = option(
+        (0.5,),
+        "Angles by which all fingers of a start are bent further, to be fitted there too; empty: none",
+        unit="rad",
+        source="as `start_confidence`",
+        least=-3,
+        most=3,
+    )
     start_confidence: float = option(
         0.4,
         "A start with a lower confidence tries other places of the hand",

@@ -5,8 +5,9 @@ forearm. So a start is judged in the region of interest of its own pose, as the 
 unexplained there counts.
 
 Along the forearm, the energy of an observation without a prior hardly changes: the hand may slide there, with
-stretched fingers in the place of its palm. So a start is also moved along the hand, and fitted there. A doubtful start
-tries other places of the hand too, each with a search.
+stretched fingers in the place of its palm. So a start is also moved along the hand, and fitted there. Searches of
+single fingers do not find that all are bent: a start with all fingers bent further is fitted too. A doubtful start
+tries other places of the hand, each with a search.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,8 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from depthtrack.geometry.rotations import rotation_matrix
-from depthtrack.hand.pose import ORIENTATION, POSITION
+from depthtrack.hand.limits import within_limits
+from depthtrack.hand.pose import ANGLES, ORIENTATION, POSITION
 from depthtrack.segmentation.observation import Observation, Resegmentation
 from depthtrack.tracking.candidate import Candidate
 from depthtrack.tracking.options import TrackingThresholds
@@ -65,32 +67,37 @@ class StartChoice(Generic[P]):
     judge: Callable[[Array, float, Resegmentation], Start]
 
     def best(self, first: P, resegmentation: Resegmentation) -> P:
-        """Return the best of a proposal and of those moved along the hand.
+        """Return the best of a proposal and of those moved or bent.
 
         A doubtful one tries other places too.
         """
-        if not (self.thresholds.start_shifts or tries_places(self.thresholds)):
+        changes = self.thresholds.start_shifts or self.thresholds.start_bends
+        if not (changes or tries_places(self.thresholds)):
             return first
-        best, start = self._moved(first, resegmentation)
+        best, start = self._changed(first, resegmentation)
         if not is_doubtful(start, self.thresholds):
             return best
         for other in resegmentation.elsewhere():
             if (found := self.search(other)) is not None:
-                found, there = self._moved(found, resegmentation)
+                found, there = self._changed(found, resegmentation)
                 best, start = min((best, start), (found, there), key=self._cost)
         return best
 
-    def _moved(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
-        """Return the best of a proposal and of those moved along the hand.
+    def _changed(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
+        """Return the best of a proposal and of those moved, then of that and of those bent.
 
         Each is judged in the region of interest of its pose. The best one is fitted there too.
         """
-        pose = first.candidate.pose
-        unmoved = best = first, self.judge(pose, first.place, resegmentation)
-        for shift in self.thresholds.start_shifts:
-            found = self._fitted(moved_along_hand(pose, shift), first.place, resegmentation)
-            best = best if found is None else min(best, found, key=self._cost)
-        if best is unmoved:
+        unchanged = best = first, self.judge(first.candidate.pose, first.place, resegmentation)
+        for change, amounts in (
+            (moved_along_hand, self.thresholds.start_shifts),
+            (bent_further, self.thresholds.start_bends),
+        ):
+            pose = best[0].candidate.pose
+            for amount in amounts:
+                found = self._fitted(change(pose, amount), first.place, resegmentation)
+                best = best if found is None else min(best, found, key=self._cost)
+        if best is unchanged:
             return best
         return self._fitted(best[0].candidate.pose, first.place, resegmentation) or best
 
@@ -109,6 +116,16 @@ def moved_along_hand(pose: Array, shift: float) -> Array:
     moved = pose.copy()
     moved[POSITION] += shift * rotation_matrix(pose[ORIENTATION])[:, 1]
     return moved
+
+
+def bent_further(pose: Array, angle: float) -> Array:
+    """Return a pose (27,) with all joints of the four fingers bent by `angle` (rad).
+
+    Angles stay within the limits.
+    """
+    bent = pose.copy()
+    bent[ANGLES].reshape(5, 4)[1:, 1:] += angle
+    return within_limits(bent)
 
 
 def tries_places(thresholds: TrackingThresholds) -> bool:

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from depthtrack.hand.kinematics import HandModel
-from depthtrack.hand.pose import make_pose
+from depthtrack.hand.limits import within_limits
+from depthtrack.hand.pose import ANGLES, make_pose
 from depthtrack.hand.postures import POSTURES
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame
@@ -25,12 +26,19 @@ from depthtrack.tracking.guided_segmentation import segment_start
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.stage_tracker import StageTracker
-from depthtrack.tracking.start_choice import Start, is_doubtful, moved_along_hand, start_cost, tries_places
+from depthtrack.tracking.start_choice import (
+    Start,
+    bent_further,
+    is_doubtful,
+    moved_along_hand,
+    start_cost,
+    tries_places,
+)
 from depthtrack.tracking.trackers.hybrid import hybrid
 from depthtrack.types import Array
 
 OPTIONS = TrackingThresholds()
-NEVER = TrackingThresholds(start_shifts=(), start_confidence=0, start_energy=math.inf)
+NEVER = TrackingThresholds(start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf)
 STARTS = st.builds(Start, st.floats(0, 3), st.floats(0, 1), st.floats(0, 1))
 
 
@@ -101,8 +109,22 @@ def test_a_move_along_the_hand_moves_all_joints_from_the_wrist_to_the_fingers(sh
     assert moves[0] @ (knuckle - wrist) * shift >= 0
 
 
-class Slides:
-    """Stage that finds the hand of a frame, moved along the forearm."""
+@given(st.floats(-3, 3))
+def test_a_bend_turns_the_joints_of_the_fingers_alone_and_within_the_limits(angle: float) -> None:
+    pose = make_pose([0.1, 0.2, 0.5], [0.5, -0.1, 0.7, 0.5], POSTURES["open"])
+    bent = bent_further(pose, angle)
+    np.testing.assert_array_equal(bent, within_limits(bent))
+    before, after = (each[ANGLES].reshape(5, 4) for each in (within_limits(pose), bent))
+    np.testing.assert_array_equal(before[0], after[0])
+    np.testing.assert_array_equal(before[:, 0], after[:, 0])
+    np.testing.assert_array_equal(pose[: ANGLES.start], bent[: ANGLES.start])
+    changes = (after - before)[1:, 1:]
+    assert np.all(changes * np.sign(angle) >= 0)
+    assert np.all(np.abs(changes) <= abs(angle) + 1e-12)
+
+
+class Found:
+    """Stage that finds a pose."""
 
     name = "search"
 
@@ -118,10 +140,11 @@ def test_a_hand_that_slid_along_its_forearm_is_moved_back(slide: float) -> None:
     made = Synthesiser(Synthesis(motion="everyday", model="skin", forearm=True, frames=1))
     frame = Frame(0, 0.0, made[0].depth.astype(np.float32), None, made.sensor.camera)
     hand, config = made.options.hand, HybridConfig()
+    moves = replace(NEVER, start_shifts=config.thresholds.start_shifts)
     errors = []
-    for thresholds in (config.thresholds, NEVER):
+    for thresholds in (moves, NEVER):
         tools = Toolkit(hand, config.scoring)
-        stages = replace(hybrid(config, tools), start=[Slides(moved_along_hand(made[0].pose, slide))])
+        stages = replace(hybrid(config, tools), start=[Found(moved_along_hand(made[0].pose, slide))])
         with closing(StageTracker("hybrid", stages, tools, thresholds, 0)) as tracker:
             observation = segment_start(frame, Segmenter(None), HandModel(hand))
             assert observation is not None
@@ -130,3 +153,23 @@ def test_a_hand_that_slid_along_its_forearm_is_moved_back(slide: float) -> None:
             errors.append(float(np.linalg.norm(HandModel(hand).keypoints(pose) - made[0].joints, axis=-1).mean()))
     assert errors[0] < 0.003
     assert errors[1] > 0.02
+
+
+def test_a_start_with_stretched_fingers_is_bent() -> None:
+    """The fingers of a half-open hand are found stretched; the fit alone leaves them so."""
+    made = Synthesiser(Synthesis(motion="grasp", model="skin", forearm=True, frames=60))
+    index = len(made) - 1
+    frame = Frame(0, 0.0, made[index].depth.astype(np.float32), None, made.sensor.camera)
+    hand, config = made.options.hand, HybridConfig()
+    errors = []
+    for bends in ((0.5,), ()):
+        tools = Toolkit(hand, config.scoring)
+        stages = replace(hybrid(config, tools), start=[Found(bent_further(made[index].pose, -0.6))])
+        tracker = StageTracker("hybrid", stages, tools, replace(NEVER, start_bends=bends), 0)
+        with closing(tracker):
+            observation = segment_start(frame, Segmenter(None), HandModel(hand))
+            assert observation is not None
+            pose = tracker.start(observation).pose
+            assert pose is not None
+            errors.append(float(np.linalg.norm(HandModel(hand).keypoints(pose) - made[index].joints, axis=-1).mean()))
+    assert errors[0] < 0.5 * errors[1]
