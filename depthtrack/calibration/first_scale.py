@@ -106,7 +106,7 @@ def lowest_of_parabola(x: Array, y: Array) -> float:
 
 
 class _Start(NamedTuple):
-    """An observation around a pose (27,), and that pose."""
+    """An observation, and a pose (27,) in it."""
 
     observation: Observation
     pose: Array
@@ -126,10 +126,7 @@ def _start(source: CalibrationSource, hand: HandShape, frame: Frame) -> _Start |
         return None
     with closing(create_tracker(source.tracker, hand)) as tracker:
         pose = tracker.start(observation).pose
-    if pose is None:
-        return None
-    around = observation.resegmentation.around(pose) if observation.resegmentation is not None else None
-    return _Start(observation if around is None else around, pose)
+    return None if pose is None else _Start(observation, pose)
 
 
 def _fit(source: CalibrationSource, hand: HandShape, start: _Start) -> Estimate:
