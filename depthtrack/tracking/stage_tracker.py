@@ -129,7 +129,7 @@ class StageTracker:
     ) -> Estimate:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
-        It is absent if the stages find no candidate. A start is moved along the hand; a doubtful one tries other places
+        It is absent if the stages find no candidate. A start is also moved and bent; a doubtful one tries other places
         of the hand, and after a pause it searches again.
 
         pose: (27,) given by the user.
@@ -171,7 +171,7 @@ class StageTracker:
         lists: dict[Status, Sequence[Stage]],
         clock: StageClock,
     ) -> _Proposal:
-        """Return the best of a start and of those at other places of the hand."""
+        """Return the best of a start, of those moved or bent, and of those at other places."""
         refine = {Status.STARTED: self._stages.refine}
         choice = StartChoice[_Proposal](
             self._thresholds,

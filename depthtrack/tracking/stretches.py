@@ -180,11 +180,12 @@ def refine_views(
 class _Stretch(NamedTuple):
     """Result of a hand in one stretch; see `TrackedStretches`.
 
+    estimates: of all its frames.
     frames: its frames, the first one and the last one.
     ends: trusted estimates in them, None without.
     """
 
-    energies: list[float]
+    estimates: list[Estimate]
     views: list[TrackedView]
     frames: tuple[int, int]
     ends: list[Estimate | None]
@@ -204,7 +205,6 @@ class _Tracked:
         self._stretches, self._frames = list[_Stretch](), 0
         self._pipeline: Pipeline | None = None
         self._before: Future[int] | None = None
-        self._last: Estimate | None = None
 
     def submit(self, frames: list[Frame], pool: ThreadPoolExecutor) -> Future[int]:
         """Track the next stretch in a thread; the result is the number of its frames."""
@@ -214,7 +214,10 @@ class _Tracked:
         )
         if self._pipeline is None or starts:
             self._pipeline, self._before = self._begun(), None
-        self._before = pool.submit(self._track, self._pipeline, frames, self._frames, stretch, self._before, starts)
+        last = self._stretches[-1] if self._before is not None else None
+        self._before = pool.submit(
+            self._track, self._pipeline, frames, self._frames, stretch, self._before, starts, last
+        )
         self._stretches.append(stretch)
         self._frames += len(frames)
         return self._before
@@ -227,19 +230,22 @@ class _Tracked:
         stretch: _Stretch,
         before: Future[int] | None,
         starts: tuple[Estimate, ...],
+        last: _Stretch | None,
     ) -> int:
-        """Track the hand in frames, the first one with this number, if those before are finished."""
+        """Track the hand in frames, the first one with this number, if those before are finished.
+
+        last: the stretch that the track goes on from, if any.
+        """
         if before is not None:
             before.result()
-        if self._anew and before is not None and self._last is not None:
-            starts = (self._last, self._begun().step(frames[0]).estimate)
+        if self._anew and last is not None:
+            starts = (last.estimates[-1], self._begun().step(frames[0]).estimate)
         if starts:
             pipeline.restore([self._best(starts, frames[0])])
         for number, frame in enumerate(frames, first):
             tracked = pipeline.step(frame)
             estimate, observation = tracked.estimate, tracked.observation
-            stretch.energies.append(estimate.energy)
-            self._last = estimate
+            stretch.estimates.append(estimate)
             trusted = estimate if estimate.status.is_trusted else None
             if frame.index in stretch.frames:
                 stretch.ends.append(trusted)
@@ -261,7 +267,7 @@ class _Tracked:
 
     def found(self) -> TrackedStretches:
         """Return the results of the finished stretches."""
-        energies = np.array([energy for each in self._stretches for energy in each.energies])
+        energies = np.array([estimate.energy for each in self._stretches for estimate in each.estimates])
         views = tuple(view for each in self._stretches for view in each.views)
         starts = {each.frames[0]: [each.ends[0]] for each in self._stretches}
         for one, other in pairwise(self._stretches):

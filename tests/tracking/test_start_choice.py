@@ -58,9 +58,11 @@ def test_a_start_without_readings_around_it_is_doubtful_and_costs_most(start: St
     assert start_cost(nothing, OPTIONS) > start_cost(start, OPTIONS)
 
 
-def test_trackers_of_papers_try_no_places() -> None:
+def test_trackers_of_papers_try_no_places_moves_or_bends() -> None:
     for name in ("oikonomidis2011", "schroeder2014"):
-        assert not tries_places(tracker_config(name).thresholds)
+        thresholds = tracker_config(name).thresholds
+        assert not tries_places(thresholds)
+        assert (thresholds.start_shifts, thresholds.start_bends) == ((), ())
     assert not is_doubtful(Start(math.inf, 0.0, 0.0), NEVER)
     assert tries_places(OPTIONS)
 
