@@ -4,10 +4,10 @@ Usage: tune_starts.py FOLDER --rig RIG.glb [...] [--seeds N] [--every N]
 
 The recordings are those of the tuning seeds of the cross-model benchmark. `hybrid` starts in single frames, at all
 places of the hand, with two hands: one with the joints of the rig, and the average one. Each start is moved along the
-hand too. Each set of the options in `CHOICES` then chooses among these starts. Printed are the sets with the fewest
-wrong starts, and the default one. A wrong start has a mean joint error of 20 mm; open and half-open hands are counted
-apart. The number of other places that a start tries is that of further searches. The folder holds the starts, from
-which an interrupted choice continues.
+hand too, and not bent. Each set of the options in `CHOICES` then chooses among these starts. Printed are the sets with
+the fewest wrong starts, and the default one. A wrong start has a mean joint error of 20 mm; open and half-open hands
+are counted apart. The number of other places that a start tries is that of further searches. The folder holds the
+starts, from which an interrupted choice continues.
 """
 
 import argparse

@@ -93,7 +93,7 @@ class CalibrationOptions:
         source="tools/tune_side.py on tuning seeds of the cross-model benchmark",
         most=1,
     )
-    size_cost: float = option(1.5, "Largest factor of that", source="as `size_weight`", least=1, most=1000)
+    size_cost: float = option(1.5, "Largest factor of that", source="report seeds 1028 to 1036", least=1, most=1000)
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
 
