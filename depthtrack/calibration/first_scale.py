@@ -1,8 +1,7 @@
 """Size of the whole hand from single frames, before it is tracked.
 
 A hand of a wrong size fits other things as well as the hand, such as the end of a forearm. The average hand is started
-in a few frames. Hands of other sizes are fitted from its poses. The median energy has its minimum near the right size,
-for hands of both sides.
+in a few frames. Hands of other sizes are fitted from its poses. The median energy has its minimum near the right size.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +41,7 @@ def first_hand(source: CalibrationSource, side: Side = "right") -> FirstHand:
 
     Its scale is 1 if fewer than `CalibrationOptions.fewest` frames show a hand, or `first_scales` is empty.
 
-    side: of the average hand; the scale hardly depends on it.
+    side: of the hand. A hand of the wrong side is often smaller.
     """
     scales = sorted(source.options.first_scales)
     if len(scales) < 2:
@@ -68,7 +67,7 @@ def best_scale(scales: Sequence[float], fitted: Callable[[float], list[Estimate]
 
     def energy(number: int) -> float:
         found[number] = fitted(scales[number])
-        return float(np.median([estimate.energy for estimate in found[number]]))
+        return float(np.median([estimate.comparable_energy for estimate in found[number]]))
 
     energies = around_lowest(len(scales), int(np.argmin(np.abs(np.log(scales)))), energy)
     tried = sorted(energies)

@@ -194,7 +194,7 @@ class OngoingPipeline(Closing):
         estimates = {side: each.estimate for side, each in tracked.items()}
         if self.side_sure or any(each.pose is None for each in estimates.values()):
             return
-        self._energies = {side: self._energies[side] + each.energy for side, each in estimates.items()}
+        self._energies = {side: self._energies[side] + each.comparable_energy for side, each in estimates.items()}
         if self._excess(self.side) >= self._options.lead_margin:
             self.side = other_side(self.side)
 

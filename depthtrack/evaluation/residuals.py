@@ -53,7 +53,7 @@ def visible_silhouette(surface: HandSurface, pose: Array, observation: Observati
     rendered = surface.silhouette(pose, camera)
     if observation.occluder is None:
         return rendered
-    depth = surface.render(pose, observation.camera).depth
+    depth = surface.render(pose, observation.camera).depth.astype(np.float32)
     hidden = (depth > 0) & (observation.unhidden(depth, Objective().hidden_depth) == 0)
     return rendered & ~observation.region.paste(hidden, camera.rect)
 

@@ -1,6 +1,7 @@
 """The observed silhouette and depth maps that hypotheses are scored against."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.types import Array, Depth, Index, Mask
+from depthtrack.types import Depth, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -19,8 +20,10 @@ class Target:
     silhouette: (h, w) true for pixels of the hand.
     depth: (h, w) metres, 0 = no reading of the hand.
     occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
+    surroundings: (h, w) metres, readings that are not of the hand, such as the forearm's, 0 = none; None if unknown.
 
     A hypothesis may lie behind the occluder. What lies before it or inside it costs more in Eq. (2).
+    The surroundings do not count there.
 
     Raises:
         ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
@@ -30,15 +33,16 @@ class Target:
     silhouette: Mask
     depth: Depth
     occluder: Depth | None = field(default=None, kw_only=True)
+    surroundings: Depth | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "silhouette", np.ascontiguousarray(self.silhouette, dtype=np.bool_))
         object.__setattr__(self, "depth", np.ascontiguousarray(self.depth, dtype=np.float32))
-        if self.occluder is not None:
-            object.__setattr__(self, "occluder", np.ascontiguousarray(self.occluder, dtype=np.float32))
-        for name in ("silhouette", "depth", "occluder"):
-            found = getattr(self, name)
-            if found is None:
+        for name in ("occluder", "surroundings"):
+            if (given := getattr(self, name)) is not None:
+                object.__setattr__(self, name, np.ascontiguousarray(given, dtype=np.float32))
+        for name in ("silhouette", "depth", "occluder", "surroundings"):
+            if (found := getattr(self, name)) is None:
                 continue
             if found.shape != self.camera.shape:
                 raise ValueError(
@@ -56,9 +60,9 @@ class Target:
     def crop(self, region: Rect) -> "Target":
         """Return the part in a region, which may extend outside, where nothing is observed."""
         occluder = None if self.occluder is None else region.crop(self.occluder)
-        return Target(
-            self.camera.crop(region), region.crop(self.silhouette), region.crop(self.depth), occluder=occluder
-        )
+        surroundings = None if self.surroundings is None else region.crop(self.surroundings)
+        silhouette, depth = region.crop(self.silhouette), region.crop(self.depth)
+        return Target(self.camera.crop(region), silhouette, depth, occluder=occluder, surroundings=surroundings)
 
     def reduced(self, side: int) -> "Target":
         """Return the target sampled so that its longer side has at most `side` pixels.
@@ -80,7 +84,8 @@ class Target:
         rows = _nearest((np.arange(camera.height) + 0.5) / factor - 0.5, self.camera.height)
         pick = np.ix_(rows, columns)
         occluder = None if self.occluder is None else self.occluder[pick]
-        return Target(camera, self.silhouette[pick], self.depth[pick], occluder=occluder)
+        surroundings = None if self.surroundings is None else self.surroundings[pick]
+        return Target(camera, self.silhouette[pick], self.depth[pick], occluder=occluder, surroundings=surroundings)
 
     def hidden_from(self, behind: float) -> Depth:
         """Return the inverse depth (h, w), 1/m, from which on a surface is hidden.
@@ -93,15 +98,24 @@ class Target:
             return np.zeros(self.camera.shape, np.float32)
         return np.where(self.occluder > 0, np.float32(1) / (self.occluder + np.float32(behind)), np.float32(0))
 
-    def unhidden(self, rendered: ArrayLike, behind: float) -> Array:
-        """Return a rendered depth map (h, w), metres, with 0 where the occluder hides it.
+    @cached_property
+    def hiding(self) -> Depth | None:
+        """Depth (h, w) of what may hide the hand, metres, 0 = nothing: the occluder, elsewhere the surroundings."""
+        if self.occluder is None or self.surroundings is None:
+            return self.surroundings if self.occluder is None else self.occluder
+        return np.where(self.occluder > 0, self.occluder, self.surroundings)
 
-        behind: depth behind the occluder's readings, metres.
+    def unhidden(self, rendered: Depth, behind: float) -> Depth:
+        """Return a rendered depth map (h, w), metres, with 0 where the occluder or the surroundings hide it.
+
+        It is the same map if they hide nothing.
+
+        behind: depth behind their readings, metres.
         """
-        depth = np.asarray(rendered, dtype=np.float64)
-        if self.occluder is None:
-            return depth
-        return np.where((self.occluder > 0) & (depth >= self.occluder.astype(np.float64) + behind), 0.0, depth)
+        if self.hiding is None:
+            return rendered
+        hidden = (self.hiding > 0) & (rendered >= self.hiding + np.float32(behind))
+        return np.where(hidden, np.float32(0), rendered) if hidden.any() else rendered
 
     def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
         """Return where (h, w) a surface lies before or inside the occluder; None without one.
@@ -111,7 +125,9 @@ class Target:
         """
         if self.occluder is None:
             return None
-        return np.asarray((self.occluder > 0) & (self.unhidden(rendered, behind) > 0), dtype=np.bool_)
+        depth = np.asarray(rendered, dtype=np.float64)
+        inside = depth < self.occluder.astype(np.float64) + behind
+        return np.asarray((self.occluder > 0) & (depth > 0) & inside, dtype=np.bool_)
 
 
 def _nearest(position: NDArray[np.floating], size: int) -> Index:

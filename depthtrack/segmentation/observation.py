@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, TypeVar, cast
 
+from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
 from depthtrack.recording.sequence import ImageKeypoints
 from depthtrack.rendering.target import Target
@@ -37,6 +38,7 @@ class Observation(Target):
     It is made once per frame and shared by all trackers.
 
     region: region of interest in the frame, imaged by `camera`.
+    frame_camera: camera of the whole frame; None if unknown.
     centre: (3,) approximate centre of the palm, metres, camera frame.
     palm_radius: of the circle inscribed in the palm, metres.
     arm_direction: (3,) unit vector from the palm along the forearm, camera frame; None without a visible arm.
@@ -60,6 +62,7 @@ class Observation(Target):
     arrived: float = math.nan
     resegmentation: Resegmentation | None = None
     cost: float = 0.0
+    frame_camera: Camera | None = None
 
     def arrived_at(self, arrived: float) -> "Observation":
         """Return the observation with another time of arrival; its maps are not checked again."""

@@ -129,6 +129,7 @@ class Segmenter:
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)
         return Observation(
             camera=frame.camera.crop(masks.region),
+            frame_camera=frame.camera,
             silhouette=masks.silhouette,
             depth=np.where(masks.readings, frame.depth[masks.region.slices], np.float32(0)),
             frame_index=frame.index,
@@ -140,5 +141,6 @@ class Segmenter:
             wrist=located.wrist,
             cloud_options=self._options.point_cloud,
             occluder=occluder,
+            surroundings=np.where(masks.silhouette, np.float32(0), frame.depth[masks.region.slices]),
             keypoints=None if frame.keypoints is None else frame.keypoints.shifted(*masks.region[:2]),
         )

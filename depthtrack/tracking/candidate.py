@@ -35,13 +35,13 @@ def evaluate(scorer: Scorer, poses: Array) -> list[Candidate]:
 
 
 def seen_part(candidate: Candidate, rendered: Depth, target: Target, objective: Objective) -> Candidate:
-    """Return the candidate with the energy and the agreement of what no object hides of it.
+    """Return the candidate with the energy and the agreement of what nothing hides of it.
 
     rendered: (h, w) depth of its pose, metres.
     """
-    if target.occluder is None:
-        return candidate
     seen = target.unhidden(rendered, objective.hidden_depth)
+    if seen is rendered and target.occluder is None:
+        return candidate
     before = target.before_occluder(rendered, objective.hidden_depth)
     sums = np.array(evaluate_image(objective, target.silhouette, target.depth, seen, before))
     terms = Terms.of_sums(objective, candidate.pose[None], *sums[:, None])

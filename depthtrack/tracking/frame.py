@@ -6,6 +6,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from depthtrack.geometry.camera import Camera
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
@@ -45,11 +46,24 @@ class Toolkit:
         self._fitters: dict[SurfaceFitOptions, IcpFitter] = {}
         self._lifters: dict[LiftOptions, Lifter] = {}
         self._targets: dict[object, Observation] = {}
+        self._frame_camera: Camera | None = None
 
     def set_target(self, observation: Observation) -> None:
         """Set the observation that the scorer compares with."""
+        self._frame_camera = observation.frame_camera
         resolution = self.scoring.resolution
         self.scorer.set_target(observation if resolution is None else observation.reduced(resolution))
+
+    def share_in_image(self, pose: Array) -> float:
+        """Return the share of the keypoints of a pose (27,) inside the image of the last target; 1 if it is unknown."""
+        if (camera := self._frame_camera) is None:
+            return 1.0
+        pixels = camera.project(self.model.keypoints(pose))
+        return float(
+            np.mean(
+                (pixels >= -0.5).all(axis=-1) & (pixels < np.array([camera.width, camera.height]) - 0.5).all(axis=-1)
+            )
+        )
 
     def scorer_at(self, resolution: int | None, observation: Observation) -> Scorer:
         """Return a scorer of `observation` at a resolution.

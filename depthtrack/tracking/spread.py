@@ -76,9 +76,9 @@ def bones_in_view(model: HandModel, pose: Array, rendered: Depth, target: Target
         own.reshape(-1),
         differences.reshape(-1),
     )
-    if target.occluder is not None:
-        # Bones lie inside the fingers: none is behind an object that does not hide its finger.
-        visible &= points_in_view(points, target.occluder, target.camera, behind=0.0)
+    if target.hiding is not None:
+        # Bones lie inside the fingers: none is behind what does not hide its finger.
+        visible &= points_in_view(points, target.hiding, target.camera, behind=0.0)
     measured = visible & own & (differences < AGREES)
     posture, uncertainty = float(np.sqrt(2 * prior_energy(pose, posture_prior()))), model.shape.uncertainty
     deviations = (CALIBRATED,) if uncertainty == CALIBRATED else (CALIBRATED, max(LEAST, uncertainty))

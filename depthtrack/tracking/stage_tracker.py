@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from depthtrack.recording.branches import Branch
@@ -55,6 +54,7 @@ class _Proposal(NamedTuple):
     visibility: tuple[float, ...]
     spread: tuple[float, ...]
     place: float
+    seen_energy: float
 
 
 class StageTracker:
@@ -118,7 +118,7 @@ class StageTracker:
             return Start(math.inf, 0.0, place)
         tools.set_target(around)
         found = self._assessed(evaluate(tools.scorer, pose[None])[0])
-        return Start(found.candidate.energy / tools.scoring.objective.clamp, found.confidence, place)
+        return Start(found.seen_energy / tools.scoring.objective.clamp, found.confidence, place)
 
     def close(self) -> None:
         """Free the renderers."""
@@ -157,6 +157,7 @@ class StageTracker:
             best.spread,
             best.branches,
             best.seen,
+            best.seen_energy,
         )
 
     def _start_again(self, best: _Proposal, observation: Observation, clock: StageClock) -> _Proposal:
@@ -221,11 +222,13 @@ class StageTracker:
     def _assessed(self, best: Candidate) -> _Proposal:
         """Return a candidate with its evidence, as a start without branches at no cost of its place."""
         tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
+        unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth)
         seen = seen_part(best, rendered, target, tools.scoring.objective)
         bones = bones_in_view(tools.model, best.pose, rendered, target)
-        unhidden = rendered
-        if target.occluder is not None:
-            unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth).astype(np.float32)
         evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
         figures = tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
-        return _Proposal(best, Status.STARTED, (), seen, evidence, self._confidence(evidence), *figures, 0.0)
+        inside = tools.share_in_image(best.pose)
+        seen_energy = inside * seen.energy + (1 - inside) * tools.scoring.objective.clamp
+        return _Proposal(
+            best, Status.STARTED, (), seen, evidence, self._confidence(evidence), *figures, 0.0, seen_energy
+        )

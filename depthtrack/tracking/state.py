@@ -130,10 +130,12 @@ class TrackState:
         spread: tuple[float, ...] = UNKNOWN_SPREAD,
         branches: tuple[Branch, ...] = (),
         seen: Candidate | None = None,
+        seen_energy: float = math.nan,
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted.
 
         seen: energy and agreement that decide this; those of the pose if None.
+        seen_energy: see `Estimate`.
         """
         judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
         # Two doubtful frames are worth one that is certainly wrong.
@@ -141,7 +143,7 @@ class TrackState:
         if self.is_jump(pose, timestamp) or self.is_lost(*judged, certain):
             status = Status.LOST
         figures = confidence, visibility, spread, branches
-        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures)
+        estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures, seen_energy=seen_energy)
         self.update(estimate)
         return estimate
 

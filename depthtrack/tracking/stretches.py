@@ -262,12 +262,12 @@ class _Tracked:
         for start in starts:
             pipeline = self._begun()
             pipeline.restore([start])
-            energies.append(pipeline.step(frame).estimate.energy)
+            energies.append(pipeline.step(frame).estimate.comparable_energy)
         return starts[int(np.argmin(np.nan_to_num(energies, nan=np.inf)))]
 
     def found(self) -> TrackedStretches:
         """Return the results of the finished stretches."""
-        energies = np.array([estimate.energy for each in self._stretches for estimate in each.estimates])
+        energies = np.array([estimate.comparable_energy for each in self._stretches for estimate in each.estimates])
         views = tuple(view for each in self._stretches for view in each.views)
         starts = {each.frames[0]: [each.ends[0]] for each in self._stretches}
         for one, other in pairwise(self._stretches):

@@ -30,6 +30,8 @@ class Estimate:
     branches: alternatives to the pose that the next frame goes on with.
     timestamp: time of the frame, seconds; NaN if unknown, which counts as no time since the frame before.
     hand: hand that was tracked, if its sizes change while it is tracked.
+    seen_energy: energy of what nothing hides of the hand, whose part outside the image counts as completely wrong; NaN
+        if unknown.
     """
 
     pose: Array | None
@@ -43,6 +45,12 @@ class Estimate:
     spread: tuple[float, ...] = UNKNOWN_SPREAD
     branches: tuple[Branch, ...] = ()
     hand: HandShape | None = None
+    seen_energy: float = math.nan
+
+    @property
+    def comparable_energy(self) -> float:
+        """Energy by which hands and places are compared: `seen_energy`, or `energy` if that is unknown."""
+        return self.energy if math.isnan(self.seen_energy) else self.seen_energy
 
 
 ABSENT = Estimate(None, math.nan, 0.0, Status.ABSENT)

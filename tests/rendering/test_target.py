@@ -21,7 +21,7 @@ LINE = Camera(6, 1, 10.0, 10.0, 0.0, 0.0)
 def test_pixels_before_an_object_or_inside_it_are_told_from_those_behind() -> None:
     # behind it | within the tolerance | before it | no object there | nothing drawn
     occluder = np.array([[0.400, 0.498, 0.520, 0.000, 0.400]], np.float32)
-    rendered = np.array([[0.500, 0.500, 0.500, 0.500, 0.000]])
+    rendered = np.array([[0.500, 0.500, 0.500, 0.500, 0.000]], np.float32)
     camera = Camera(5, 1, 10.0, 10.0, 0.0, 0.0)
     target = Target(camera, np.zeros((1, 5), bool), np.zeros((1, 5), np.float32), occluder=occluder)
     np.testing.assert_array_equal(target.unhidden(rendered, 0.005) > 0, [[False, True, True, True, False]])
@@ -29,6 +29,25 @@ def test_pixels_before_an_object_or_inside_it_are_told_from_those_behind() -> No
     np.testing.assert_array_equal(before, [[False, True, True, False, False]])
     from_depth = target.hidden_from(0.005)
     np.testing.assert_array_equal((from_depth > 0) & (rendered > 0) & (from_depth < 1 / 0.5), before)
+
+
+def test_surroundings_hide_a_hand_but_cost_nothing() -> None:
+    # behind them | within the tolerance | before them | nothing there | nothing drawn | inside an object's front
+    surroundings = np.array([[0.400, 0.498, 0.520, 0.000, 0.400, 0.400]], np.float32)
+    occluder = np.array([[0.000, 0.000, 0.000, 0.000, 0.000, 0.600]], np.float32)
+    rendered = np.array([[0.500, 0.500, 0.500, 0.500, 0.000, 0.500]], np.float32)
+    maps = np.zeros((1, 6), bool), np.zeros((1, 6), np.float32)
+    target = Target(LINE, *maps, surroundings=surroundings)
+    np.testing.assert_array_equal(target.unhidden(rendered, 0.005) > 0, [[False, True, True, True, False, False]])
+    assert target.before_occluder(rendered, 0.005) is None
+    both = replace(target, occluder=occluder)
+    np.testing.assert_array_equal(both.unhidden(rendered, 0.005) > 0, [[False, True, True, True, False, True]])
+    np.testing.assert_array_equal(both.before_occluder(rendered, 0.005), occluder > 0)
+    near = rendered - np.float32(0.2)
+    assert both.unhidden(near, 0.005) is near
+    assert Target(LINE, *maps).unhidden(rendered, 0.005) is rendered
+    cropped = both.crop(Rect.of_size(1, 0, 3, 1))
+    np.testing.assert_array_equal(cropped.hiding, surroundings[:, 1:4])
 
 
 @pytest.mark.parametrize("cost", [0.0, 0.25, 1.0, 4.0])

@@ -70,6 +70,17 @@ def test_a_hand_with_forearm_in_a_cluttered_room() -> None:
     assert np.abs(wrists).max() < 0.015
 
 
+def test_readings_around_the_hand_are_its_surroundings() -> None:
+    frame, _, _ = made(CLUTTERED, 0)
+    found = Segmenter(SkinColourModel.default()).segment(frame)
+    assert found is not None
+    assert found.surroundings is not None
+    assert found.frame_camera == frame.camera
+    assert not (found.surroundings[found.silhouette] > 0).any()
+    around = ~found.silhouette
+    np.testing.assert_array_equal(found.surroundings[around], frame.depth[found.region.slices][around])
+
+
 @pytest.mark.parametrize("sensor", ["kinect1", "kinect2", "realsense"])
 def test_any_frame_can_be_the_first(sensor: str) -> None:
     options = Synthesis(motion="signs", sensor=sensor, background="room", seed=3)  # type: ignore[arg-type]

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from depthtrack.geometry.rectangle import Rect
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.recording import Frame
 from depthtrack.rendering.backends import create_scorer
@@ -66,8 +67,31 @@ def test_what_the_object_hides_does_not_count_against_a_pose(
     seen = seen_part(whole, rendered, first, Objective())
     assert seen.energy < 0.9 * whole.energy
     assert seen.agreement > whole.agreement
-    free = replace(first, occluder=None)
+    free = replace(first, occluder=None, surroundings=None)
     assert seen_part(whole, rendered, free, Objective()) is whole
+
+
+def test_neither_a_forearm_before_the_hand_nor_the_border_counts_as_a_wrong_hand(
+    made: Synthesiser, observations: list[Observation]
+) -> None:
+    """A forearm is before half of the hand; then the image ends in the middle of the hand."""
+    first, pose = replace(observations[0], occluder=None), made.poses[0]
+    columns = np.arange(first.camera.width) < int(first.camera.project(pose[:3])[0])
+    readings, silhouette = np.where(columns, np.float32(0), first.depth), first.silhouette & ~columns
+    hidden = replace(
+        first, silhouette=silhouette, depth=readings, surroundings=np.where(columns, np.float32(0.3), readings * 0)
+    )
+    camera = made.sensor.camera
+    outside = replace(hidden, surroundings=None, frame_camera=camera.crop(Rect.of_size(0, 0, 1, camera.height)))
+    with closing(create_tracker(tracker_config("ik"), HOLDING.hand)) as tracker:
+        whole, seen, unexplained, cut = (
+            tracker.start(each, pose)
+            for each in (first, hidden, replace(hidden, surroundings=None, frame_camera=None), outside)
+        )
+    assert seen.comparable_energy < 1.2 * whole.comparable_energy
+    assert seen.energy > 1.5 * whole.energy
+    assert unexplained.comparable_energy == unexplained.energy
+    assert cut.comparable_energy == Objective().clamp
 
 
 @pytest.mark.parametrize("name", ["ik", "pso", "hybrid"])

@@ -48,9 +48,8 @@ class ForearmFirst(Segmenter):
         camera = frame.camera.crop(region)
         v, u = np.nonzero(depth)
         centre = camera.unproject(np.stack([u, v], axis=-1), depth[v, u]).mean(axis=0)
-        return replace(
-            right, camera=camera, silhouette=depth > 0, depth=depth, region=region, centre=centre, wrist=None
-        )
+        there = replace(right, camera=camera, silhouette=depth > 0, depth=depth, surroundings=None)
+        return replace(there, region=region, centre=centre, wrist=None)
 
     def alternatives(self, frame: Frame, first: Observation) -> Iterator[Observation]:
         right = Segmenter(None).segment(frame)
