@@ -86,8 +86,8 @@ def measure_sides(cell: Cell) -> Row:
     """
     with made_recording(**cell) as sequence:
         source = CalibrationSource(sequence, None, 0, 1, None, OPTIONS)
-        scale = first_hand(source).scale
-        choice = choose_side(sequence, scale=scale)
+        scales: dict[Side, float] = {each: first_hand(source, each).scale for each in ("right", "left")}
+        choice = choose_side(sequence, scales=scales)
         side: Side = cell["side"]
         known = float(np.log1p(choice.margin)) * (1 if choice.side == side else -1)
         row: Row = {"open": not choice.sure, "margin": known, "average": known}
@@ -101,7 +101,7 @@ def measure_sides(cell: Cell) -> Row:
                 found = fit_sizes(
                     source,
                     each,
-                    FirstHand(scale, choice.starts[each]),
+                    FirstHand(scales[each], choice.starts[each]),
                     choice.views.get(each, ()),
                     lambda stage, share: None,
                 )

@@ -1,8 +1,9 @@
 """Calibration of a hand whose side is unknown.
 
-Hands of average proportions of both sides are tracked over the recording. If that leaves the side open, hands of both
-sides are calibrated. The energies of the last hands tracked for that are compared. A few views alone leave the side
-open often: a hand of adapted sizes fits them from its back as well. Such sizes are less common among people.
+Hands of average proportions of both sides, each of the scale that fits single frames best, are tracked over the
+recording. If that leaves the side open, hands of both sides are calibrated. The energies of the last hands tracked for
+that are compared. A few views alone leave the side open often: a hand of adapted sizes fits them from its back as well.
+Such sizes are less common among people.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,9 +45,10 @@ def calibrate_either_side(
     side_options = SideOptions()
     source = CalibrationSource(sequence, segmentation, seed, threads, frames, options or CalibrationOptions())
     report("size of the hand", 0.0)
-    scale = first_hand(source).scale
-    choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.05, 0.2), scale)
-    first = {side: FirstHand(scale, starts) for side, starts in choice.starts.items()}
+    sides: tuple[Side, ...] = ("right", "left")
+    scales = {side: first_hand(source, side).scale for side in sides}
+    choice = choose_side(sequence, segmentation, threads, frames, side_options, _frames(report, 0.05, 0.2), scales)
+    first = {side: FirstHand(scales[side], starts) for side, starts in choice.starts.items()}
     if choice.sure:
         views, part = choice.views.get(choice.side, ()), _part(report, 0.25, 0.75)
         found = calibrate(
@@ -55,7 +57,6 @@ def calibrate_either_side(
         return replace(found, side_margin=choice.margin, sure_margin=side_options.sure_margin)
     sized: dict[Side, FittedHand] = {}
     failure: InputError | None = None
-    sides: tuple[Side, ...] = ("right", "left")
     for n, side in enumerate(sides):
         try:
             part = _part(report, 0.25 + 0.25 * n, 0.25)

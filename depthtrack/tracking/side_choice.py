@@ -56,16 +56,16 @@ def choose_side(
     frames: int | None = None,
     options: SideOptions = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
-    scale: float = 1.0,
+    scales: Mapping[Side, float] | None = None,
 ) -> SideChoice:
     """Return the side of the hand in a recording, by hands of average proportions.
 
     frames: number of first frames to use; all if None.
     progress: called with the number of tracked frames, and of all frames to track.
-    scale: of these hands.
+    scales: of these hands; 1 if None.
     """
     sides: tuple[Side, ...] = ("right", "left")
-    hands = {side: HandShape(side=side, scale=scale) for side in sides}
+    hands = {side: HandShape(side=side, scale=scales[side] if scales else 1.0) for side in sides}
     tracked = track_sides(sequence, hands, segmentation, threads, frames, options.stretches, progress)
     views = {side: each.views for side, each in tracked.items()}
     starts = {side: each.starts for side, each in tracked.items()}

@@ -20,7 +20,7 @@ from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recordin
 from depthtrack.tracking import stretches
 from depthtrack.tracking.run_configuration import RunConfiguration
 from depthtrack.tracking.side_choice import SideChoice, SideOptions, choose_side, mean_energies
-from depthtrack.tracking.stretches import Starts, StretchOptions, track_hands, track_stretches
+from depthtrack.tracking.stretches import StretchOptions, track_hands, track_stretches
 from depthtrack.tracking.tracker import ABSENT, Estimate
 
 OPTIONS = SideOptions(StretchOptions(stretches=2, stretch_frames=3))
@@ -175,7 +175,8 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         side: Side
         values: np.ndarray
 
-    def fit_sizes(source: object, side: Side, *rest: object) -> Sized:
+    def fit_sizes(source: object, side: Side, first: FirstHand, *rest: object) -> Sized:
+        assert first.scale == {"right": 1.1, "left": 0.9}[side]
         tried.append(side)
         return Sized(side, np.zeros(COUNT))
 
@@ -187,13 +188,19 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
         energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
         return Measured(HandShape(side=sized.side), {"right": 1.0, "left": 2.0}[sized.side], energies[sized.side])
 
-    starts: dict[Side, Starts] = {"right": {}, "left": {}}
-    monkeypatch.setattr(sides, "choose_side", lambda *rest, **more: SideChoice("left", 0.27, sure, 10, {}, starts))
-    monkeypatch.setattr(sides, "first_hand", lambda source: FirstHand(1.0, {}))
+    def choose_side(*rest: object) -> SideChoice:
+        # Hands of both sides have their own scales.
+        assert rest[-1] == {"right": 1.1, "left": 0.9}
+        return SideChoice("left", 0.27, sure, 10, {}, {"right": {}, "left": {}})
+
+    monkeypatch.setattr(sides, "choose_side", choose_side)
+    monkeypatch.setattr(sides, "first_hand", lambda source, side: FirstHand({"right": 1.1, "left": 0.9}[side], {}))
     monkeypatch.setattr(sides, "fit_sizes", fit_sizes)
     monkeypatch.setattr(sides, "fit_skin", fit_skin)
     monkeypatch.setattr(sides, "calibration_of", calibration_of)
-    monkeypatch.setattr(sides, "calibrate", lambda s, side, *rest: calibration_of(s, fit_skin(s, fit_sizes(s, side))))
+    monkeypatch.setattr(
+        sides, "calibrate", lambda s, side, *rest: calibration_of(s, fit_skin(s, fit_sizes(s, side, rest[-1])))
+    )
     found = calibrate_either_side(None)  # type: ignore[arg-type]
     assert tried == (["left"] if sure else ["right", "left"])
     # The skin of the side that was chosen is fitted alone.
