@@ -90,10 +90,10 @@ class CalibrationOptions:
     size_weight: float = option(
         0.02,
         "Share by which a side costs more for a squared standard deviation of its sizes from the average ones",
-        source="tools/tune_side.py on tuning seeds of the cross-model benchmark",
+        source="tools/tune_side.py on the tuning seeds 6 to 21 of the cross-model benchmark",
         most=1,
     )
-    size_cost: float = option(1.5, "Largest factor of that", source="report seeds 1028 to 1036", least=1, most=1000)
+    size_cost: float = option(1.2, "Largest factor of that", source="as `size_weight`", least=1, most=1000)
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
 

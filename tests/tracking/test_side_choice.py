@@ -213,8 +213,8 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
 
 def test_uncommon_sizes_raise_the_cost_of_a_side_up_to_a_limit() -> None:
     options = CalibrationOptions()
-    factors = sides.size_costs({"right": 40.0, "left": 50.0}, options)
-    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(10 * options.size_weight))}
+    factors = sides.size_costs({"right": 45.0, "left": 50.0}, options)
+    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(5 * options.size_weight))}
     assert sides.size_costs({"right": 1e9, "left": 0.0}, options) == {"right": options.size_cost, "left": 1.0}
     # One standard deviation of the scale of people, and none of another size.
     values = np.zeros(COUNT)
