@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from depthtrack.rendering.objective import Terms
-from depthtrack.rendering.objective import evaluate as evaluate_image
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.scorer import Scorer
+from depthtrack.rendering.seen_sums import seen_sums
 from depthtrack.rendering.target import Target
 from depthtrack.types import Array, Depth
 
@@ -39,11 +39,14 @@ def seen_part(candidate: Candidate, rendered: Depth, target: Target, objective: 
 
     rendered: (h, w) depth of its pose, metres.
     """
-    seen = target.unhidden(rendered, objective.hidden_depth)
-    if seen is rendered and target.occluder is None:
+    if target.hiding is None:
         return candidate
-    before = target.before_occluder(rendered, objective.hidden_depth)
-    sums = np.array(evaluate_image(objective, target.silhouette, target.depth, seen, before))
+    occluder = np.zeros_like(target.hiding) if target.occluder is None else target.occluder
+    limits = objective.match_depth, objective.clamp_depth, float(objective.before_cost), objective.hidden_depth
+    sums = np.empty(3)
+    hidden = seen_sums(rendered, target.silhouette, target.depth, target.hiding, occluder, limits, sums)
+    if not hidden and target.occluder is None:
+        return candidate
     terms = Terms.of_sums(objective, candidate.pose[None], *sums[:, None])
     return Candidate(candidate.pose, float(terms.energy[0]), float(terms.agreement[0]))
 

@@ -62,7 +62,7 @@ def fitted_model() -> ConfidenceModel:
 def evidence_of(pose: Array, rendered: Depth, target: Target, bones: BonesInView, energy: float) -> Evidence:
     """Return the evidence of a pose (27,).
 
-    rendered: (h, w) depth of the posed hand without what an occluder hides, metres.
+    rendered: (h, w) depth of the posed hand, metres; what hides it lies beside the silhouette.
     energy: in multiples of `Objective.clamp`.
     """
     return Evidence(

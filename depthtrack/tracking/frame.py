@@ -7,6 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from depthtrack.geometry.camera import Camera
+from depthtrack.hand.compiled_kinematics import BodyPoses, endpoints
 from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.hand.synergies import Synergies, load_synergies
@@ -55,15 +56,17 @@ class Toolkit:
         self.scorer.set_target(observation if resolution is None else observation.reduced(resolution))
 
     def share_in_image(self, pose: Array) -> float:
-        """Return the share of the keypoints of a pose (27,) inside the image of the last target; 1 if it is unknown."""
+        """Return the share of the fingers' keypoints inside the image of the last target, in a pose (27,).
+
+        It is 1 if the image is unknown.
+        """
         if (camera := self._frame_camera) is None:
             return 1.0
-        pixels = camera.project(self.model.keypoints(pose))
-        return float(
-            np.mean(
-                (pixels >= -0.5).all(axis=-1) & (pixels < np.array([camera.width, camera.height]) - 0.5).all(axis=-1)
-            )
-        )
+        ends = np.empty((5, 4, 3))
+        endpoints(self.model.chain, BodyPoses.at(self.model.chain, pose), ends)
+        pixels = camera.project(ends)
+        inside = (pixels >= -0.5) & (pixels < (camera.width - 0.5, camera.height - 0.5))
+        return float(inside.all(axis=-1).mean())
 
     def scorer_at(self, resolution: int | None, observation: Observation) -> Scorer:
         """Return a scorer of `observation` at a resolution.

@@ -222,10 +222,9 @@ class StageTracker:
     def _assessed(self, best: Candidate) -> _Proposal:
         """Return a candidate with its evidence, as a start without branches at no cost of its place."""
         tools, target, rendered = self._tools, self._tools.scorer.target, self._tools.scorer.render(best.pose)
-        unhidden = target.unhidden(rendered, tools.scoring.objective.hidden_depth)
         seen = seen_part(best, rendered, target, tools.scoring.objective)
         bones = bones_in_view(tools.model, best.pose, rendered, target)
-        evidence = evidence_of(best.pose, unhidden, target, bones, seen.energy / tools.scoring.objective.clamp)
+        evidence = evidence_of(best.pose, rendered, target, bones, seen.energy / tools.scoring.objective.clamp)
         figures = tuple(bones.finger_visibility.tolist()), tuple(bones.spread.tolist())
         inside = tools.share_in_image(best.pose)
         seen_energy = inside * seen.energy + (1 - inside) * tools.scoring.objective.clamp

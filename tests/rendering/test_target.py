@@ -12,6 +12,7 @@ from depthtrack.hand.shape import HandShape
 from depthtrack.rendering.objective import evaluate
 from depthtrack.rendering.options import Objective
 from depthtrack.rendering.raster import RasterScorer
+from depthtrack.rendering.seen_sums import seen_sums
 from depthtrack.rendering.target import Target
 from tests.support.rendering import random_poses, target_of, window_on
 
@@ -48,6 +49,29 @@ def test_surroundings_hide_a_hand_but_cost_nothing() -> None:
     assert Target(LINE, *maps).unhidden(rendered, 0.005) is rendered
     cropped = both.crop(Rect.of_size(1, 0, 3, 1))
     np.testing.assert_array_equal(cropped.hiding, surroundings[:, 1:4])
+
+
+@pytest.mark.parametrize("with_object", [False, True])
+def test_the_sums_of_what_is_seen_are_those_of_the_unhidden_map(with_object: bool) -> None:
+    rng = np.random.default_rng(7)
+    shape, objective = (40, 30), Objective(before_cost=0.7)
+    silhouette = rng.random(shape) < 0.5
+
+    def depths(share: float) -> np.ndarray:
+        return np.where(rng.random(shape) < share, 0.5 + 0.03 * rng.normal(size=shape), 0).astype(np.float32)
+
+    rendered, observed = depths(0.7), depths(0.8) * silhouette
+    maps = {"surroundings": depths(0.6) * ~silhouette, "occluder": depths(0.4) * ~silhouette if with_object else None}
+    target = Target(Camera(30, 40, 10.0, 10.0, 0.0, 0.0), silhouette, observed, **maps)
+    seen, before = target.unhidden(rendered, 0.005), target.before_occluder(rendered, 0.005)
+    assert (seen != rendered).sum() > 50
+    limits, sums = (objective.match_depth, objective.clamp_depth, objective.before_cost, 0.005), np.empty(3)
+    occluder = np.zeros_like(rendered) if target.occluder is None else target.occluder
+    assert target.hiding is not None
+    assert seen_sums(rendered, silhouette, observed, target.hiding, occluder, limits, sums)
+    np.testing.assert_allclose(sums, evaluate(objective, silhouette, observed, seen, before), rtol=1e-12)
+    far = rendered - np.float32(0.4) * (rendered > 0)
+    assert not seen_sums(far, silhouette, observed, target.hiding, occluder, limits, sums)
 
 
 @pytest.mark.parametrize("cost", [0.0, 0.25, 1.0, 4.0])
