@@ -269,7 +269,12 @@ class Oikonomidis2011Config:
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(refine=False), "Swarms of a search", advanced=True)
     thresholds: TrackingThresholds = option(
         TrackingThresholds(
-            longest_gap=math.inf, start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf
+            longest_gap=math.inf,
+            start_shifts=(),
+            start_bends=(),
+            start_oppositions=(),
+            start_confidence=0,
+            start_energy=math.inf,
         ),
         "Trust in a pose; not part of the paper",
         advanced=True,
@@ -297,7 +302,12 @@ class Schroeder2014Config:
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     thresholds: TrackingThresholds = option(
         TrackingThresholds(
-            longest_gap=math.inf, start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf
+            longest_gap=math.inf,
+            start_shifts=(),
+            start_bends=(),
+            start_oppositions=(),
+            start_confidence=0,
+            start_energy=math.inf,
         ),
         "Trust in a pose; not part of the paper",
         advanced=True,

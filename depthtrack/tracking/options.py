@@ -82,6 +82,14 @@ class TrackingThresholds:
         least=-3,
         most=3,
     )
+    start_oppositions: tuple[float, ...] = option(
+        (0.3,),
+        "Angles by which the thumb of a start is opposed further, to be fitted there too; empty: none",
+        unit="rad",
+        source="`grasp` 1047, 1049 and tuning seed 11 of the cross-model benchmark, checked on its tuning seeds",
+        least=-3,
+        most=3,
+    )
     start_confidence: float = option(
         0.4,
         "A start with a lower confidence tries other places of the hand",

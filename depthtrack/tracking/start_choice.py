@@ -6,7 +6,8 @@ unexplained there counts.
 
 Along the forearm, the energy of an observation without a prior hardly changes: the hand may slide there, with
 stretched fingers in the place of its palm. So a start is also moved along the hand, and fitted there. Searches of
-single fingers do not find that all are bent: a start with all fingers bent further is fitted too. A doubtful start
+single fingers do not find that all are bent: a start with all fingers bent further is fitted too. A thumb behind the
+palm is drawn to the edge of the silhouette: a start with the thumb opposed further is fitted as well. A doubtful start
 tries other places of the hand, each with a search.
 """
 
@@ -71,8 +72,9 @@ class StartChoice(Generic[P]):
 
         A doubtful one tries other places too.
         """
-        changes = self.thresholds.start_shifts or self.thresholds.start_bends
-        if not (changes or tries_places(self.thresholds)):
+        thresholds = self.thresholds
+        changes = thresholds.start_shifts or thresholds.start_bends or thresholds.start_oppositions
+        if not (changes or tries_places(thresholds)):
             return first
         best, start = self._changed(first, resegmentation)
         if not is_doubtful(start, self.thresholds):
@@ -84,7 +86,7 @@ class StartChoice(Generic[P]):
         return best
 
     def _changed(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
-        """Return the best of a proposal and of those moved, then of that and of those bent.
+        """Return the best of a proposal and of those moved, then of that and of those bent, then with another thumb.
 
         Each is judged in the region of interest of its pose. The best one is fitted there too.
         """
@@ -92,6 +94,7 @@ class StartChoice(Generic[P]):
         for change, amounts in (
             (moved_along_hand, self.thresholds.start_shifts),
             (bent_further, self.thresholds.start_bends),
+            (opposed_further, self.thresholds.start_oppositions),
         ):
             pose = best[0].candidate.pose
             for amount in amounts:
@@ -126,6 +129,16 @@ def bent_further(pose: Array, angle: float) -> Array:
     bent = pose.copy()
     bent[ANGLES].reshape(5, 4)[1:, 1:] += angle
     return within_limits(bent)
+
+
+def opposed_further(pose: Array, angle: float) -> Array:
+    """Return a pose (27,) with all angles of the thumb, palmar abduction too, increased by `angle` (rad).
+
+    Angles stay within the limits.
+    """
+    opposed = pose.copy()
+    opposed[ANGLES].reshape(5, 4)[0] += angle
+    return within_limits(opposed)
 
 
 def tries_places(thresholds: TrackingThresholds) -> bool:

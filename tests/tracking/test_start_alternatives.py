@@ -23,7 +23,9 @@ from depthtrack.tracking.pipeline import Pipeline, TrackedFrame, replay_frames, 
 from depthtrack.tracking.registry import create_tracker, tracker_config
 
 CLUTTERED = Synthesis(motion="everyday", sensor="kinect1", background="room", model="skin", seed=22)
-NEVER = TrackingThresholds(start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf)
+NEVER = TrackingThresholds(
+    start_shifts=(), start_bends=(), start_oppositions=(), start_confidence=0, start_energy=math.inf
+)
 
 
 @pytest.fixture(scope="module")

@@ -31,6 +31,7 @@ from depthtrack.tracking.start_choice import (
     bent_further,
     is_doubtful,
     moved_along_hand,
+    opposed_further,
     start_cost,
     tries_places,
 )
@@ -38,7 +39,9 @@ from depthtrack.tracking.trackers.hybrid import hybrid
 from depthtrack.types import Array
 
 OPTIONS = TrackingThresholds()
-NEVER = TrackingThresholds(start_shifts=(), start_bends=(), start_confidence=0, start_energy=math.inf)
+NEVER = TrackingThresholds(
+    start_shifts=(), start_bends=(), start_oppositions=(), start_confidence=0, start_energy=math.inf
+)
 STARTS = st.builds(Start, st.floats(0, 3), st.floats(0, 1), st.floats(0, 1))
 
 
@@ -62,7 +65,7 @@ def test_trackers_of_papers_try_no_places_moves_or_bends() -> None:
     for name in ("oikonomidis2011", "schroeder2014"):
         thresholds = tracker_config(name).thresholds
         assert not tries_places(thresholds)
-        assert (thresholds.start_shifts, thresholds.start_bends) == ((), ())
+        assert (thresholds.start_shifts, thresholds.start_bends, thresholds.start_oppositions) == ((), (), ())
     assert not is_doubtful(Start(math.inf, 0.0, 0.0), NEVER)
     assert tries_places(OPTIONS)
 
@@ -123,6 +126,17 @@ def test_a_bend_turns_the_joints_of_the_fingers_alone_and_within_the_limits(angl
     changes = (after - before)[1:, 1:]
     assert np.all(changes * np.sign(angle) >= 0)
     assert np.all(np.abs(changes) <= abs(angle) + 1e-12)
+
+
+@given(st.floats(-3, 3))
+def test_an_opposition_turns_the_thumb_alone_and_within_the_limits(angle: float) -> None:
+    pose = make_pose([0.1, 0.2, 0.5], [0.5, -0.1, 0.7, 0.5], POSTURES["open"])
+    opposed = opposed_further(pose, angle)
+    np.testing.assert_array_equal(opposed, within_limits(opposed))
+    before, after = (each[ANGLES].reshape(5, 4) for each in (within_limits(pose), opposed))
+    np.testing.assert_array_equal(before[1:], after[1:])
+    np.testing.assert_array_equal(pose[: ANGLES.start], opposed[: ANGLES.start])
+    assert np.all((after - before)[0] * np.sign(angle) >= 0)
 
 
 class Found:
