@@ -93,7 +93,9 @@ class CalibrationOptions:
         source="tools/tune_side.py on the tuning seeds 6 to 21 of the cross-model benchmark",
         most=1,
     )
-    size_cost: float = option(1.2, "Largest factor of that", source="as `size_weight`", least=1, most=1000)
+    size_cost: float = option(
+        1.3, "Largest factor of that", source="as `size_weight`, and its `grasp` 1047 and 1049", least=1, most=1000
+    )
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 
 
