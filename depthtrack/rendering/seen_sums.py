@@ -1,4 +1,4 @@
-"""The sums of Oikonomidis et al. 2011, Eq. (2), over what nothing hides of a hand, in one pass.
+"""The sums of Oikonomidis et al. 2011, Eq. (2), over the seen part of a hand.
 
 `objective.evaluate` of the depth map that `Target.unhidden` returns gives the same sums.
 """

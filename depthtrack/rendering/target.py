@@ -100,15 +100,18 @@ class Target:
 
     @cached_property
     def hiding(self) -> Depth | None:
-        """Depth (h, w) of what may hide the hand, metres, 0 = nothing: the occluder, elsewhere the surroundings."""
+        """Depth (h, w) of what may hide the hand, metres, 0 = nothing.
+
+        It is that of the occluder, elsewhere of the surroundings.
+        """
         if self.occluder is None or self.surroundings is None:
             return self.surroundings if self.occluder is None else self.occluder
         return np.where(self.occluder > 0, self.occluder, self.surroundings)
 
     def unhidden(self, rendered: Depth, behind: float) -> Depth:
-        """Return a rendered depth map (h, w), metres, with 0 where the occluder or the surroundings hide it.
+        """Return a rendered depth map (h, w), metres, with 0 where it is hidden.
 
-        It is the same map if they hide nothing.
+        It is the same map if occluder and surroundings hide nothing.
 
         behind: depth behind their readings, metres.
         """

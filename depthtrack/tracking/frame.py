@@ -56,9 +56,9 @@ class Toolkit:
         self.scorer.set_target(observation if resolution is None else observation.reduced(resolution))
 
     def share_in_image(self, pose: Array) -> float:
-        """Return the share of the fingers' keypoints inside the image of the last target, in a pose (27,).
+        """Return the share of the fingers' keypoints in a pose (27,) that the image shows.
 
-        It is 1 if the image is unknown.
+        The image is that of the last target; the share is 1 if it is unknown.
         """
         if (camera := self._frame_camera) is None:
             return 1.0

@@ -86,9 +86,10 @@ class StartChoice(Generic[P]):
         return best
 
     def _changed(self, first: P, resegmentation: Resegmentation) -> tuple[P, Start]:
-        """Return the best of a proposal and of those moved, then of that and of those bent, then with another thumb.
+        """Return the best of a proposal and of those that differ from it.
 
-        Each is judged in the region of interest of its pose. The best one is fitted there too.
+        They are moved, then bent, then have another thumb. Each is judged in the region of interest of its pose. The
+        best one is fitted there too.
         """
         unchanged = best = first, self.judge(first.candidate.pose, first.place, resegmentation)
         for change, amounts in (
@@ -132,9 +133,9 @@ def bent_further(pose: Array, angle: float) -> Array:
 
 
 def opposed_further(pose: Array, angle: float) -> Array:
-    """Return a pose (27,) with all angles of the thumb, palmar abduction too, increased by `angle` (rad).
+    """Return a pose (27,) with all angles of the thumb increased by `angle` (rad).
 
-    Angles stay within the limits.
+    Palmar abduction is one of them. Angles stay within the limits.
     """
     opposed = pose.copy()
     opposed[ANGLES].reshape(5, 4)[0] += angle

@@ -49,7 +49,10 @@ class Estimate:
 
     @property
     def comparable_energy(self) -> float:
-        """Energy by which hands and places are compared: `seen_energy`, or `energy` if that is unknown."""
+        """Energy by which hands and places are compared.
+
+        It is `seen_energy`, or `energy` if that is unknown.
+        """
         return self.energy if math.isnan(self.seen_energy) else self.seen_energy
 
 
