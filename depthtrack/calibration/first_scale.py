@@ -67,7 +67,7 @@ def best_scale(scales: Sequence[float], fitted: Callable[[float], list[Estimate]
 
     def energy(number: int) -> float:
         found[number] = fitted(scales[number])
-        return float(np.median([estimate.comparable_energy for estimate in found[number]]))
+        return float(np.median([estimate.energy for estimate in found[number]]))
 
     energies = around_lowest(len(scales), int(np.argmin(np.abs(np.log(scales)))), energy)
     tried = sorted(energies)
