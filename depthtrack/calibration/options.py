@@ -90,7 +90,7 @@ class CalibrationOptions:
     size_weight: float = option(
         0.02,
         "Share by which a side costs more for a squared standard deviation of its sizes from the average ones",
-        source="tools/tune_side.py on the tuning seeds 6 to 21 of the cross-model benchmark",
+        source="measured as in tools/tune_side.py on the tuning seeds 6 to 21 of the cross-model benchmark",
         most=1,
     )
     size_cost: float = option(
