@@ -253,6 +253,17 @@ class HybridConfig:
         _check_predictions(self.predictions)
 
 
+_PAPER_THRESHOLDS = TrackingThresholds(
+    longest_gap=math.inf,
+    start_shifts=(),
+    start_bends=(),
+    start_oppositions=(),
+    start_confidence=0,
+    start_energy=math.inf,
+)
+"""Thresholds of the published trackers: no start is changed, and the last pose is followed after any pause."""
+
+
 @dataclass(frozen=True)
 class Oikonomidis2011Config:
     """PSO tracker as published: 27 raw parameters, one swarm around the last solution."""
@@ -268,14 +279,7 @@ class Oikonomidis2011Config:
     search: GlobalSearchOptions = option(GlobalSearchOptions(follow_arm=False), "Global search", advanced=True)
     swarm_search: SwarmSearchOptions = option(SwarmSearchOptions(refine=False), "Swarms of a search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(
-            longest_gap=math.inf,
-            start_shifts=(),
-            start_bends=(),
-            start_oppositions=(),
-            start_confidence=0,
-            start_energy=math.inf,
-        ),
+        _PAPER_THRESHOLDS,
         "Trust in a pose; not part of the paper",
         advanced=True,
     )
@@ -301,14 +305,7 @@ class Schroeder2014Config:
     )
     fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
     thresholds: TrackingThresholds = option(
-        TrackingThresholds(
-            longest_gap=math.inf,
-            start_shifts=(),
-            start_bends=(),
-            start_oppositions=(),
-            start_confidence=0,
-            start_energy=math.inf,
-        ),
+        _PAPER_THRESHOLDS,
         "Trust in a pose; not part of the paper",
         advanced=True,
     )
