@@ -27,7 +27,7 @@ from depthtrack.types import Array
 class Start(NamedTuple):
     """A start in the region of interest of its pose.
 
-    energy: in multiples of `Objective.clamp`.
+    energy: see `Estimate.comparable_energy`, in multiples of `Objective.clamp`.
     confidence: see `Confidence`.
     place: cost of the place of the hand, see `Observation.cost`, metres.
     """

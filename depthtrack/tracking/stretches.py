@@ -72,7 +72,7 @@ class TrackedView(NamedTuple):
 class TrackedStretches(NamedTuple):
     """Result of a hand in the stretches of a recording.
 
-    energies: (N,) of all frames; NaN without a hand.
+    energies: (N,) of all frames, see `Estimate.comparable_energy`; NaN without a hand.
     views: trusted poses in some of them.
     starts: trusted estimates of the first frames of stretches, by frame.
     """
