@@ -3,14 +3,13 @@
 Usage: tune_side.py FOLDER --rig RIG.glb [...] [--first-seed N] [--seeds N] [--frames N] [--motion NAME ...]
 
 The recordings are those of the tuning seeds of the cross-model benchmark. Hands of both sides are calibrated on those
-whose side the average hands leave open. Printed for each weight and largest factor of the sizes are the right sides,
-the sides called sure, and the right ones of those. The folder holds the figures of each recording, from which an
+whose side the average hands leave open. Printed for each weight of the sizes are the right sides, the sides called
+sure, and the right ones of those. The folder holds the figures of each recording, from which an
 interrupted choice continues.
 """
 
 import argparse
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +30,7 @@ from depthtrack.hand.shape import Side, other_side
 from depthtrack.hand.size_parameters import COUNT, size_deviation
 from depthtrack.tracking.side_choice import SideOptions, choose_side, mean_energies
 
-WEIGHTS = (0.0, 0.005, 0.01, 0.02, 0.03, 0.05)
-COSTS = (1.2, 1.3, 1.5, 2.0)
+WEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.8)
 OPTIONS = CalibrationOptions()
 
 
@@ -55,12 +53,12 @@ def main() -> None:
     cells = [cell for cell in recording_cells(options) if cell["motion"] in chosen.motion]
     with Journal(chosen.folder / "sides.jsonl", list(cells[0])) as journal:
         rows = run_sweep(measure_sides, cells, journal, chosen_workers(None))
-    for weight, cost in product(WEIGHTS, COSTS):
-        margins = np.array([margin(row, replace(OPTIONS, size_weight=weight, size_cost=cost)) for row in rows])
+    for weight in WEIGHTS:
+        margins = np.array([margin(row, replace(OPTIONS, size_weight=weight)) for row in rows])
         needed = np.array([OPTIONS.sure_margin if row["open"] else SideOptions().sure_margin for row in rows])
         sure = (np.abs(margins) >= np.log1p(needed)) & (margins * np.array([row["average"] for row in rows]) >= 0)
         print(
-            f"weight {weight:g}, at most {cost:g}: {(margins > 0).sum()} of {len(rows)} sides right, "
+            f"weight {weight:g}: {(margins > 0).sum()} of {len(rows)} sides right, "
             f"{sure.sum()} sure, {(margins[sure] > 0).sum()} of them right; least margin of a right one that is sure "
             f"{np.expm1(margins[sure & (margins > 0)].min()):.2f}, largest of a wrong one "
             f"{np.expm1(-margins.min()) if (margins < 0).any() else 0:.2f}"
@@ -94,11 +92,10 @@ def measure_sides(cell: Cell) -> Row:
         row |= {"right_deviation": 0.0, "left_deviation": 0.0}
         if choice.sure:
             return row
-        costs = dict[Side, float]()
-        energies = {}
+        sized = {}
         for each in (side, other_side(side)):
             try:
-                found = fit_sizes(
+                sized[each] = fit_sizes(
                     source,
                     each,
                     FirstHand(scales[each], choice.starts[each]),
@@ -108,11 +105,11 @@ def measure_sides(cell: Cell) -> Row:
             except InputError:
                 # The other side alone can be calibrated, and is taken.
                 return row | {"open": False, "margin": float(np.log1p(10.0)) * (-1 if each == side else 1)}
-            row[f"{each}_deviation"] = size_deviation(found.values[:COUNT])
-            costs[each], energies[each] = calibration_of(source, found).after_mm, found.energies
-        means, frames = mean_energies(energies)
-        quotients = [costs, means] if frames else [costs]
-        return row | {"margin": known + sum(float(np.log(each[other_side(side)] / each[side])) for each in quotients)}
+            row[f"{each}_deviation"] = size_deviation(sized[each].values[:COUNT])
+        misfits, frames = mean_energies({each: found.energies for each, found in sized.items()})
+        if not frames:
+            misfits = {each: calibration_of(source, found).after_mm for each, found in sized.items()}
+        return row | {"margin": known + float(np.log(misfits[other_side(side)] / misfits[side]))}
 
 
 if __name__ == "__main__":

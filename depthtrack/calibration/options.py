@@ -60,7 +60,7 @@ class JointFitOptions:
 class AcceptanceOptions:
     """Views that take part in a measurement, and the hand that they must show."""
 
-    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies")
+    good_views: float = option(0.7, "Share of the views that are fitted: those with the lowest energies", most=1)
     hand_like: float = option(
         0.55,
         "Agreement of silhouettes below which no hand was found",
@@ -72,7 +72,7 @@ class AcceptanceOptions:
 class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
-    stretches: StretchOptions = option(StretchOptions(views=54), "Frames that the hand is tracked in")
+    stretches: StretchOptions = option(StretchOptions(views=40), "Frames that the hand is tracked in")
     first_scales: tuple[float, ...] = option(
         (0.72, 0.8, 0.9, 1.0, 1.1, 1.22),
         "Sizes of the whole hand, of the average one's, that are compared in the first frames of the stretches; empty: "
@@ -85,16 +85,15 @@ class CalibrationOptions:
     skin_iterations: int = option(6, "Iterations of each")
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
-    accepted: AcceptanceOptions = option(AcceptanceOptions(), "Accepted views")
-    sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
-    size_weight: float = option(
-        0.02,
-        "Share by which a side costs more for a squared standard deviation of its sizes from the average ones",
-        source="measured as in tools/tune_side.py on the tuning seeds 6 to 21 of the cross-model benchmark",
-        most=1,
+    accepted: AcceptanceOptions = option(AcceptanceOptions(good_views=1.0), "Accepted views")
+    sure_margin: float = option(
+        0.2, "Share by which the other side costs more if the side is certain", source="as `size_weight`"
     )
-    size_cost: float = option(
-        1.3, "Largest factor of that", source="as `size_weight`, and its `grasp` 1047 and 1049", least=1, most=1000
+    size_weight: float = option(
+        0.3,
+        "Exponent of the uncommonness of the sizes of a side in its cost; 0 leaves it out",
+        source="measured as in tools/tune_side.py, on 57 recordings of the cross-model benchmark",
+        most=10,
     )
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")
 

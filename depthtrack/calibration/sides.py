@@ -9,8 +9,6 @@ Such sizes are less common among people.
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
 from depthtrack.calibration.first_scale import FirstHand, first_hand
 from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin
@@ -67,9 +65,7 @@ def calibrate_either_side(
         if not sized:
             raise failure
         return calibration_of(source, fit_skin(source, next(iter(sized.values())), _part(report, 0.75, 0.25)))
-    calibrations = {side: calibration_of(source, each) for side, each in sized.items()}
-    factors = size_costs({side: size_deviation(each.values[:COUNT]) for side, each in sized.items()}, source.options)
-    side, margin = _cheaper(calibrations, choice, factors)
+    side, margin = _cheaper(source, sized, choice)
     found = calibration_of(source, fit_skin(source, sized[side], _part(report, 0.85, 0.15)))
     # With an object in the hand, the average hands and those of adapted sizes often have different sides.
     return replace(found, side_margin=margin, side_agrees=side == choice.side)
@@ -78,32 +74,30 @@ def calibrate_either_side(
 def size_costs(deviations: Mapping[Side, float], options: CalibrationOptions) -> dict[Side, float]:
     """Return the factor of the sizes in the cost of each side.
 
-    It is 1 for the more common sizes.
+    It is a power of the density of Student's t of the sizes, whose degrees of freedom are their number. Only its ratio
+    between the sides counts: two hands of equally uncommon sizes have about the same factor.
 
     deviations: squared, in standard deviations among people, see `size_deviation`.
     """
-    least, most = min(deviations.values()), np.log(options.size_cost)
-    return {side: float(np.exp(min(options.size_weight * (each - least), most))) for side, each in deviations.items()}
+    return {side: float((1 + each / COUNT) ** options.size_weight) for side, each in deviations.items()}
 
 
-def _cheaper(
-    calibrations: dict[Side, Calibration], choice: SideChoice, factors: Mapping[Side, float]
-) -> tuple[Side, float]:
+def _cheaper(source: CalibrationSource, sized: Mapping[Side, FittedHand], choice: SideChoice) -> tuple[Side, float]:
     """Return the side that costs less, and the share by which the other one costs more.
 
     choice: the comparison of the average hands.
-    factors: of the sizes of each side.
 
-    The cost of a side is a product of four figures: the mean energies of its last tracked hand and of its average
-    hand, the factor of its sizes, and the median distance of its views. That is the distance of their points to its
-    skin. The first energy does not count if no frame shows both hands.
+    The cost of a side is a product of three figures: the mean energies of its last tracked hand and of its average
+    hand, and the factor of its sizes. If no frame shows both hands, the median distance of the points of its views to
+    its skin takes the place of the first. It is no fourth figure: sizes of the wrong side adapt to such points.
     """
-    energies, frames = mean_energies({side: each.energies for side, each in calibrations.items()})
-    costs = {
-        side: factors[side] * each.after_mm * (energies[side] if frames else 1.0) for side, each in calibrations.items()
-    }
+    costs = size_costs({side: size_deviation(each.values[:COUNT]) for side, each in sized.items()}, source.options)
+    misfits, frames = mean_energies({side: each.energies for side, each in sized.items()})
+    if not frames:
+        misfits = {side: calibration_of(source, each).after_mm for side, each in sized.items()}
+    costs = {side: cost * misfits[side] for side, cost in costs.items()}
     costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
-    side, other = sorted(calibrations, key=lambda each: costs[each])
+    side, other = sorted(sized, key=lambda each: costs[each])
     return side, costs[other] / costs[side] - 1
 
 

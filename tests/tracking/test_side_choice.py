@@ -157,8 +157,10 @@ def test_a_recording_without_a_hand_leaves_the_side_open(tmp_path: Path, capsys:
     assert Run.load(tmp_path / "run").status == ("absent",) * 3
 
 
-@pytest.mark.parametrize("sure", [True, False])
-def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.MonkeyPatch, sure: bool) -> None:
+@pytest.mark.parametrize(("sure", "compared"), [(True, True), (False, True), (False, False)])
+def test_both_sides_are_calibrated_only_if_the_side_is_open(
+    monkeypatch: pytest.MonkeyPatch, sure: bool, compared: bool
+) -> None:
     @dataclass(frozen=True)
     class Measured:
         hand: HandShape
@@ -174,19 +176,23 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     class Sized:
         side: Side
         values: np.ndarray
+        energies: np.ndarray
+
+    # Views are compared only if no frame shows both hands.
+    energies = {"right": np.array([11.0, np.nan]), "left": np.array([20.0, 1.0] if compared else [np.nan, 1.0])}
+    distances = {"right": 1.0, "left": 0.5 if compared else 2.0}
 
     def fit_sizes(source: object, side: Side, first: FirstHand, *rest: object) -> Sized:
         assert first.scale == {"right": 1.1, "left": 0.9}[side]
         tried.append(side)
-        return Sized(side, np.zeros(COUNT))
+        return Sized(side, np.zeros(COUNT), energies[side])
 
     def fit_skin(source: object, sized: Sized, *rest: object) -> Sized:
         skins.append(sized.side)
         return sized
 
     def calibration_of(source: object, sized: Sized) -> Measured:
-        energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0])}
-        return Measured(HandShape(side=sized.side), {"right": 1.0, "left": 2.0}[sized.side], energies[sized.side])
+        return Measured(HandShape(side=sized.side), distances[sized.side], sized.energies)
 
     def choose_side(*rest: object) -> SideChoice:
         # Hands of both sides have their own scales.
@@ -206,16 +212,22 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(monkeypatch: pytest.
     # The skin of the side that was chosen is fitted alone.
     assert skins == ["left" if sure else "right"]
     assert found.hand.side == ("left" if sure else "right")
-    assert found.side_margin == pytest.approx(0.27 if sure else 2 * 10 / (11 * 1.27) - 1)
+    assert found.side_margin == pytest.approx(0.27 if sure else (20 / 11 if compared else 2.0) / 1.27 - 1)
     assert found.side_agrees == sure
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
 
 
-def test_uncommon_sizes_raise_the_cost_of_a_side_up_to_a_limit() -> None:
+def test_uncommon_sizes_raise_the_cost_of_a_side() -> None:
     options = CalibrationOptions()
-    factors = sides.size_costs({"right": 45.0, "left": 50.0}, options)
-    assert factors == {"right": 1.0, "left": pytest.approx(np.exp(5 * options.size_weight))}
-    assert sides.size_costs({"right": 1e9, "left": 0.0}, options) == {"right": options.size_cost, "left": 1.0}
+    factors = sides.size_costs({"right": 40.0, "left": 120.0}, options)
+    assert factors["left"] / factors["right"] == pytest.approx(((COUNT + 120) / (COUNT + 40)) ** options.size_weight)
+    # Among uncommon hands the same difference counts less.
+    others = sides.size_costs({"right": 240.0, "left": 320.0}, options)
+    assert 1 < others["left"] / others["right"] < factors["left"] / factors["right"]
+    assert sides.size_costs({"right": 240.0, "left": 320.0}, replace(options, size_weight=0.0)) == {
+        "right": 1.0,
+        "left": 1.0,
+    }
     # One standard deviation of the scale of people, and none of another size.
     values = np.zeros(COUNT)
     values[SCALE] = np.sqrt(prior_covariance()[SCALE, SCALE])
