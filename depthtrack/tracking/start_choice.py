@@ -8,9 +8,11 @@ Along the forearm, the energy of an observation without a prior hardly changes: 
 stretched fingers in the place of its palm. So a start is also moved along the hand, and fitted there. Searches of
 single fingers do not find that all are bent: a start with all fingers bent further is fitted too. A thumb behind the
 palm is drawn to the edge of the silhouette: a start with the thumb opposed further is fitted as well. A doubtful start
-tries other places of the hand, each with a search.
+tries other places of the hand, each with a search. Its confidence is also taken in its first observation: a hand on a
+forearm may explain the region around it well, but not what was observed.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeVar
@@ -40,11 +42,15 @@ class Start(NamedTuple):
 class Proposal(Protocol):
     """A candidate that a start may be.
 
+    confidence: in the observation that it was found in, see `Confidence`.
     place: cost of the place of the hand, see `Observation.cost`, metres.
     """
 
     @property
     def candidate(self) -> Candidate: ...
+
+    @property
+    def confidence(self) -> float: ...
 
     @property
     def place(self) -> float: ...
@@ -77,7 +83,7 @@ class StartChoice(Generic[P]):
         if not (changes or tries_places(thresholds)):
             return first
         best, start = self._changed(first, resegmentation)
-        if not is_doubtful(start, self.thresholds):
+        if not is_doubtful(start, thresholds, first.confidence):
             return best
         for other in resegmentation.elsewhere():
             if (found := self.search(other)) is not None:
@@ -147,9 +153,13 @@ def tries_places(thresholds: TrackingThresholds) -> bool:
     return thresholds.start_confidence > 0 or thresholds.start_energy < float("inf")
 
 
-def is_doubtful(start: Start, thresholds: TrackingThresholds) -> bool:
-    """Return whether a start tries other places."""
-    return start.confidence < thresholds.start_confidence or start.energy > thresholds.start_energy
+def is_doubtful(start: Start, thresholds: TrackingThresholds, observed: float = 1.0) -> bool:
+    """Return whether a start tries other places.
+
+    observed: its confidence in the observation that it was found in. Its geometric mean with that of the start counts.
+    """
+    known = min(start.confidence, math.sqrt(start.confidence * observed))
+    return known < thresholds.start_confidence or start.energy > thresholds.start_energy
 
 
 def start_cost(start: Start, thresholds: TrackingThresholds) -> float:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from depthtrack.tracking.registry import create_tracker, tracker_config
 from depthtrack.tracking.stage_tracker import StageTracker
 from depthtrack.tracking.start_choice import (
     Start,
+    StartChoice,
     bent_further,
     is_doubtful,
     moved_along_hand,
@@ -59,6 +61,50 @@ def test_a_start_without_readings_around_it_is_doubtful_and_costs_most(start: St
     nothing = Start(math.inf, 0.0, 0.0)
     assert is_doubtful(nothing, OPTIONS)
     assert start_cost(nothing, OPTIONS) > start_cost(start, OPTIONS)
+
+
+@given(STARTS, st.floats(0, 1), st.floats(0, 1))
+def test_a_start_that_explains_little_of_its_observation_is_doubtful(
+    start: Start, observed: float, less: float
+) -> None:
+    assert is_doubtful(start, OPTIONS, 0.0)
+    assert is_doubtful(start, OPTIONS) == is_doubtful(start, OPTIONS, 1.0)
+    assert is_doubtful(start, OPTIONS, observed * less) or not is_doubtful(start, OPTIONS, observed)
+
+
+class Proposed(NamedTuple):
+    """Proposal with a confidence in its observation."""
+
+    candidate: Candidate
+    confidence: float
+    place: float = 0.0
+
+
+def test_a_start_on_the_forearm_tries_other_places() -> None:
+    """It explains the region around it, but little of its first observation."""
+    hand, forearm = np.zeros(27), np.ones(27)
+    tried = list[Array]()
+
+    def found(pose: Array, confidence: float) -> Proposed:
+        tried.append(pose)
+        return Proposed(Candidate(pose, 0.01, 0.8), confidence)
+
+    choice = StartChoice[Proposed](
+        replace(OPTIONS, start_shifts=(), start_bends=(), start_oppositions=()),
+        search=lambda other: found(hand, 0.8),
+        refine=lambda around, pose: None,
+        judge=lambda pose, place, _: Start(0.3 if pose is hand else 0.45, 0.8 if pose is hand else 0.5, place),
+    )
+
+    class Elsewhere(Around):
+        def elsewhere(self) -> Iterator[Observation]:
+            return iter([None])  # type: ignore[list-item]
+
+    best = choice.best(found(forearm, 0.04), Elsewhere(None))
+    assert best.candidate.pose is hand
+    assert len(tried) == 2
+    assert choice.best(found(forearm, 0.9), Elsewhere(None)).candidate.pose is forearm
+    assert len(tried) == 3
 
 
 def test_trackers_of_papers_try_no_places_moves_or_bends() -> None:
