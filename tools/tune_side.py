@@ -19,6 +19,7 @@ from depthtrack.benchmarks.papers.experiment import ExperimentOptions
 from depthtrack.calibration.calibrate import calibration_of
 from depthtrack.calibration.first_scale import FirstHand, first_hand
 from depthtrack.calibration.fitted_hand import fit_sizes
+from depthtrack.calibration.joint_optimisation import size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.recorded_views import CalibrationSource
 from depthtrack.calibration.sides import size_costs
@@ -30,7 +31,7 @@ from depthtrack.hand.shape import Side, other_side
 from depthtrack.hand.size_parameters import COUNT, size_deviation
 from depthtrack.tracking.side_choice import SideOptions, choose_side, mean_energies
 
-WEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.8)
+WEIGHTS = (0.0, 0.3, 0.5, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0)
 OPTIONS = CalibrationOptions()
 
 
@@ -105,7 +106,7 @@ def measure_sides(cell: Cell) -> Row:
             except InputError:
                 # The other side alone can be calibrated, and is taken.
                 return row | {"open": False, "margin": float(np.log1p(10.0)) * (-1 if each == side else 1)}
-            row[f"{each}_deviation"] = size_deviation(sized[each].values[:COUNT])
+            row[f"{each}_deviation"] = size_deviation(sized[each].values[:COUNT], size_covariance(OPTIONS.joint))
         misfits, frames = mean_energies({each: found.energies for each, found in sized.items()})
         if not frames:
             misfits = {each: calibration_of(source, found).after_mm for each, found in sized.items()}

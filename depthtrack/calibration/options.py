@@ -86,13 +86,11 @@ class CalibrationOptions:
     converged: float = option(0.015, "Change of the logarithm of scale and lengths that ends the rounds")
     fewest: int = option(3, "Views with a hand below which calibration is refused", unit="frames")
     accepted: AcceptanceOptions = option(AcceptanceOptions(good_views=1.0), "Accepted views")
-    sure_margin: float = option(
-        0.2, "Share by which the other side costs more if the side is certain", source="as `size_weight`"
-    )
+    sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
     size_weight: float = option(
-        0.3,
+        1.5,
         "Exponent of the uncommonness of the sizes of a side in its cost; 0 leaves it out",
-        source="measured as in tools/tune_side.py, on 57 recordings of the cross-model benchmark",
+        source="measured as in tools/tune_side.py, on 59 recordings of the cross-model benchmark",
         most=10,
     )
     joint: JointFitOptions = option(JointFitOptions(), "Joint optimisation")

@@ -12,6 +12,7 @@ from dataclasses import replace
 from depthtrack.calibration.calibrate import Calibration, calibrate, calibration_of
 from depthtrack.calibration.first_scale import FirstHand, first_hand
 from depthtrack.calibration.fitted_hand import FittedHand, fit_sizes, fit_skin
+from depthtrack.calibration.joint_optimisation import size_covariance
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.pose_search import Progress
 from depthtrack.calibration.recorded_views import CalibrationSource
@@ -77,7 +78,7 @@ def size_costs(deviations: Mapping[Side, float], options: CalibrationOptions) ->
     It is a power of the density of Student's t of the sizes, whose degrees of freedom are their number. Only its ratio
     between the sides counts: two hands of equally uncommon sizes have about the same factor.
 
-    deviations: squared, in standard deviations among people, see `size_deviation`.
+    deviations: squared, in standard deviations of the prior of `calibrate`, see `size_deviation`.
     """
     return {side: float((1 + each / COUNT) ** options.size_weight) for side, each in deviations.items()}
 
@@ -91,7 +92,10 @@ def _cheaper(source: CalibrationSource, sized: Mapping[Side, FittedHand], choice
     hand, and the factor of its sizes. If no frame shows both hands, the median distance of the points of its views to
     its skin takes the place of the first. It is no fourth figure: sizes of the wrong side adapt to such points.
     """
-    costs = size_costs({side: size_deviation(each.values[:COUNT]) for side, each in sized.items()}, source.options)
+    prior = size_covariance(source.options.joint)
+    costs = size_costs(
+        {side: size_deviation(each.values[:COUNT], prior) for side, each in sized.items()}, source.options
+    )
     misfits, frames = mean_energies({side: each.energies for side, each in sized.items()})
     if not frames:
         misfits = {side: calibration_of(source, each).after_mm for side, each in sized.items()}

@@ -85,12 +85,14 @@ def prior_covariance() -> Array:
     return C
 
 
-def size_deviation(values: Array) -> float:
+def size_deviation(values: Array, covariance: Array) -> float:
     """Return the squared distance of sizes (35,) from the average ones.
 
-    Its unit is a standard deviation among people.
+    Its unit is a standard deviation.
+
+    covariance: (35, 35) of the sizes.
     """
-    return float(values @ np.linalg.solve(prior_covariance(), values))
+    return float(values @ np.linalg.solve(covariance, values))
 
 
 def placement_covariance(joints: tuple[float, float, float], thickness: float) -> Array:

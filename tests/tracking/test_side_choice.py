@@ -231,4 +231,4 @@ def test_uncommon_sizes_raise_the_cost_of_a_side() -> None:
     # One standard deviation of the scale of people, and none of another size.
     values = np.zeros(COUNT)
     values[SCALE] = np.sqrt(prior_covariance()[SCALE, SCALE])
-    assert size_deviation(values) == pytest.approx(1.0)
+    assert size_deviation(values, prior_covariance()) == pytest.approx(1.0)
