@@ -107,10 +107,10 @@ def measure_sides(cell: Cell) -> Row:
                 # The other side alone can be calibrated, and is taken.
                 return row | {"open": False, "margin": float(np.log1p(10.0)) * (-1 if each == side else 1)}
             row[f"{each}_deviation"] = size_deviation(sized[each].values[:COUNT], size_covariance(OPTIONS.joint))
-        misfits, frames = mean_energies({each: found.energies for each, found in sized.items()})
-        if not frames:
-            misfits = {each: calibration_of(source, found).after_mm for each, found in sized.items()}
-        return row | {"margin": known + float(np.log(misfits[other_side(side)] / misfits[side]))}
+        means, frames = mean_energies({each: found.energies for each, found in sized.items()})
+        quotients = [{each: calibration_of(source, found).after_mm for each, found in sized.items()}]
+        quotients += [means] if frames else []
+        return row | {"margin": known + sum(float(np.log(each[other_side(side)] / each[side])) for each in quotients)}
 
 
 if __name__ == "__main__":

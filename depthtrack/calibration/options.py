@@ -88,7 +88,7 @@ class CalibrationOptions:
     accepted: AcceptanceOptions = option(AcceptanceOptions(good_views=1.0), "Accepted views")
     sure_margin: float = option(0.3, "Share by which the other side costs more if the side is certain")
     size_weight: float = option(
-        1.5,
+        2.0,
         "Exponent of the uncommonness of the sizes of a side in its cost; 0 leaves it out",
         source="measured as in tools/tune_side.py, on 59 recordings of the cross-model benchmark",
         most=10,

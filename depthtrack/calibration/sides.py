@@ -88,19 +88,19 @@ def _cheaper(source: CalibrationSource, sized: Mapping[Side, FittedHand], choice
 
     choice: the comparison of the average hands.
 
-    The cost of a side is a product of three figures: the mean energies of its last tracked hand and of its average
-    hand, and the factor of its sizes. If no frame shows both hands, the median distance of the points of its views to
-    its skin takes the place of the first. It is no fourth figure: sizes of the wrong side adapt to such points.
+    The cost of a side is a product of four figures: the mean energies of its last tracked hand and of its average
+    hand, the median distance of its views, and the factor of its sizes. That distance is the one of their points to its
+    skin. The first energy does not count if no frame shows both hands. Sizes of a wrong side may adapt well to the
+    views, but are less common.
     """
     prior = size_covariance(source.options.joint)
     costs = size_costs(
         {side: size_deviation(each.values[:COUNT], prior) for side, each in sized.items()}, source.options
     )
-    misfits, frames = mean_energies({side: each.energies for side, each in sized.items()})
-    if not frames:
-        misfits = {side: calibration_of(source, each).after_mm for side, each in sized.items()}
-    costs = {side: cost * misfits[side] for side, cost in costs.items()}
-    costs = {side: cost if side == choice.side else cost * (1 + choice.margin) for side, cost in costs.items()}
+    energies, frames = mean_energies({side: each.energies for side, each in sized.items()})
+    for side, each in sized.items():
+        costs[side] *= calibration_of(source, each).after_mm * (energies[side] if frames else 1.0)
+        costs[side] *= 1.0 if side == choice.side else 1 + choice.margin
     side, other = sorted(sized, key=lambda each: costs[each])
     return side, costs[other] / costs[side] - 1
 

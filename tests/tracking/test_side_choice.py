@@ -178,9 +178,9 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(
         values: np.ndarray
         energies: np.ndarray
 
-    # Views are compared only if no frame shows both hands.
-    energies = {"right": np.array([11.0, np.nan]), "left": np.array([20.0, 1.0] if compared else [np.nan, 1.0])}
-    distances = {"right": 1.0, "left": 0.5 if compared else 2.0}
+    # Energies are compared only if a frame shows both hands.
+    energies = {"right": np.array([11.0, np.nan]), "left": np.array([10.0, 1.0] if compared else [np.nan, 1.0])}
+    distances = {"right": 1.0, "left": 2.0}
 
     def fit_sizes(source: object, side: Side, first: FirstHand, *rest: object) -> Sized:
         assert first.scale == {"right": 1.1, "left": 0.9}[side]
@@ -212,7 +212,7 @@ def test_both_sides_are_calibrated_only_if_the_side_is_open(
     # The skin of the side that was chosen is fitted alone.
     assert skins == ["left" if sure else "right"]
     assert found.hand.side == ("left" if sure else "right")
-    assert found.side_margin == pytest.approx(0.27 if sure else (20 / 11 if compared else 2.0) / 1.27 - 1)
+    assert found.side_margin == pytest.approx(0.27 if sure else 2 * (10 / 11 if compared else 1) / 1.27 - 1)
     assert found.side_agrees == sure
     assert found.sure_margin == (SideOptions().sure_margin if sure else CalibrationOptions().sure_margin)
 
