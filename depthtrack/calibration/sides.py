@@ -3,7 +3,7 @@
 Hands of average proportions of both sides, each of the scale that fits single frames best, are tracked over the
 recording. If that leaves the side open, hands of both sides are calibrated. The energies of the last hands tracked for
 that are compared. A few views alone leave the side open often: a hand of adapted sizes fits them from its back as well.
-Such sizes are less common among people.
+Such sizes are less common by the prior of the fit.
 """
 
 from collections.abc import Callable, Mapping
@@ -75,8 +75,8 @@ def calibrate_either_side(
 def size_costs(deviations: Mapping[Side, float], options: CalibrationOptions) -> dict[Side, float]:
     """Return the factor of the sizes in the cost of each side.
 
-    It is a power of the density of Student's t of the sizes, whose degrees of freedom are their number. Only its ratio
-    between the sides counts: two hands of equally uncommon sizes have about the same factor.
+    It is an inverse power of Student's t density of the sizes, with as many degrees of freedom. Only its ratio between
+    the sides counts: two hands of equally uncommon sizes have about the same factor.
 
     deviations: squared, in standard deviations of the prior of `calibrate`, see `size_deviation`.
     """
