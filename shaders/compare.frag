@@ -3,7 +3,8 @@
 
 uniform sampler2D inverse_depth;  // 1/m, 0 = nothing drawn; tiles of the atlas
 uniform sampler2D observation;    // depth o_d in metres, 0 = no reading; silhouette o_s, 0 or 1;
-                                  // inverse depth that a surface before an occluder exceeds, 1/m, 0 = no occluder
+                                  // inverse depths, 1/m, that a surface before an occluder exceeds, and one before
+                                  // the surroundings; 0 = none
 uniform ivec2 tile;               // pixels
 uniform ivec2 blocks;             // blocks of a tile
 uniform float match_depth, clamp_depth;  // d_m, d_M, metres
@@ -17,9 +18,9 @@ void main() {
     sums = vec4(0.0);
     for (int y = first.y; y < last.y; ++y) {
         for (int x = first.x; x < last.x; ++x) {
-            vec3 observed = texelFetch(observation, ivec2(x, y), 0).rgb;
+            vec4 observed = texelFetch(observation, ivec2(x, y), 0);
             float w = texelFetch(inverse_depth, corner * tile + ivec2(x, y), 0).r;
-            bool drawn = w > 0.0;
+            bool drawn = w > observed.a;
             float difference = abs(observed.r - (drawn ? 1.0 / w : 0.0));
             bool matched = drawn && (difference < match_depth || observed.r == 0.0);
             float before = observed.b > 0.0 && w > observed.b ? before_cost : 0.0;

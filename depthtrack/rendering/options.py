@@ -1,5 +1,6 @@
 """Options of scoring: the objective of Oikonomidis et al. 2011 and its renderer."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -45,6 +46,14 @@ class Objective:
         unit="m",
         least=1e-6,
         most=10,
+    )
+    surroundings_depth: float = option(
+        0.02,
+        "Depth behind the readings around the hand, such as the forearm's, from which they hide it; infinite: never",
+        unit="m",
+        source="half of a wrist's thickness; 10 and 30 mm measured alike on hands seen along the forearm",
+        least=1e-6,
+        most=math.inf,
     )
     before_cost: float = option(
         1.0,

@@ -36,7 +36,8 @@ class OracleScorer(ScorerBase):
         return Terms.of_sums(self._objective, batch, clamped, matched_silhouette, union)
 
     def _sums(self, pose: Array) -> tuple[float, float, float]:
-        target, drawn = self.target, self._depth(pose)
+        target = self.target
+        drawn = target.before_surroundings(self._depth(pose), self._objective.surroundings_depth)
         before = target.before_occluder(drawn, self._objective.hidden_depth)
         return evaluate(self._objective, target.silhouette, target.depth, drawn, before)
 

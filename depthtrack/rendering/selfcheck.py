@@ -30,6 +30,8 @@ _SEED = 50
 """The first seed from 0 that leaves no pixel within half a micrometre of d_m, where float32 rounding would decide."""
 _OCCLUDER = 0.477
 """Metres: depth of an object that hides half of what is drawn behind it, with no pixel within a micrometre."""
+_SURROUNDINGS = 0.465
+"""Metres: depth of readings at the bottom of the image, which hide a part of what is drawn behind them."""
 _OBJECTIVE = Objective(before_cost=0.5)
 """Pixels before the object count neither once more nor not at all, so that an error in either shows."""
 ENERGY_TOLERANCE = 1e-3
@@ -68,7 +70,8 @@ class SelfCheck:
 def scene() -> tuple[HandShape, Target, Array]:
     """Return a hand, its target of 64 x 64 pixels, and poses (64, 27) around the true one.
 
-    An object hides the left third of the image behind it, but not all of the poses there.
+    An object hides the left third of the image behind it, and other readings the bottom third. They do not hide all of
+    the poses there.
     """
     shape = HandShape()
     truth = within_limits(make_pose([0, 0, 0.5], [0.1, 1, 0.2, 0.1], np.full(20, 0.3)))
@@ -82,8 +85,10 @@ def scene() -> tuple[HandShape, Target, Array]:
         depth = oracle.render(truth)
     occluder = np.zeros(camera.shape, np.float32)
     occluder[:, : SIDE // 3] = _OCCLUDER
-    seen = np.where(occluder > 0, np.float32(0), depth)
-    return shape, Target(camera, seen > 0, seen, occluder=occluder), poses
+    surroundings = np.zeros(camera.shape, np.float32)
+    surroundings[-(SIDE // 3) :] = _SURROUNDINGS
+    seen = np.where((occluder > 0) | (surroundings > 0), np.float32(0), depth)
+    return shape, Target(camera, seen > 0, seen, occluder=occluder, surroundings=surroundings), poses
 
 
 def self_check(name: str, seconds: float = 0.7, **options: Any) -> SelfCheck:

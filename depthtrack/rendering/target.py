@@ -1,5 +1,6 @@
 """The observed silhouette and depth maps that hypotheses are scored against."""
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from depthtrack.errors import InputError
 from depthtrack.geometry.camera import Camera
 from depthtrack.geometry.rectangle import Rect
-from depthtrack.types import Depth, Index, Mask
+from depthtrack.types import Array, Depth, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Target:
     surroundings: (h, w) metres, readings that are not of the hand, such as the forearm's, 0 = none; None if unknown.
 
     A hypothesis may lie behind the occluder. What lies before it or inside it costs more in Eq. (2).
-    The surroundings do not count there.
+    What lies well behind the surroundings costs nothing there.
 
     Raises:
         ValueError: if a map differs in shape from the camera's image, or a depth is negative or not finite.
@@ -98,6 +99,18 @@ class Target:
             return np.zeros(self.camera.shape, np.float32)
         return np.where(self.occluder > 0, np.float32(1) / (self.occluder + np.float32(behind)), np.float32(0))
 
+    def seen_from(self, behind: float) -> Depth:
+        """Return the inverse depth (h, w), 1/m, that a surface before the surroundings exceeds.
+
+        It is 0 without surroundings, and on the occluder.
+
+        behind: depth behind their readings from which on they hide it, metres.
+        """
+        if self.surroundings is None or math.isinf(behind):
+            return np.zeros(self.camera.shape, np.float32)
+        hides = self.surroundings > 0 if self.occluder is None else (self.surroundings > 0) & (self.occluder == 0)
+        return np.where(hides, np.float32(1) / (self.surroundings + np.float32(behind)), np.float32(0))
+
     @cached_property
     def hiding(self) -> Depth | None:
         """Depth (h, w) of what may hide the hand, metres, 0 = nothing.
@@ -119,6 +132,19 @@ class Target:
             return rendered
         hidden = (self.hiding > 0) & (rendered >= self.hiding + np.float32(behind))
         return np.where(hidden, np.float32(0), rendered) if hidden.any() else rendered
+
+    def before_surroundings(self, rendered: ArrayLike, behind: float) -> Array:
+        """Return a rendered depth map (h, w), metres, with 0 where the surroundings hide it.
+
+        The occluder hides nothing here.
+
+        behind: depth behind their readings, metres.
+        """
+        depth = np.asarray(rendered, dtype=np.float64)
+        if self.surroundings is None:
+            return depth
+        hidden = (self.surroundings > 0) & (depth >= self.surroundings.astype(np.float64) + behind)
+        return np.where(hidden if self.occluder is None else hidden & (self.occluder == 0), 0.0, depth)
 
     def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
         """Return where (h, w) a surface lies before or inside the occluder; None without one.

@@ -80,6 +80,8 @@ _ROUTINE_SWARMS = SwarmSearchOptions(
 
 _POSTURE_ICP = IcpOptions(posture_weight=3e-4, keypoint_weight=0.3)
 """Fits with a prior on the posture; keypoints weigh as much more as the prior, which they compete with."""
+_PAPER_SCORING = ScoringOptions(objective=Objective(surroundings_depth=math.inf))
+"""Scoring of the published trackers: nothing hides the hand."""
 _LIKELY_POSTURES = ScoringOptions(objective=Objective(posture_weight=0.04))
 """Scoring of the trackers that fit surfaces: prefers common postures where the images leave a finger open."""
 
@@ -283,7 +285,7 @@ class Oikonomidis2011Config:
         "Trust in a pose; not part of the paper",
         advanced=True,
     )
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_PAPER_SCORING, "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:
@@ -309,7 +311,7 @@ class Schroeder2014Config:
         "Trust in a pose; not part of the paper",
         advanced=True,
     )
-    scoring: ScoringOptions = option(ScoringOptions(), "Rendering and scoring")
+    scoring: ScoringOptions = option(_PAPER_SCORING, "Rendering and scoring")
     seed: int = option(0, "Seed of the random numbers", most=MOST_SEED)
 
     def __post_init__(self) -> None:

@@ -183,11 +183,14 @@ def test_the_kernel_sums_tiles_like_the_plain_evaluation(seed: int) -> None:
     empty = float(np.minimum(depth, objective.clamp_depth).sum(dtype=np.float64)), 0.0, float(silhouette.sum())
     limits = objective.match_depth, objective.clamp_depth, objective.before_cost
     occluder = np.where(rng.random((h, w)) < 0.3, rng.uniform(0.4, 0.5, (h, w)), 0)
-    target = Target(Camera(w, h, 60, 60, 0, 0), silhouette, depth, occluder=occluder)
-    maps = depth, silhouette.astype(np.float32), target.hidden_from(objective.hidden_depth)
+    around = np.where(rng.random((h, w)) < 0.3, rng.uniform(0.4, 0.5, (h, w)), 0)
+    target = Target(Camera(w, h, 60, 60, 0, 0), silhouette, depth, occluder=occluder, surroundings=around)
+    hiding = target.hidden_from(objective.hidden_depth), target.seen_from(objective.surroundings_depth)
+    maps = depth, silhouette.astype(np.float32), *hiding
     sum_tiles(tiles, columns, regions, *maps, empty, *limits, sums)
-    before = [target.before_occluder(image, objective.hidden_depth) for image in rendered]
-    expected = [evaluate(objective, silhouette, depth, *maps) for maps in zip(rendered, before, strict=True)]
+    seen = [target.before_surroundings(image, objective.surroundings_depth) for image in rendered]
+    before = [target.before_occluder(image, objective.hidden_depth) for image in seen]
+    expected = [evaluate(objective, silhouette, depth, *maps) for maps in zip(seen, before, strict=True)]
     np.testing.assert_allclose(sums, expected, rtol=1e-5, atol=1e-5)
 
 

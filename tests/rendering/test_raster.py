@@ -1,5 +1,6 @@
 """The rasteriser agrees with the float64 oracle: silhouettes, depth and energies."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from tests.support.rendering import (
     target_of,
     window_on,
     with_occluder,
+    with_surroundings,
 )
 
 
@@ -54,6 +56,35 @@ def test_agrees_with_the_oracle_behind_an_occluder(seed: int, reduced: int | Non
     target = with_occluder(target_of(shape, poses[0], window_on(shape, poses[0], 224), rng), 0.5, rng)
     objective = Objective(hidden_depth=0.003, before_cost=cost)
     assert_agrees(shape, target if reduced is None else target.reduced(reduced), poses, objective)
+
+
+@given(seed=st.integers(0, 2**32 - 1), reduced=st.sampled_from([None, 96, 33]), with_object=st.booleans())
+@settings(max_examples=20)
+def test_agrees_with_the_oracle_behind_other_readings(seed: int, reduced: int | None, with_object: bool) -> None:
+    rng = np.random.default_rng(seed)
+    shape, poses = random_shape(rng), random_poses(rng, 5, (0.02, -0.01, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 224), rng)
+    target = with_surroundings(with_occluder(target, 0.5, rng) if with_object else target, 0.48, rng)
+    assert_agrees(shape, target if reduced is None else target.reduced(reduced), poses, Objective())
+
+
+def test_what_other_readings_hide_costs_nothing() -> None:
+    rng = np.random.default_rng(4)
+    shape, poses = HandShape(), random_poses(rng, 6, (0, 0, 0.5), 0.02)
+    target = target_of(shape, poses[0], window_on(shape, poses[0], 96), rng)
+    near = np.full(target.camera.shape, 0.2, np.float32)
+    energies = {}
+    for name, surroundings, depth in (("free", None, 0.02), ("hidden", near, 0.02), ("never", near, math.inf)):
+        objective = Objective(kinematic_weight=0.0, surroundings_depth=depth)
+        with RasterScorer(shape, objective) as scorer:
+            scorer.set_target(replace(target, surroundings=surroundings))
+            energies[name] = scorer.score(poses)
+            empty = target.depth.clip(0, objective.clamp_depth).sum(dtype=np.float64) / np.count_nonzero(
+                target.silhouette
+            )
+    np.testing.assert_array_equal(energies["free"], energies["never"])
+    # Nothing of a hidden hand is drawn: the depth and the silhouette of the observation remain.
+    np.testing.assert_allclose(energies["hidden"], 1e3 * empty + 20.0, rtol=1e-4)
 
 
 def test_an_occluder_before_the_hand_changes_no_bit() -> None:

@@ -1,5 +1,6 @@
 """A hand may lie behind an occluder, and pays for lying before it or inside it."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -47,6 +48,13 @@ def test_surroundings_hide_a_hand_but_cost_nothing() -> None:
     near = rendered - np.float32(0.2)
     assert both.unhidden(near, 0.005) is near
     assert Target(LINE, *maps).unhidden(rendered, 0.005) is rendered
+    # Hypotheses are scored without what lies behind the surroundings; an object hides in its own way.
+    np.testing.assert_array_equal(target.before_surroundings(rendered, 0.005), target.unhidden(rendered, 0.005))
+    np.testing.assert_array_equal(both.before_surroundings(rendered, 0.005)[:, 5], rendered[:, 5])
+    for each in (target, both):
+        seen = each.before_surroundings(rendered, 0.005) > 0
+        np.testing.assert_array_equal((rendered > 0) & (1 / np.maximum(rendered, 1e-3) > each.seen_from(0.005)), seen)
+        assert not each.seen_from(math.inf).any()
     cropped = both.crop(Rect.of_size(1, 0, 3, 1))
     np.testing.assert_array_equal(cropped.hiding, surroundings[:, 1:4])
 

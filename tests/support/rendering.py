@@ -57,6 +57,18 @@ def with_occluder(target: Target, distance: float, rng: np.random.Generator) -> 
     return Target(target.camera, target.silhouette & free, target.depth * free, occluder=np.where(inside, plane, 0))
 
 
+def with_surroundings(target: Target, distance: float, rng: np.random.Generator) -> Target:
+    """Return the target with other readings over a part of it.
+
+    They are of a slanted plane, about `distance` (m) away.
+    """
+    plane = with_occluder(Target.blank(target.camera), distance, rng).occluder
+    assert plane is not None
+    free = plane == 0
+    maps = target.silhouette & free, target.depth * free
+    return Target(target.camera, *maps, occluder=target.occluder, surroundings=plane)
+
+
 def window_on(shape: HandShape, pose: np.ndarray, side: int) -> Camera:
     """A square region of the Kinect's image, `side` pixels wide, centred on the hand."""
     uv = KINECT.project(HandModel(shape).keypoints(pose)).mean(axis=0)
@@ -85,6 +97,9 @@ def assert_agrees(shape: HandShape, target: Target, poses: np.ndarray, objective
         undecided += np.count_nonzero(drawn != truth)
         if target.occluder is not None:
             behind = theirs - target.occluder - objective.hidden_depth
+            undecided += np.count_nonzero(truth & (np.abs(behind) < 5e-6))
+        if target.surroundings is not None:
+            behind = theirs - target.surroundings - objective.surroundings_depth
             undecided += np.count_nonzero(truth & (np.abs(behind) < 5e-6))
         pixel = (2 * objective.silhouette_weight + objective.clamp_depth / objective.depth_unit) / (
             1 + np.count_nonzero(target.silhouette | truth)

@@ -193,14 +193,14 @@ class Renderer:
         return _texture(gl)
 
     def upload(self, gl: Any, texture: int, observation: Array32) -> None:
-        """Write an observation (h, w, 3) to a texture.
+        """Write an observation (h, w, 4) to a texture.
 
-        It holds depth (metres), silhouette (0 or 1), and the inverse depth (1/m) that a surface before or inside
-        an occluder exceeds.
+        It holds depth (metres), silhouette (0 or 1), and the inverse depths (1/m) that a surface before or inside
+        an occluder exceeds, and one before the surroundings.
         """
         height, width, _ = observation.shape
         gl.glBindTexture(gl.GL_TEXTURE_2D, texture)
-        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RGB32F, width, height, 0, gl.GL_RGB, gl.GL_FLOAT, observation)
+        gl.glTexImage2D(gl.GL_TEXTURE_2D, 0, gl.GL_RGBA32F, width, height, 0, gl.GL_RGBA, gl.GL_FLOAT, observation)
 
     def _describe_instances(self, gl: Any) -> None:
         gl.glBindVertexArray(self._vertices)

@@ -73,13 +73,14 @@ class OpenGLScorer(ScorerBase):
         self._intrinsics = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._silhouette = target.silhouette.astype(np.float32)
         self._hidden_from = target.hidden_from(self._objective.hidden_depth)
+        self._seen_from = target.seen_from(self._objective.surroundings_depth)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         self._empty = float(clamped), 0.0, float(np.count_nonzero(target.silhouette))
         if self.sums == "gpu":
             with self._open.context as gl:
                 if not self._textures:
                     self._textures.append(self._open.new_texture(gl))
-                maps = np.stack([target.depth, self._silhouette, self._hidden_from], axis=-1)
+                maps = np.stack([target.depth, self._silhouette, self._hidden_from, self._seen_from], axis=-1)
                 self._open.upload(gl, self._textures[0], maps)
         self._target = target
 
@@ -147,7 +148,7 @@ class OpenGLScorer(ScorerBase):
             sums[:] = self._open.sum(gl, which, grid, len(sums), self._textures[0], limits)
         else:
             pixels = self._read(gl, which, grid, len(sums))
-            maps = target.depth, self._silhouette, self._hidden_from
+            maps = target.depth, self._silhouette, self._hidden_from, self._seen_from
             sum_tiles(pixels, grid.columns, regions, *maps, self._empty, *limits, sums)
 
 

@@ -15,6 +15,7 @@ def sum_tiles(
     depth: Array32,
     silhouette: Array32,
     hidden_from: Array32,
+    seen_from: Array32,
     empty: tuple[float, float, float],
     match_depth: float,
     clamp_depth: float,
@@ -28,6 +29,7 @@ def sum_tiles(
     depth: (h, w) metres, 0 = no reading.
     silhouette: (h, w) 0 or 1.
     hidden_from: (h, w) inverse depth, 1/m, that a surface before or inside an occluder exceeds; 0 without one.
+    seen_from: (h, w) inverse depth, 1/m, that a surface before the surroundings exceeds; 0 without any.
     before_cost: see `Objective`.
     empty: sums of a tile in which nothing is drawn.
     sums: (B, 3) written: min(|o_d - r_d|, d_M) in metres, pixels of o_s and r_m, pixels of o_s or r_m.
@@ -41,11 +43,12 @@ def sum_tiles(
         sums[n, 0], sums[n, 1], sums[n, 2] = empty
         for v in range(regions[n, 1], regions[n, 3]):
             drawn_row = inverse_depth[top + v, left + u0 : left + u1]
-            depth_row, silhouette_row, hidden_row = depth[v, u0:u1], silhouette[v, u0:u1], hidden_from[v, u0:u1]
+            depth_row, silhouette_row = depth[v, u0:u1], silhouette[v, u0:u1]
+            hidden_row, seen_row = hidden_from[v, u0:u1], seen_from[v, u0:u1]
             clamped, on_silhouette, off_silhouette = zero, zero, zero
             for u in range(u1 - u0):
                 w, o, s, behind = drawn_row[u], depth_row[u], silhouette_row[u], hidden_row[u]
-                drawn = w > zero
+                drawn = w > seen_row[u]
                 difference = abs(o - one / w)
                 change = min(difference, clamp) - min(o, clamp)
                 before = cost if (behind > zero) & (w > behind) else zero

@@ -43,7 +43,7 @@ class KernelArrays:
 
     def __init__(self, hand: Array, objective: Array, tickets: Tickets) -> None:
         self.hand, self.objective, self.tickets = hand, objective, tickets
-        self.camera, self.empty, self.has_occluder = np.empty(8), np.empty(3), np.zeros(1, np.bool_)
+        self.camera, self.empty, self.is_hiding = np.empty(8), np.empty(3), np.zeros(1, np.bool_)
         self.workspaces: list[Workspace] = []
         self._capacity = 0
         self.allocate_poses(256)
@@ -63,11 +63,11 @@ class KernelArrays:
         if count > self._capacity:
             self._capacity = count + count // 4  # regions grow and shrink by a little
             self.workspaces = [Workspace(tiles.new_tiles(self._capacity)) for _ in range(threads)]
-            self._observed, self._hidden_from = (tiles.new_tiles(self._capacity) for _ in range(2))
+            self._images = [tiles.new_tiles(self._capacity) for _ in range(3)]
         for each in self.workspaces:
             each.fit_to(columns, rows)
         size = count * tiles.TILE_PIXELS
-        self.observed, self.hidden_from = self._observed[:size], self._hidden_from[:size]
+        self.observed, self.hidden_from, self.seen_from = (image[:size] for image in self._images)
         self.labels = np.zeros(count, np.int64)
 
     def score_tickets(self, thread: int, spin_limit: int) -> None:
@@ -81,8 +81,9 @@ class KernelArrays:
             self.camera,
             self.observed,
             self.labels,
-            self.has_occluder,
+            self.is_hiding,
             self.hidden_from,
+            self.seen_from,
             self.empty,
             self.objective,
             *self.workspaces[thread].arrays,

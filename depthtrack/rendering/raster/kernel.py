@@ -116,7 +116,7 @@ def _draw_hand(pose, hand, camera, scratch, table, buffer, first, last, low, hig
 
 
 @kernel_part
-def _compare(has_occluder, observed, labels, hidden_from, buffer, tile_rows, low, high, limits):
+def _compare(is_hiding, observed, labels, hidden_from, seen_from, buffer, tile_rows, low, high, limits):
     """Return how the drawn pixels change the sums of Eq. (2), and clear the buffer.
 
     Returns the change of the clamped difference, the matched pixels of the silhouette, and all matched pixels. A pixel
@@ -136,7 +136,7 @@ def _compare(has_occluder, observed, labels, hidden_from, buffer, tile_rows, low
         for index in range(start, start + (bottom - top + 1) * TILE_PIXELS, TILE_PIXELS):
             w = _load(buffer, index)
             o = _load(observed, index)
-            drawn = w > 0.0
+            drawn = w > (_load(seen_from, index) if is_hiding else nothing)
             z = estimated_reciprocal(w)
             z = z + z * (one - w * z)
             difference = vabs(o - z)
@@ -147,7 +147,7 @@ def _compare(has_occluder, observed, labels, hidden_from, buffer, tile_rows, low
             hit = bits_of(drawn) & (bits_of(difference < match_depth) | label >> TILE_PIXELS)
             matched += count_bits(hit)
             on_silhouette += count_bits(hit & label)
-            if has_occluder:
+            if is_hiding:
                 behind = _load(hidden_from, index)
                 before = both(behind > 0.0, w > behind)
                 in_column = in_column + select(before, _fill(before_cost * clamp_depth), 0.0)
@@ -167,8 +167,9 @@ def score_poses(
     camera: Array,
     observed: Array32,
     labels: Index,
-    has_occluder: Mask,
+    is_hiding: Mask,
     hidden_from: Array32,
+    seen_from: Array32,
     empty: Array,
     objective: Array,
     scratch: Array,
@@ -189,8 +190,9 @@ def score_poses(
     hand, camera: see `posing.set_up`.
     observed: depth, metres, tiled; 0 = no reading, NaN outside the image.
     labels: see `tiles.write_labels`.
-    has_occluder: (1,) whether any pixel of `hidden_from` is not 0.
+    is_hiding: (1,) whether any pixel of `hidden_from` or `seen_from` is not 0.
     hidden_from: inverse depth, 1/m, that a surface before or inside an occluder exceeds, tiled; 0 without one.
+    seen_from: inverse depth, 1/m, that a surface before the surroundings exceeds, tiled; 0 without any.
     empty: (3,) sums of Eq. (2) for an empty image.
     objective: (7,) d_m, d_M, depth unit, epsilon, lambda, lambda_k, `Objective.before_cost`.
     sums, energies: (B, 3) and (B,) of Oikonomidis et al. 2011, Eq. (2) and (1), written.
@@ -206,14 +208,14 @@ def score_poses(
         if n < 0:
             break
         tile_rows = _draw_hand(poses[n], hand, camera, scratch, table, buffer, first, last, low, high)
-        # Constant arguments compile to two loops: the one without an occluder does not read `hidden_from`.
-        if has_occluder[0]:
+        # Constant arguments compile to two loops: the one without them does not read the maps of what hides.
+        if is_hiding[0]:
             clamped, on_silhouette, matched = _compare(
-                True, observed, labels, hidden_from, buffer, tile_rows, low, high, limits
+                True, observed, labels, hidden_from, seen_from, buffer, tile_rows, low, high, limits
             )
         else:
             clamped, on_silhouette, matched = _compare(
-                False, observed, labels, hidden_from, buffer, tile_rows, low, high, limits
+                False, observed, labels, hidden_from, seen_from, buffer, tile_rows, low, high, limits
             )
         sums[n, 0] = empty[0] + clamped
         sums[n, 1] = on_silhouette
