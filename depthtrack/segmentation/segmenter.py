@@ -18,6 +18,7 @@ from depthtrack.segmentation.roi_tracking import RoiPrior, segment_roi
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
 from depthtrack.segmentation.skin_colour import SkinColourModel
 from depthtrack.segmentation.skin_of_frame import frame_for_skin, skin_of_frame
+from depthtrack.segmentation.surroundings import surroundings_of
 
 
 class Segmenter:
@@ -117,13 +118,13 @@ class Segmenter:
         hand: its sizes.
         """
         masks, occluder = located.masks, None
-        has_colour = self._skin is not None and frame.colour is not None
-        if not has_colour:
+        skin = None if frame.colour is None else self._skin
+        if skin is None:
             valid = ~flying_pixels(frame.depth[masks.region.slices], frame.camera.fx, self._options.flying_pixels)
             masks = replace(masks, readings=masks.readings & valid, silhouette=masks.silhouette & valid)
         if not masks.readings.any():
             return None
-        if has_colour and self._options.occluder.find_occluder:
+        if skin is not None and self._options.occluder.find_occluder:
             place = located.surface_centre, located.wrist, hand
             occluder = find_occluder(frame, masks, *place, self._options.occluder)
         sight = located.surface_centre / np.linalg.norm(located.surface_centre)
@@ -141,6 +142,6 @@ class Segmenter:
             wrist=located.wrist,
             cloud_options=self._options.point_cloud,
             occluder=occluder,
-            surroundings=np.where(masks.silhouette, np.float32(0), frame.depth[masks.region.slices]),
+            surroundings=surroundings_of(frame, masks, skin, float(located.surface_centre[2])),
             keypoints=None if frame.keypoints is None else frame.keypoints.shifted(*masks.region[:2]),
         )
