@@ -5,8 +5,11 @@ but it hides the hand all the same. Its colour shows it, unless the gap may be a
 no readings beside a near surface, where the projector does not reach the one behind it.
 """
 
+from typing import TypeVar
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from depthtrack.compilation import compiled
 from depthtrack.geometry.rectangle import Rect
@@ -14,12 +17,15 @@ from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.masks import HandMasks
 from depthtrack.segmentation.morphology import dilated, eroded
 from depthtrack.segmentation.skin_adaptation import AdaptiveSkin
-from depthtrack.types import Depth, Mask
+from depthtrack.types import Depth, Image, Mask
 
+Pixel = TypeVar("Pixel", bound=np.generic)
 TOO_NEAR = np.float32(0.05)
 """Metres: depth given to skin that is too near for a reading; no sensor measures there."""
 _LEAST_WIDTH = 0.012
 """Metres at the hand's distance: narrower skin without readings is an error of the hand's outline."""
+_SAMPLES = 4
+"""Samples across the least width."""
 _BASELINE = 0.1
 """Metres between camera and projector, at most; that of the first Kinect is 0.075."""
 _LEAST_SHARE = 0.5
@@ -38,51 +44,64 @@ def surroundings_of(frame: Frame, masks: HandMasks, skin: AdaptiveSkin | None, d
     found = np.where(masks.silhouette, np.float32(0), frame.depth[masks.region.slices])
     if skin is None or frame.colour is None:
         return found
-    pixels = frame.camera.fx / distance
-    radius = max(1, round(_LEAST_WIDTH / 2 * pixels))
+    width = _LEAST_WIDTH * frame.camera.fx / distance
     missing = ~((found > 0) | masks.silhouette)
-    if not eroded(missing, radius).any():
+    stride = max(1, round(width / _SAMPLES))
+    if not _wide(_every(missing, stride)).any():
         return found
-    region = masks.region.grown(round(_AROUND * pixels)).clipped(frame.camera.rect)
-    near = _skin_too_near(frame, region, skin, radius)
-    here = masks.region.shifted(-region.left, -region.top)
-    found[near[here.slices] & missing] = TOO_NEAR
+    region = masks.region.grown(round(_AROUND / _LEAST_WIDTH * width)).clipped(frame.camera.rect)
+    if not (near := _skin_too_near(frame.depth, frame.colour, region, skin, stride, frame.camera.fx)).any():
+        return found
+    rows = (np.arange(masks.region.top, masks.region.bottom) - region.top) // stride
+    columns = (np.arange(masks.region.left, masks.region.right) - region.left) // stride
+    found[near[rows].take(columns, axis=1) & missing] = TOO_NEAR
     return found
 
 
-def _skin_too_near(frame: Frame, region: Rect, skin: AdaptiveSkin, radius: int) -> Mask:
-    """Return the wide gaps (h, w) of skin colour in a region that are no shadows.
+def _skin_too_near(
+    depth: Depth, colour: Image, region: Rect, skin: AdaptiveSkin, stride: int, focal_length: float
+) -> Mask:
+    """Return the wide gaps of skin colour that are no shadows, in every n-th row and column of a region.
 
-    radius: half of their least width, pixels.
+    depth, colour: (H, W) metres and (H, W, 3) RGB of the frame.
+    stride: n.
     """
-    assert frame.colour is not None
-    missing = ~(frame.depth[region.slices] > 0)
-    wide = eroded(skin.find_among(frame.colour, region, missing), radius)
+    sampled, readings = _every(colour[region.slices], stride), _every(depth[region.slices], stride)
+    missing = ~(readings > 0)
+    wide = _wide(skin.find_among(sampled, Rect.of_image(missing.shape), missing))
     if not wide.any():
         return wide
     shadows = np.empty(missing.shape, np.bool_)
-    mark_shadows(frame.depth, *map(int, region), float(frame.camera.fx) * _BASELINE, shadows)
-    count, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)
-    areas = np.bincount(labels.ravel(), minlength=count)
-    near = np.bincount(labels[~shadows], minlength=count) >= _LEAST_SHARE * areas
+    mark_shadows(readings, float(focal_length) / stride * _BASELINE, shadows)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(wide.view(np.uint8), connectivity=4)
+    lit = np.bincount(labels[wide & ~shadows], minlength=count)
+    near = lit >= _LEAST_SHARE * stats[:, cv2.CC_STAT_AREA]
     near[0] = False
-    return dilated(near[labels], radius + 1)
+    return dilated(near[labels], _SAMPLES // 2 + 1) if near.any() else np.zeros_like(wide)
+
+
+def _every(image: NDArray[Pixel], stride: int) -> NDArray[Pixel]:
+    return np.ascontiguousarray(image[::stride, ::stride])
+
+
+def _wide(mask: Mask) -> Mask:
+    """Return the samples (h, w) of a mask that are half the least width from its complement."""
+    return eroded(mask, _SAMPLES // 2)
 
 
 @compiled(nogil=True)
-def mark_shadows(depth: Depth, left: int, top: int, right: int, bottom: int, focal_baseline: float, out: Mask) -> None:
+def mark_shadows(depth: Depth, focal_baseline: float, out: Mask) -> None:
     """Mark the pixels without a reading that may lie in the shadow of a surface in their row.
 
-    depth: (H, W) of the whole frame, metres, 0 = no reading.
-    left, top, right, bottom: region of the frame.
+    depth: (h, w) metres, 0 = no reading.
     focal_baseline: focal length times baseline of the sensor, pixels times metres.
-    out: (h, w) of the region, written.
+    out: (h, w) written.
 
     A projector beside the camera shifts a shadow by the difference of disparities, to either side.
     """
     width = depth.shape[1]
-    for v in range(top, bottom):
-        out[v - top] = False
+    for v in range(depth.shape[0]):
+        out[v] = False
         for side in range(2):
             step, u = (1, 0) if side == 0 else (-1, width - 1)
             # Along the row: the largest sum of place and disparity of a surface, and the last surface.
@@ -98,6 +117,6 @@ def mark_shadows(depth: Depth, left: int, top: int, right: int, bottom: int, foc
                     end += step
                 behind = max(last, depth[v, end]) if 0 <= end < width else np.inf
                 while u != end:
-                    if left <= u < right and step * u <= farthest - focal_baseline / behind:
-                        out[v - top, u - left] = True
+                    if step * u <= farthest - focal_baseline / behind:
+                        out[v, u] = True
                     u += step
