@@ -61,7 +61,9 @@ def surroundings_of(frame: Frame, masks: HandMasks, skin: AdaptiveSkin | None, d
 def _skin_too_near(
     depth: Depth, colour: Image, region: Rect, skin: AdaptiveSkin, stride: int, focal_length: float
 ) -> Mask:
-    """Return the wide gaps of skin colour that are no shadows, in every n-th row and column of a region.
+    """Return wide gaps of skin colour that are no shadows, in samples of a region.
+
+    Every n-th row and column is sampled.
 
     depth, colour: (H, W) metres and (H, W, 3) RGB of the frame.
     stride: n.
