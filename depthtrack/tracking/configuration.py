@@ -257,6 +257,7 @@ class HybridConfig:
 
 _PAPER_THRESHOLDS = TrackingThresholds(
     longest_gap=math.inf,
+    doubt_confidence=0,
     start_shifts=(),
     start_bends=(),
     start_oppositions=(),

@@ -122,6 +122,7 @@ class FrameContext:
     surface: surface that all fits of the frame use, None for that of their options.
     deadline: time at which searches end.
     search: search for the hand that the deadline interrupted, which the next frame goes on with.
+    anew: whether a search starts from the observation alone, without the last pose.
     """
 
     observation: Observation
@@ -135,6 +136,7 @@ class FrameContext:
     surface: SurfaceName | None = None
     deadline: Deadline = field(default_factory=Deadline)
     search: InterruptedSearch | None = None
+    anew: bool = False
 
     @cached_property
     def random(self) -> np.random.Generator:

@@ -10,7 +10,6 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.sequence import Frame
-from depthtrack.recording.status import Status
 from depthtrack.segmentation.hand_size import AVERAGE_HAND
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
@@ -86,11 +85,11 @@ def around_start(
 
     It cannot be segmented anew any more.
 
-    A start elsewhere than the observed palm has chosen another place: the frame is segmented again around its pose.
+    A pose elsewhere than the observed palm is at another place: the frame is segmented again around it.
     """
     if observation is None or observation.resegmentation is None:
         return observation, None
-    if estimate.status is Status.STARTED and estimate.pose is not None:
+    if estimate.status.is_trusted and estimate.pose is not None:
         apart = float(np.linalg.norm(estimate.pose[POSITION] - observation.centre))
         if apart > _ELSEWHERE:
             try:

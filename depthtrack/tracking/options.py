@@ -60,6 +60,19 @@ class TrackingThresholds:
         unit="s",
         most=math.inf,
     )
+    doubt_confidence: float = option(
+        0.25,
+        "A track that stays below this confidence for `doubt_after` is in doubt: a start competes with it. "
+        "The same goes for such a pose after a loss",
+        most=1,
+    )
+    doubt_after: float = option(
+        0.3, "Time of low confidence until the first start competes; it doubles each time", unit="s", least=1e-3
+    )
+    longest_doubt: float = option(5.0, "Longest time between two such starts", unit="s", least=1e-3)
+    doubt_margin: float = option(
+        0.1, "Energy by which a start must be better than a track in doubt", unit="clamp", most=100
+    )
     fastest: float = option(
         4.0,
         "Speed of a palm, beside half a hand's length, beyond which a pose is of another hand: the track is lost",

@@ -17,7 +17,7 @@ from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.random import checked_pose
 from depthtrack.tracking.spread import bones_in_view
 from depthtrack.tracking.stages.stage import Stage
-from depthtrack.tracking.start_choice import Start, StartChoice
+from depthtrack.tracking.start_choice import Start, StartChoice, start_cost
 from depthtrack.tracking.state import InterruptedSearch, TrackState
 from depthtrack.tracking.timing import Deadline, StageClock
 from depthtrack.tracking.tracker import ABSENT, Estimate
@@ -97,6 +97,8 @@ class StageTracker:
         """
         if self._state.pose is None:
             return self._estimate(observation, {Status.STARTED: self._stages.start})
+        if observation.resegmentation is not None and self._state.is_in_doubt(observation.timestamp):
+            return self._reconsider(observation, observation.resegmentation)
         rival = {Status.STARTED: self._stages.start} if self._state.is_stale(observation.timestamp) else {}
         return self._estimate(observation, {Status.TRACKED: self._stages.follow} | rival)
 
@@ -130,22 +132,63 @@ class StageTracker:
         """Return the best estimate of some lists of stages, by the status that each implies.
 
         It is absent if the stages find no candidate. A start is also moved and bent; a doubtful one tries other places
-        of the hand, and after a pause it searches again.
+        of the hand, and after a pause it searches again. After a loss, a start without the last pose competes with a
+        doubtful pose near it.
 
         pose: (27,) given by the user.
         """
         clock = StageClock(self.stages)
         begins = pose is None and self._state.begins(observation.timestamp)
+        lost = self._state.pose is None and self._state.is_search_due(observation.timestamp)
         after_pause = Status.TRACKED in lists and Status.STARTED in lists
         best = self._propose(observation, lists, clock, pose)
         if best is None:
             estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
             self._state.update(estimate)
             return estimate
-        if begins and self._deadline is None and observation.resegmentation is not None:
-            best = self._best_start(best, observation.resegmentation, lists, clock)
+        again = observation.resegmentation if self._deadline is None and pose is None else None
+        if begins and again is not None:
+            best = self._best_start(best, again, lists, clock)
+        elif lost and again is not None and best.confidence < self._thresholds.doubt_confidence:
+            best = self._or_anew(best, observation, again, clock)
         if after_pause and self._deadline is None and best.confidence < self._thresholds.start_confidence:
             best = self._start_again(best, observation, clock)
+        return self._committed(best, observation, clock)
+
+    def _reconsider(self, observation: Observation, resegmentation: Resegmentation) -> Estimate:
+        """Return the estimate of a track in doubt.
+
+        A start competes with it, if there is no deadline.
+
+        observation: made without a prior.
+        """
+        clock, last = StageClock(self.stages), self._state.followed_pose(observation.timestamp)
+        around = None if last is None else resegmentation.around(last)
+        guided = observation if around is None else around.arrived_at(observation.arrived)
+        follow = self._propose(guided, {Status.TRACKED: self._stages.follow}, clock)
+        assert follow is not None
+        if self._deadline is None:
+            follow = self._or_anew(follow, observation, resegmentation, clock)
+        return self._committed(follow, observation, clock)
+
+    def _or_anew(
+        self, best: _Proposal, observation: Observation, resegmentation: Resegmentation, clock: StageClock
+    ) -> _Proposal:
+        """Return a doubtful estimate, or a start without the last pose that costs clearly less."""
+        starts = {Status.STARTED: self._stages.start}
+        found = self._propose(observation, starts, clock, anew=True)
+        if found is None:
+            return best
+        found = self._best_start(found, resegmentation, starts, clock, anew=True)
+        before, after = (
+            start_cost(self.start_at(each.candidate.pose, each.place, resegmentation), self._thresholds)
+            for each in (best, found)
+        )
+        clock.lap("target")
+        return found if after < before - self._thresholds.doubt_margin else best
+
+    def _committed(self, best: _Proposal, observation: Observation, clock: StageClock) -> Estimate:
+        """Update the state with a proposal; return its estimate."""
         self.evidence = best.evidence
         return self._state.commit(
             *best.candidate,
@@ -171,12 +214,16 @@ class StageTracker:
         resegmentation: Resegmentation,
         lists: dict[Status, Sequence[Stage]],
         clock: StageClock,
+        anew: bool = False,
     ) -> _Proposal:
-        """Return the best of a start, of those moved or bent, and of those at other places."""
+        """Return the best of a start, of those moved or bent, and of those at other places.
+
+        anew: see `_propose`.
+        """
         refine = {Status.STARTED: self._stages.refine}
         choice = StartChoice[_Proposal](
             self._thresholds,
-            search=lambda other: self._propose(other, lists, clock),
+            search=lambda other: self._propose(other, lists, clock, anew=anew),
             refine=lambda around, pose: self._propose(around, refine, clock, pose),
             judge=self.start_at,
         )
@@ -191,10 +238,12 @@ class StageTracker:
         clock: StageClock,
         pose: Array | None = None,
         repeat: int = 0,
+        anew: bool = False,
     ) -> _Proposal | None:
         """Return the best candidate of some lists of stages, or None without any.
 
         repeat: number of the repetition, which has other random numbers.
+        anew: whether searches leave the last pose out.
         """
         deadline = Deadline.after(self._deadline, observation.arrived)
         self._tools.set_target(observation)
@@ -203,7 +252,7 @@ class StageTracker:
         interrupted: InterruptedSearch | None = None
         for status, stages in lists.items():
             seed = self._seed + repeat
-            frame = FrameContext(observation, self._tools, self._state, seed, pose, deadline=deadline)
+            frame = FrameContext(observation, self._tools, self._state, seed, pose, deadline=deadline, anew=anew)
             candidates = list[Candidate]()
             for stage in stages:
                 candidates = stage(frame, candidates)

@@ -61,7 +61,8 @@ class TrackState:
     time: of the last pose, s; NaN if there was none.
     branches: alternatives to the last pose.
     lost: estimate of the last frame, if it was not trusted.
-    last_trusted: (27,) last trusted pose; None after `memory` seconds without one, in which a hand hardly turns over.
+    last_trusted: (27,) last trusted pose that was not in doubt; None after `memory` seconds without one, in which a
+        hand hardly turns over.
     search: search for the hand that the deadline of the last frame interrupted. A resumed run begins it anew.
     """
 
@@ -74,10 +75,10 @@ class TrackState:
         self.last_trusted: Array | None = None
         self.branches: tuple[Branch, ...] = ()
         self.search: InterruptedSearch | None = None
-        self.time, self._started = math.nan, math.nan
+        self.time, self._trusted, self._started = math.nan, math.nan, math.nan
         self._motion, self._duration = np.zeros(26), math.nan
         self.lost: Estimate | None = None
-        self._lost_since, self._previous = math.nan, math.nan
+        self._lost_since, self._doubted_since, self._previous = math.nan, math.nan, math.nan
 
     def is_lost(self, energy: float, agreement: float, confidence: float = math.nan) -> bool:
         """Return whether a pose with these figures is not trusted.
@@ -160,7 +161,7 @@ class TrackState:
     def forget_last(self) -> None:
         """Remove the last pose and the energies, so that a new track may start anywhere."""
         self.pose, self.last_trusted = None, None
-        self.lost, self._lost_since = None, math.nan
+        self.lost, self._lost_since, self._doubted_since = None, math.nan, math.nan
         self._energies.clear()
 
     def update(self, estimate: Estimate) -> None:
@@ -173,9 +174,13 @@ class TrackState:
             self.lost = estimate
             if math.isnan(self._lost_since):
                 self._lost_since = estimate.timestamp
+        if not (estimate.status.is_trusted and estimate.confidence < self._thresholds.doubt_confidence):
+            self._doubted_since = math.nan
+        elif math.isnan(self._doubted_since):
+            self._doubted_since = estimate.timestamp
         if estimate.pose is None or estimate.status is Status.LOST:
             self.pose, self._motion, self.branches = None, np.zeros(26), ()
-            if elapsed > self._thresholds.memory + _SAME_TIME:
+            if estimate.timestamp - self._trusted > self._thresholds.memory + _SAME_TIME:
                 self.last_trusted = None
             return
         if self.pose is not None and estimate.status is Status.TRACKED:
@@ -185,7 +190,9 @@ class TrackState:
             self._started = estimate.timestamp
         self.pose, self.energy, self._agreement = estimate.pose, estimate.energy, estimate.agreement
         self._confidence, self.branches = estimate.confidence, estimate.branches
-        self.last_trusted, self.time = estimate.pose, estimate.timestamp
+        self.time = estimate.timestamp
+        if math.isnan(self._doubted_since):
+            self.last_trusted, self._trusted = estimate.pose, estimate.timestamp
         self._energies.append(estimate.energy)
 
     def begins(self, timestamp: float) -> bool:
@@ -208,6 +215,21 @@ class TrackState:
         """Return how many searches are due after that of the second lost frame."""
         limits, elapsed = self._thresholds, max(timestamp - self._lost_since, 0.0) + _SAME_TIME
         return int(math.log2(1 + elapsed / limits.search_interval)) + int(elapsed / limits.longest_interval)
+
+    def is_in_doubt(self, timestamp: float) -> bool:
+        """Return whether a start competes with a track of low confidence at `timestamp` (s).
+
+        It does after times that double up to `longest_doubt`.
+        """
+        if self.pose is None or math.isnan(self._doubted_since):
+            return False
+        return self._starts_until(timestamp) > self._starts_until(self._previous)
+
+    def _starts_until(self, timestamp: float) -> int:
+        """Return how many starts competed with a track of low confidence until then."""
+        limits, elapsed = self._thresholds, timestamp - self._doubted_since + _SAME_TIME
+        turns = elapsed / limits.doubt_after
+        return int(elapsed / limits.longest_doubt) + (1 + int(math.log2(turns)) if turns >= 1 else 0)
 
     def is_stale(self, timestamp: float) -> bool:
         """Return whether the last pose is too old at `timestamp` (s) to be followed without a rival."""
@@ -233,7 +255,13 @@ class TrackState:
         limits = self._thresholds
         if self.pose is None or self._agreement < limits.guide_agreement or self.is_stale(timestamp):
             return None
+        if self.is_in_doubt(timestamp):
+            return None
         high = self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy
         if high and not self._confidence >= limits.sure_confidence:
             return None
-        return retract(self.pose, self.motion_until(timestamp))
+        return self.followed_pose(timestamp)
+
+    def followed_pose(self, timestamp: float) -> Array | None:
+        """Return the linear prediction (27,) for `timestamp` (s); None without a last pose."""
+        return None if self.pose is None else retract(self.pose, self.motion_until(timestamp))

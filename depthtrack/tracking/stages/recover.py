@@ -188,13 +188,13 @@ class Reinitialise:
 
     def __call__(self, frame: FrameContext, candidates: list[Candidate]) -> list[Candidate]:
         state = frame.state
-        near = self._near_last(frame) if state.search is None else []
+        near = self._near_last(frame) if state.search is None and not frame.anew else []
         is_due = state.search is not None or state.is_search_due(frame.observation.timestamp)
         if near and state.lost is not None and (not is_due or self._is_good(frame, near[0], state.lost)):
             return near
         if near and frame.puts_search_off():
             return near
-        brief = state.lost is not None and state.last_trusted is not None
+        brief = state.lost is not None and state.last_trusted is not None and not frame.anew
         found = run_stages(self.elsewhere if brief else self.start, frame)
         return near if near and found[0].energy >= self.options.accept_global * near[0].energy else found
 
