@@ -47,7 +47,8 @@ def surroundings_of(frame: Frame, masks: HandMasks, skin: AdaptiveSkin | None, d
     width = _LEAST_WIDTH * frame.camera.fx / distance
     missing = ~((found > 0) | masks.silhouette)
     stride = max(1, round(width / _SAMPLES))
-    if not _wide(_every(missing, stride)).any():
+    gaps = _every(missing, stride)
+    if not (_wide(gaps).any() and _wide_skin(frame.colour, masks.region, gaps, skin, stride).any()):
         return found
     region = masks.region.grown(round(_AROUND / _LEAST_WIDTH * width)).clipped(frame.camera.rect)
     if not (near := _skin_too_near(frame.depth, frame.colour, region, skin, stride, frame.camera.fx)).any():
@@ -68,18 +69,24 @@ def _skin_too_near(
     depth, colour: (H, W) metres and (H, W, 3) RGB of the frame.
     stride: n.
     """
-    sampled, readings = _every(colour[region.slices], stride), _every(depth[region.slices], stride)
-    missing = ~(readings > 0)
-    wide = _wide(skin.find_among(sampled, Rect.of_image(missing.shape), missing))
-    if not wide.any():
-        return wide
-    shadows = np.empty(missing.shape, np.bool_)
+    readings = _every(depth[region.slices], stride)
+    wide = _wide_skin(colour, region, ~(readings > 0), skin, stride)
+    shadows = np.empty(wide.shape, np.bool_)
     mark_shadows(readings, float(focal_length) / stride * _BASELINE, shadows)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(wide.view(np.uint8), connectivity=4)
     lit = np.bincount(labels[wide & ~shadows], minlength=count)
     near = lit >= _LEAST_SHARE * stats[:, cv2.CC_STAT_AREA]
     near[0] = False
     return dilated(near[labels], _SAMPLES // 2 + 1) if near.any() else np.zeros_like(wide)
+
+
+def _wide_skin(colour: Image, region: Rect, gaps: Mask, skin: AdaptiveSkin, stride: int) -> Mask:
+    """Return the samples (h, w) of a region that lie in wide gaps of skin colour.
+
+    gaps: (h, w) samples without a reading.
+    """
+    sampled = _every(colour[region.slices], stride)
+    return _wide(skin.find_among(sampled, Rect.of_image(gaps.shape), gaps))
 
 
 def _every(image: NDArray[Pixel], stride: int) -> NDArray[Pixel]:
