@@ -51,7 +51,7 @@ class Objective:
         0.02,
         "Depth behind the readings around the hand, such as the forearm's, from which they hide it; infinite: never",
         unit="m",
-        source="half of a wrist's thickness; 10 and 30 mm measured alike on hands seen along the forearm",
+        source="half of a wrist's thickness; checked on hands seen along the forearm, see docs/experiments.md",
         least=1e-6,
         most=math.inf,
     )
