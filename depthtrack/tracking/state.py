@@ -219,9 +219,9 @@ class TrackState:
     def is_in_doubt(self, timestamp: float) -> bool:
         """Return whether a start competes with a track of low confidence at `timestamp` (s).
 
-        It does after times that double up to `longest_doubt`.
+        It does after times that double up to `longest_doubt`. After a pause, a start competes in any case.
         """
-        if self.pose is None or math.isnan(self._doubted_since):
+        if self.pose is None or math.isnan(self._doubted_since) or self.is_stale(timestamp):
             return False
         return self._starts_until(timestamp) > self._starts_until(self._previous)
 

@@ -61,6 +61,7 @@ def test_starts_compete_with_a_track_in_doubt_at_growing_intervals(made: Synthes
         state = TrackState(limits, 40.0)
         state.restore([doubtful(made.poses[0], index / 30, confidence) for index in range(9)])
         assert state.is_in_doubt(0.3) == in_doubt
+        assert not state.is_in_doubt(1.0)
 
 
 def test_after_a_doubtful_track_the_hand_is_not_searched_for_near_it(made: Synthesiser) -> None:
