@@ -37,7 +37,7 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
     "thresholds.lost_ratio": (1.6, 2.0, 2.6),
     "thresholds.sure_confidence": (0.2, 0.3, 0.5, 1.0),
     "thresholds.doubt_confidence": (0.0, 0.15, 0.25, 0.35),
-    "thresholds.doubt_margin": (0.0, 0.1, 0.2),
+    "thresholds.doubt_margin": (0.0, 0.05, 0.1),
     "recovery.good_energy": (0.15, 0.2, 0.25),
     "recovery.accept_local": (0.88, 0.93, 0.97),
     "recovery.accept_global": (0.65, 0.75, 0.85),

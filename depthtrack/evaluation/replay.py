@@ -156,7 +156,8 @@ class Replay:
         options = self.configuration.tracker
         if isinstance(options, MarkersConfig):
             raise InputError(f"the run {self.run.folder} was solved from markers: leave out --sequence")
-        return TrackState(options.thresholds, options.scoring.objective.clamp)
+        has_deadline = getattr(options, "deadline", None) is not None
+        return TrackState(options.thresholds, options.scoring.objective.clamp, reconsiders=not has_deadline)
 
 
 def estimate_of(run: Run, row: int) -> Estimate:

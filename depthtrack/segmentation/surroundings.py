@@ -30,6 +30,8 @@ _BASELINE = 0.1
 """Metres between camera and projector, at most; that of the first Kinect is 0.075."""
 _LEAST_SHARE = 0.5
 """Least share of a gap that is no shadow."""
+_MOST_BORDER = 0.4
+"""Largest share of the region's border that a forearm takes: a wall out of range takes more."""
 _AROUND = 0.1
 """Metres around the hand's region in which gaps are judged."""
 
@@ -76,6 +78,8 @@ def _skin_too_near(
     count, labels, stats, _ = cv2.connectedComponentsWithStats(wide.view(np.uint8), connectivity=4)
     lit = np.bincount(labels[wide & ~shadows], minlength=count)
     near = lit >= _LEAST_SHARE * stats[:, cv2.CC_STAT_AREA]
+    border = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
+    near &= np.bincount(border, minlength=count) <= _MOST_BORDER * len(border)
     near[0] = False
     return dilated(near[labels], _SAMPLES // 2 + 1) if near.any() else np.zeros_like(wide)
 

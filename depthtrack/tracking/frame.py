@@ -148,6 +148,11 @@ class FrameContext:
         return frame_generator(self.seed, self.observation.frame_index)
 
     @property
+    def last_pose(self) -> Array | None:
+        """Pose (27,) of the last frame; None without one, or if a search leaves it out."""
+        return None if self.anew else self.state.pose
+
+    @property
     def motion(self) -> Array:
         """Predicted step (26,) from the last pose to this frame, in the tangent space."""
         return self.state.motion_until(self.observation.timestamp)
@@ -159,7 +164,7 @@ class FrameContext:
         """
         if self.start_pose is not None:
             return 1.0
-        if self.state.pose is None:
+        if self.last_pose is None:
             return options.search_share
         return math.exp(-max(self.observation.timestamp - self.state.time, 0.0) / options.posture_memory)
 

@@ -10,6 +10,7 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.pose import ORIENTATION, POSITION
 from depthtrack.recording.frame_failures import failure_text
 from depthtrack.recording.sequence import Frame
+from depthtrack.recording.status import Status
 from depthtrack.segmentation.hand_size import AVERAGE_HAND
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.roi_tracking import RoiPrior
@@ -33,13 +34,16 @@ def segment(
 ) -> tuple[Observation | None, float, str | None]:
     """Return the observation of a frame, the time in milliseconds, and an unexpected failure.
 
-    It is near the prediction, else near the keypoints of the frame.
+    It is near the prediction, else near the keypoints of the frame. If no hand is found, it is near
+    a track in doubt.
     """
     begun, observation, failure = clock(), None, None
     try:
         pose = guide.predicted_pose(frame.timestamp)
         prior = roi_prior(model, keypoints.pose(frame) if pose is None else pose)
         observation = segment_start(frame, segmenter, model) if prior is None else segmenter.segment(frame, prior)
+        if observation is None and (doubted := roi_prior(model, guide.doubted_pose(frame.timestamp))) is not None:
+            observation = segmenter.segment(frame, doubted)
     except Exception as error:
         failure = failure_of(error)
     if observation is not None:
@@ -85,11 +89,11 @@ def around_start(
 
     It cannot be segmented anew any more.
 
-    A pose elsewhere than the observed palm is at another place: the frame is segmented again around it.
+    A start elsewhere than the observed palm has chosen another place: the frame is segmented again around its pose.
     """
     if observation is None or observation.resegmentation is None:
         return observation, None
-    if estimate.status.is_trusted and estimate.pose is not None:
+    if estimate.status is Status.STARTED and estimate.pose is not None:
         apart = float(np.linalg.norm(estimate.pose[POSITION] - observation.centre))
         if apart > _ELSEWHERE:
             try:

@@ -63,7 +63,7 @@ class TrackingThresholds:
     doubt_confidence: float = option(
         0.25,
         "A track that stays below this confidence for `doubt_after` is in doubt: a start competes with it. "
-        "The same goes for such a pose after a loss",
+        "The same goes for such a pose after a loss, and neither with a deadline",
         source="twelve tuning recordings of the cross-model benchmark, ten of them along the forearm",
         most=1,
     )
@@ -72,7 +72,7 @@ class TrackingThresholds:
     )
     longest_doubt: float = option(5.0, "Longest time between two such starts", unit="s", least=1e-3)
     doubt_margin: float = option(
-        0.1, "Energy by which a start must be better than a track in doubt", unit="clamp", most=100
+        0.05, "Energy by which a start must be better than a track in doubt", unit="clamp", most=100
     )
     fastest: float = option(
         4.0,

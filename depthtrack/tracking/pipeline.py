@@ -107,6 +107,9 @@ class NoTracker:
     def predicted_pose(self, timestamp: float) -> Array | None:
         return None
 
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        return None
+
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         return ABSENT
 
@@ -137,6 +140,9 @@ class _KnownPose(NamedTuple):
 
     def predicted_pose(self, timestamp: float) -> Array:
         return self.pose
+
+    def doubted_pose(self, timestamp: float) -> None:
+        return None
 
     def restore(self, estimates: Sequence[Estimate]) -> None:
         return None

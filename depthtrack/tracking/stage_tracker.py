@@ -55,6 +55,7 @@ class _Proposal(NamedTuple):
     spread: tuple[float, ...]
     place: float
     seen_energy: float
+    may_jump: bool = False
 
 
 class StageTracker:
@@ -77,7 +78,10 @@ class StageTracker:
         deadline: milliseconds after a frame arrives at which its searches end; None for none.
         """
         self.name, self._stages, self._tools, self._seed, self._deadline = name, stages, tools, seed, deadline
-        self._thresholds, self._state = thresholds, TrackState(thresholds, tools.scoring.objective.clamp)
+        self._thresholds, self._state = (
+            thresholds,
+            TrackState(thresholds, tools.scoring.objective.clamp, deadline is None),
+        )
         listed = (stage.name for stage in (*stages.follow, *stages.start, *stages.refine))
         self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed, "confidence")))
         self._confidence = fitted_model()
@@ -109,6 +113,10 @@ class StageTracker:
     def predicted_pose(self, timestamp: float) -> Array | None:
         """Return the pose (27,) predicted for `timestamp` (s); None for no ROI prior."""
         return self._state.predicted_pose(timestamp)
+
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        """Return the pose (27,) predicted for `timestamp` (s) by a track in doubt; else None."""
+        return self._state.doubted_pose(timestamp)
 
     def start_at(self, pose: Array, place: float, resegmentation: Resegmentation) -> Start:
         """Return a start in the region of interest of its pose (27,).
@@ -143,9 +151,7 @@ class StageTracker:
         after_pause = Status.TRACKED in lists and Status.STARTED in lists
         best = self._propose(observation, lists, clock, pose)
         if best is None:
-            estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
-            self._state.update(estimate)
-            return estimate
+            return self._absent(observation, clock)
         again = observation.resegmentation if self._deadline is None and pose is None else None
         if begins and again is not None:
             best = self._best_start(best, again, lists, clock)
@@ -156,36 +162,41 @@ class StageTracker:
         return self._committed(best, observation, clock)
 
     def _reconsider(self, observation: Observation, resegmentation: Resegmentation) -> Estimate:
-        """Return the estimate of a track in doubt.
-
-        A start competes with it, if there is no deadline.
+        """Return the estimate of a track in doubt, with which a start competes.
 
         observation: made without a prior.
         """
-        clock, last = StageClock(self.stages), self._state.followed_pose(observation.timestamp)
-        around = None if last is None else resegmentation.around(last)
-        guided = observation if around is None else around.arrived_at(observation.arrived)
-        follow = self._propose(guided, {Status.TRACKED: self._stages.follow}, clock)
-        assert follow is not None
-        if self._deadline is None:
-            follow = self._or_anew(follow, observation, resegmentation, clock)
-        return self._committed(follow, observation, clock)
+        clock, doubted = StageClock(self.stages), self._state.doubted_pose(observation.timestamp)
+        around = None if doubted is None else resegmentation.around(doubted)
+        follow = self._propose(around or observation, {Status.TRACKED: self._stages.follow}, clock)
+        if follow is None:
+            return self._absent(observation, clock)
+        return self._committed(self._or_anew(follow, observation, resegmentation, clock), observation, clock)
 
     def _or_anew(
         self, best: _Proposal, observation: Observation, resegmentation: Resegmentation, clock: StageClock
     ) -> _Proposal:
-        """Return a doubtful estimate, or a start without the last pose that costs clearly less."""
+        """Return a doubtful estimate, or a start without the last pose that costs clearly less.
+
+        Confidence does not count: it prefers common postures, to which the fits of a start are drawn.
+        """
         starts = {Status.STARTED: self._stages.start}
         found = self._propose(observation, starts, clock, anew=True)
         if found is None:
             return best
         found = self._best_start(found, resegmentation, starts, clock, anew=True)
         before, after = (
-            start_cost(self.start_at(each.candidate.pose, each.place, resegmentation), self._thresholds)
-            for each in (best, found)
+            start_cost(start._replace(confidence=0.0), self._thresholds)
+            for start in (self.start_at(each.candidate.pose, each.place, resegmentation) for each in (best, found))
         )
         clock.lap("target")
-        return found if after < before - self._thresholds.doubt_margin else best
+        return found._replace(may_jump=True) if after < before - self._thresholds.doubt_margin else best
+
+    def _absent(self, observation: Observation, clock: StageClock) -> Estimate:
+        """Update the state with the estimate of a frame without a candidate, and return it."""
+        estimate = replace(ABSENT, stage_ms=clock.milliseconds, timestamp=observation.timestamp)
+        self._state.update(estimate)
+        return estimate
 
     def _committed(self, best: _Proposal, observation: Observation, clock: StageClock) -> Estimate:
         """Update the state with a proposal; return its estimate."""
@@ -201,6 +212,7 @@ class StageTracker:
             best.branches,
             best.seen,
             best.seen_energy,
+            best.may_jump,
         )
 
     def _start_again(self, best: _Proposal, observation: Observation, clock: StageClock) -> _Proposal:
@@ -224,7 +236,7 @@ class StageTracker:
         choice = StartChoice[_Proposal](
             self._thresholds,
             search=lambda other: self._propose(other, lists, clock, anew=anew),
-            refine=lambda around, pose: self._propose(around, refine, clock, pose),
+            refine=lambda around, pose: self._propose(around, refine, clock, pose, anew=anew),
             judge=self.start_at,
         )
         best = choice.best(first, resegmentation)

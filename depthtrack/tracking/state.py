@@ -66,8 +66,12 @@ class TrackState:
     search: search for the hand that the deadline of the last frame interrupted. A resumed run begins it anew.
     """
 
-    def __init__(self, thresholds: TrackingThresholds, clamp: float) -> None:
-        self._thresholds, self._clamp = thresholds, clamp
+    def __init__(self, thresholds: TrackingThresholds, clamp: float, reconsiders: bool = True) -> None:
+        """Make the state of no track.
+
+        reconsiders: whether starts compete with a track in doubt; they take too long for a deadline.
+        """
+        self._thresholds, self._clamp, self._reconsiders = thresholds, clamp, reconsiders
         self._agreement, self._confidence = 0.0, math.nan
         self._energies: deque[float] = deque(maxlen=thresholds.median_frames)
         self.pose: Array | None = None
@@ -132,16 +136,18 @@ class TrackState:
         branches: tuple[Branch, ...] = (),
         seen: Candidate | None = None,
         seen_energy: float = math.nan,
+        may_jump: bool = False,
     ) -> Estimate:
         """Update the state with the next pose; return its estimate, lost if it is not trusted.
 
         seen: energy and agreement that decide this; those of the pose if None.
         seen_energy: see `Estimate`.
+        may_jump: whether the pose may be anywhere, as a start that replaces a track.
         """
         judged = (energy, agreement) if seen is None else (seen.energy, seen.agreement)
         # Two doubtful frames are worth one that is certainly wrong.
         certain = math.sqrt(confidence * self._confidence) if status is Status.TRACKED else confidence
-        if self.is_jump(pose, timestamp) or self.is_lost(*judged, certain):
+        if (not may_jump and self.is_jump(pose, timestamp)) or self.is_lost(*judged, certain):
             status = Status.LOST
         figures = confidence, visibility, spread, branches
         estimate = Estimate(pose, energy, agreement, status, stage_ms, timestamp, *figures, seen_energy=seen_energy)
@@ -221,7 +227,9 @@ class TrackState:
 
         It does after times that double up to `longest_doubt`. After a pause, a start competes in any case.
         """
-        if self.pose is None or math.isnan(self._doubted_since) or self.is_stale(timestamp):
+        if self.pose is None or not self._reconsiders or self.is_stale(timestamp):
+            return False
+        if not self._doubted_since <= self._previous <= timestamp:
             return False
         return self._starts_until(timestamp) > self._starts_until(self._previous)
 
@@ -260,8 +268,10 @@ class TrackState:
         high = self.energy > limits.energy * self._clamp and self.energy > limits.guide_ratio * self.median_energy
         if high and not self._confidence >= limits.sure_confidence:
             return None
-        return self.followed_pose(timestamp)
+        return retract(self.pose, self.motion_until(timestamp))
 
-    def followed_pose(self, timestamp: float) -> Array | None:
-        """Return the linear prediction (27,) for `timestamp` (s); None without a last pose."""
-        return None if self.pose is None else retract(self.pose, self.motion_until(timestamp))
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        """Return the linear prediction (27,) for `timestamp` (s) of a track in doubt; else None."""
+        if self.pose is None or not self.is_in_doubt(timestamp):
+            return None
+        return retract(self.pose, self.motion_until(timestamp))

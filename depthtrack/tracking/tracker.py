@@ -74,6 +74,10 @@ class Guide(Protocol):
         """Return the pose (27,) predicted for `timestamp` (s); None for no ROI prior."""
         ...
 
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        """Return the pose (27,) predicted for `timestamp` (s) by a track in doubt; else None."""
+        ...
+
 
 class Tracker(Guide, Protocol):
     """Follows one hand. Its state depends on its estimates alone, so that a run can be resumed."""

@@ -87,6 +87,9 @@ class ScriptedTracker:
     def predicted_pose(self, timestamp: float) -> None:
         return None
 
+    def doubted_pose(self, timestamp: float) -> None:
+        return None
+
     def close(self) -> None:
         self.closed = True
 

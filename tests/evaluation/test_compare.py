@@ -130,6 +130,8 @@ class Idle:
 
     def predicted_pose(self, timestamp: float) -> None: ...
 
+    def doubted_pose(self, timestamp: float) -> None: ...
+
     def start(self, observation: Any, pose: Any = None) -> Estimate:
         return Estimate(None, math.nan, 0.0, Status.LOST, {"wait": 20.0, "work": 10.0})
 

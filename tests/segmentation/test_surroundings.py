@@ -74,3 +74,23 @@ def test_a_forearm_without_readings_surrounds_the_hand_by_its_colour(sensor: str
     else:
         assert not any(shares)
     assert max(others) < 0.05
+
+
+def test_a_wall_of_skin_colour_out_of_range_does_not_hide_the_hand() -> None:
+    frame, mask, _ = made(replace(CLUTTERED, sensor="kinect2"), 0)
+    segmenter = Segmenter(SkinColourModel.default())
+    found = segmenter.segment(frame)
+    assert found is not None
+    assert frame.colour is not None
+    behind = frame.depth > frame.depth[mask].max() + 0.2
+    skin = frame.colour[mask].mean(axis=0).astype(np.uint8)
+    wall = replace(
+        frame,
+        depth=np.where(behind, np.float32(0), frame.depth),
+        colour=np.where(behind[..., None], skin, frame.colour),
+    )
+    seen = segmenter.segment(wall)
+    assert seen is not None
+    assert seen.surroundings is not None
+    # Small gaps between fingers may be left.
+    assert np.count_nonzero(seen.surroundings == TOO_NEAR) < 0.03 * np.count_nonzero(mask)

@@ -165,6 +165,9 @@ class BadStart:
     def predicted_pose(self, timestamp: float) -> Array | None:
         return self._tracker.predicted_pose(timestamp)
 
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        return self._tracker.doubted_pose(timestamp)
+
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         return self._tracker.start(observation, pose)
 

@@ -12,9 +12,13 @@ from depthtrack.hand.kinematics import HandModel
 from depthtrack.hand.shape import HandShape
 from depthtrack.recording.sequence import Frame
 from depthtrack.recording.status import Status
+from depthtrack.segmentation.observation import Observation
+from depthtrack.segmentation.roi_tracking import RoiPrior
 from depthtrack.segmentation.segmenter import Segmenter
 from depthtrack.synthesis.generate import Synthesiser
 from depthtrack.tracking.configuration import HybridConfig
+from depthtrack.tracking.guided_segmentation import segment
+from depthtrack.tracking.keypoint_guide import KeypointGuide
 from depthtrack.tracking.options import TrackingThresholds
 from depthtrack.tracking.pipeline import Pipeline
 from depthtrack.tracking.registry import create_tracker, tracker_config
@@ -94,3 +98,32 @@ def test_a_start_replaces_a_wrong_track_in_doubt(made: Synthesiser, confidence: 
     error = endpoint_error(MODEL, found.pose[None], MODEL, made.poses[20][None]).values.mean()
     assert (error < 8) == corrected
     assert (found.status is Status.STARTED) == corrected
+
+
+def test_a_start_that_replaces_a_track_may_be_anywhere(made: Synthesiser) -> None:
+    state, far = TrackState(TrackingThresholds(), 40.0), made.poses[0].copy()
+    far[0] += 0.5
+    for may_jump, status in ((False, Status.LOST), (True, Status.STARTED)):
+        state.restore([doubtful(made.poses[0], 0.0)])
+        found = state.commit(far, 5.0, 0.9, Status.STARTED, {}, 1 / 30, 0.9, may_jump=may_jump)
+        assert found.status is status
+
+
+class NothingDetected(Segmenter):
+    """Finds no hand without a prior."""
+
+    def segment(self, frame: Frame, prior: RoiPrior | None = None) -> Observation | None:
+        return None if prior is None else super().segment(frame, prior)
+
+
+def test_a_track_in_doubt_is_followed_where_no_hand_is_detected(made: Synthesiser) -> None:
+    history = [doubtful(made.poses[20], 20 / 30 - 0.3 + index / 30) for index in range(9)]
+    for reconsiders in (True, False):
+        state = TrackState(TrackingThresholds(), 40.0, reconsiders)
+        state.restore(history)
+        assert (state.predicted_pose(20 / 30) is None) == reconsiders
+        segmenter, keypoints = NothingDetected(None), KeypointGuide(MODEL)
+        found, _, failure = segment(frame_of(made, 20), segmenter, MODEL, state, keypoints, lambda: 0.0)
+        assert failure is None
+        assert found is not None
+        assert found.resegmentation is None

@@ -43,6 +43,9 @@ class Following:
     def predicted_pose(self, timestamp: float) -> None:
         return None
 
+    def doubted_pose(self, timestamp: float) -> None:
+        return None
+
     def start(self, observation: Observation, pose: ArrayLike | None = None) -> Estimate:
         return self.track(observation)
 

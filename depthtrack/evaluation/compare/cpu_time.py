@@ -33,6 +33,9 @@ class CpuTimed:
     def predicted_pose(self, timestamp: float) -> Array | None:
         return self._tracker.predicted_pose(timestamp)
 
+    def doubted_pose(self, timestamp: float) -> Array | None:
+        return self._tracker.doubted_pose(timestamp)
+
     def close(self) -> None:
         self._tracker.close()
 

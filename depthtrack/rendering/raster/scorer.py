@@ -65,10 +65,11 @@ class RasterScorer(ScorerBase):
             arrays.allocate_images(shape, self._threads)
         tiles.write_tiled(target.depth, np.nan, arrays.observed)
         tiles.write_labels(target.silhouette, target.depth, arrays.labels)
-        arrays.is_hiding[0] = target.hiding is not None
-        if target.hiding is not None:
-            tiles.write_tiled(target.hidden_from(self._objective.hidden_depth), 0, arrays.hidden_from)
-            tiles.write_tiled(target.seen_from(self._objective.surroundings_depth), 0, arrays.seen_from)
+        maps = target.hidden_from(self._objective.hidden_depth), target.seen_from(self._objective.surroundings_depth)
+        arrays.is_hiding[0] = any(each.any() for each in maps)
+        if arrays.is_hiding[0]:
+            tiles.write_tiled(maps[0], 0, arrays.hidden_from)
+            tiles.write_tiled(maps[1], 0, arrays.seen_from)
         clamped = np.minimum(target.depth, self._objective.clamp_depth, dtype=np.float64).sum()
         arrays.empty[:] = clamped, 0.0, np.count_nonzero(target.silhouette)
         c = target.camera

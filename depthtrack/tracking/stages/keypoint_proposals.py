@@ -60,7 +60,7 @@ class KeypointProposals:
     ) -> Array:
         """Return the proposed poses (N, 27)."""
         observation = frame.observation
-        lifted = lifter.lift(keypoints, observation.camera, observation.depth, frame.state.pose)
+        lifted = lifter.lift(keypoints, observation.camera, observation.depth, frame.last_pose)
         if lifted is None:
             return np.empty((0, 27))
         costs = [mean_misfit(finger) for finger in misfits[1:].reshape(5, 4)]

@@ -29,7 +29,7 @@ class Lift:
         if observation.keypoints is None:
             return []
         lifter = frame.tools.lifter(self.options)
-        lifted = lifter.lift(observation.keypoints, observation.camera, observation.depth, frame.state.pose)
+        lifted = lifter.lift(observation.keypoints, observation.camera, observation.depth, frame.last_pose)
         if lifted is None:
             return []
         poses = [lifted.pose]

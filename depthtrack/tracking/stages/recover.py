@@ -103,7 +103,7 @@ class RefineFingers:
         prior = prior_near(found.pose[ANGLES], frame.posture_kept(refit.icp), refit.icp)
         fitted = frame.fitter(refit).fit(found.pose, prior=prior)
         fit, kept = (frame.evaluate(pose[None])[0] for pose in (fitted, found.pose))
-        starts = frame.state.pose is None or frame.state.is_stale(frame.observation.timestamp)
+        starts = frame.last_pose is None or frame.state.is_stale(frame.observation.timestamp)
         return kept if starts and kept.energy < self.recovery.accept_finger * fit.energy else fit
 
     def _accepted(self, frame: FrameContext, best: Candidate, other: Candidate, finger: int) -> Candidate:

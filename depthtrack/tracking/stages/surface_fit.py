@@ -40,7 +40,7 @@ class SurfaceFit:
     def fitted(self, frame: FrameContext, candidates: list[Candidate], effort: int | None = None) -> list[Candidate]:
         """Return all candidates fitted, best first."""
         fitter, prior = frame.fitter(self.options), self.prior
-        icp, last = self.options.icp, frame.state.pose
+        icp, last = self.options.icp, frame.last_pose
         if prior is None and self.hold_last and (last is not None or icp.posture_weight > 0):
             before = candidates[0].pose if last is None else last
             prior = prior_near(before[ANGLES], frame.posture_kept(icp), icp)
