@@ -22,6 +22,7 @@ class Target:
     depth: (h, w) metres, 0 = no reading of the hand.
     occluder: (h, w) metres, depth up to which an object before the hand is solid, 0 = no object; None for none at all.
     surroundings: (h, w) metres, readings that are not of the hand, such as the forearm's, 0 = none; None if unknown.
+        What is too near for a reading has a small depth.
 
     A hypothesis may lie behind the occluder. What lies before it or inside it costs more in Eq. (2).
     What lies well behind the surroundings costs nothing there.

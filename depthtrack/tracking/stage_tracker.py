@@ -42,6 +42,7 @@ class _Proposal(NamedTuple):
     """Best candidate of a frame, and what its estimate states.
 
     place: cost of the place of the hand, see `Observation.cost`, metres.
+    may_jump: whether it may be far from the last pose.
     The other fields are those of `Estimate`, and the arguments of `TrackState.commit`.
     """
 
@@ -78,10 +79,8 @@ class StageTracker:
         deadline: milliseconds after a frame arrives at which its searches end; None for none.
         """
         self.name, self._stages, self._tools, self._seed, self._deadline = name, stages, tools, seed, deadline
-        self._thresholds, self._state = (
-            thresholds,
-            TrackState(thresholds, tools.scoring.objective.clamp, deadline is None),
-        )
+        self._thresholds = thresholds
+        self._state = TrackState(thresholds, tools.scoring.objective.clamp, reconsiders=deadline is None)
         listed = (stage.name for stage in (*stages.follow, *stages.start, *stages.refine))
         self.stages: tuple[str, ...] = tuple(dict.fromkeys(("target", *listed, "confidence")))
         self._confidence = fitted_model()
