@@ -107,10 +107,10 @@ class Target:
 
         behind: depth behind their readings from which on they hide it, metres.
         """
-        if self.surroundings is None or math.isinf(behind):
+        around = self._around_occluder
+        if around is None or math.isinf(behind):
             return np.zeros(self.camera.shape, np.float32)
-        hides = self.surroundings > 0 if self.occluder is None else (self.surroundings > 0) & (self.occluder == 0)
-        return np.where(hides, np.float32(1) / (self.surroundings + np.float32(behind)), np.float32(0))
+        return np.where(around > 0, np.float32(1) / (around + np.float32(behind)), np.float32(0))
 
     @cached_property
     def hiding(self) -> Depth | None:
@@ -141,11 +141,17 @@ class Target:
 
         behind: depth behind their readings, metres.
         """
-        depth = np.asarray(rendered, dtype=np.float64)
-        if self.surroundings is None:
+        depth, around = np.asarray(rendered, dtype=np.float64), self._around_occluder
+        if around is None:
             return depth
-        hidden = (self.surroundings > 0) & (depth >= self.surroundings.astype(np.float64) + behind)
-        return np.where(hidden if self.occluder is None else hidden & (self.occluder == 0), 0.0, depth)
+        return np.where((around > 0) & (depth >= around.astype(np.float64) + behind), 0.0, depth)
+
+    @cached_property
+    def _around_occluder(self) -> Depth | None:
+        """Surroundings (h, w) without those on the occluder, which hides in its own way."""
+        if self.surroundings is None or self.occluder is None:
+            return self.surroundings
+        return np.where(self.occluder > 0, np.float32(0), self.surroundings)
 
     def before_occluder(self, rendered: ArrayLike, behind: float) -> Mask | None:
         """Return where (h, w) a surface lies before or inside the occluder; None without one.

@@ -63,7 +63,7 @@ class TrackingThresholds:
     doubt_confidence: float = option(
         0.25,
         "A track that stays below this confidence for `doubt_after` is in doubt: a start competes with it. "
-        "The same goes for such a pose after a loss, and neither with a deadline",
+        "One also competes with such a pose after a loss; none does with a deadline",
         source="twelve tuning recordings of the cross-model benchmark, ten of them along the forearm",
         most=1,
     )
