@@ -39,7 +39,7 @@ def find_arm(
     """
     areas = grid.areas.ravel()
     limbs = [limb for limb in palm.limbs if float(areas[limb].sum()) > options.least_area]
-    exits = limbs or _border_crossings(grid, palm, grid.edge, options)
+    exits = limbs or _border_crossings(grid, palm, grid.edge, options.nearest_border, options)
     return _best_arm(grid, palm, exits, wrist_distance, options, expected)
 
 
@@ -53,18 +53,19 @@ def find_vanishing_arm(
     """
     beside_blind = cv2.dilate(blind.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     nearer = grid.depth < palm.centre[2] - options.nearer
-    exits = _border_crossings(grid, palm, beside_blind & nearer, options)
+    exits = _border_crossings(grid, palm, beside_blind & nearer, options.nearest_gap, options)
     return _best_arm(grid, palm, exits, wrist_distance, options, expected)
 
 
-def _border_crossings(grid: Grid, palm: Palm, border: Mask, options: ForearmOptions) -> list[Index]:
+def _border_crossings(grid: Grid, palm: Palm, border: Mask, nearest: float, options: ForearmOptions) -> list[Index]:
     """Return the flat indices (N,) of each place where the palm's surface crosses a border.
 
     It happens before the arm has left the hand's reach.
 
     border: (rows, columns).
+    nearest: smallest distance from the palm's centre, metres.
     """
-    crossing = border & palm.paths.reached() & (palm.paths.distance > options.nearest_border)
+    crossing = border & palm.paths.reached() & (palm.paths.distance > nearest)
     labels, areas = grid.within(crossing).surfaces()
     parts = [np.flatnonzero(labels == label) for label in range(len(areas))]
     cell = float(palm.centre[2]) / grid.focal[0]

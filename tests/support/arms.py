@@ -27,11 +27,15 @@ def club(slant: float) -> tuple[Grid, Palm]:
 
     The tube points down and, by `slant` radians, away from the camera.
     """
+    return nearest_palm(club_depth(slant))
+
+
+def club_depth(slant: float) -> np.ndarray:
+    """Return the depth image (h, w) of the club, metres."""
     c, s = np.cos(slant), np.sin(slant)
     turn = np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0.5], [0, 0, 0, 1.0]])
     palm = ellipsoid((0.0, -0.01, 0.0), (0.045, 0.055, 0.030))
     fingertip = ellipsoid((0.0, -0.07, 0.0), (0.012, 0.05, 0.012))
     tube = cone((0.0, 0.0, 0.0), 0.4, 0.030, 0.032)
     placed = np.stack([turn @ part for part in (palm, fingertip, tube)])
-    depth = raycast(CAMERA, np.array([SPHERE, SPHERE, CYLINDER]), placed, np.arange(3)).depth.astype(np.float32)
-    return nearest_palm(depth)
+    return raycast(CAMERA, np.array([SPHERE, SPHERE, CYLINDER]), placed, np.arange(3)).depth.astype(np.float32)

@@ -22,8 +22,17 @@ class ForearmOptions:
     nearest_border: float = option(
         0.06, "Smallest distance from the palm's centre to where an arm leaves the image", unit="m"
     )
+    nearest_gap: float = option(
+        0.03,
+        "Smallest distance from the palm's centre to where an arm comes too near for the sensor",
+        unit="m",
+        source="462 frames of tuning recordings of the cross-model benchmark",
+    )
     nearer: float = option(
-        0.02, "Depth by which an arm that vanishes near the sensor is nearer than the palm", unit="m"
+        0.01,
+        "Depth by which an arm that vanishes near the sensor is nearer than the palm",
+        unit="m",
+        source="as `nearest_gap`",
     )
     direction_start: float = option(0.05, "Distance behind the wrist at which the direction is measured", unit="m")
     least_cosine: float = option(0.5, "Cosine of the largest turn of an arm between frames", least=-1, most=1)
