@@ -71,12 +71,14 @@ class HandDetector:
     def nearest_palm(self, grid: Grid, candidates: Grid, last: Array) -> Palm | None:
         """Return the palm of lowest cost near its last position, or None.
 
+        It may be smaller than one anywhere: the detection samples other pixels.
+
         candidates: the grid with only the nodes that may be hand.
         last: (3,), metres, camera frame.
         """
         options = self._options.detection
         nearest, lowest = None, np.inf
-        for palm in find_palms(grid, candidates, self._options.palm):
+        for palm in find_palms(grid, candidates, self._options.palm.at_known_place):
             distance = float(np.linalg.norm(palm.centre - last))
             if distance > options.largest_step:
                 continue

@@ -36,6 +36,16 @@ def test_a_palm_is_followed_up_to_the_largest_step() -> None:
         assert (DETECTOR.nearest_palm(grid, grid, last) is not None) == found
 
 
+def test_a_palm_at_a_known_place_may_be_smaller() -> None:
+    """The grid of a detection samples other pixels than the one that follows, so both disagree about the smallest."""
+    grid, palm = club(0.0)
+    narrow = replace(OPTIONS.palm, least_radius=1.1 * palm.radius)
+    assert HandDetector(replace(OPTIONS, palm=narrow), AVERAGE_HAND).detect(grid, grid) == []
+    for share, found in ((0.8, True), (1.0, False)):
+        detector = HandDetector(replace(OPTIONS, palm=replace(narrow, known_share=share)), AVERAGE_HAND)
+        assert (detector.nearest_palm(grid, grid, palm.centre) is not None) == found
+
+
 def test_costs_are_the_sum_of_their_terms() -> None:
     """A weight of zero removes its term; the last position adds its distance."""
     grid, palm = club(0.0)

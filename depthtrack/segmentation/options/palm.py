@@ -1,6 +1,7 @@
 """Options of palm candidates, and of the choice among them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 from depthtrack.options import check_ranges, option
 
@@ -39,6 +40,12 @@ class PalmOptions:
     least_radius: float = option(
         0.012, "Smallest inscribed radius of a palm: half the thickness of a child's palm", unit="m"
     )
+    known_share: float = option(
+        0.8,
+        "Share of `least_area` and `least_radius` that suffices near a known place of the hand",
+        source="462 frames of tuning recordings of the cross-model benchmark",
+        most=1,
+    )
     largest_radius: float = option(
         0.063, "Largest inscribed radius of a palm or fist; the radius of a head is 75 mm", unit="m"
     )
@@ -56,6 +63,12 @@ class PalmOptions:
 
     def __post_init__(self) -> None:
         check_ranges(self)
+
+    @property
+    def at_known_place(self) -> Self:
+        """The options for a palm near a known place of the hand, which may be smaller."""
+        share = self.known_share
+        return replace(self, least_area=share * self.least_area, least_radius=share * self.least_radius)
 
 
 @dataclass(frozen=True)
