@@ -27,10 +27,12 @@ from depthtrack.tracking.options import (
     damped_swarm,
 )
 
-_GLOBAL_FITS = GlobalSearchOptions(
-    proposals=3000, resolution=64, synergy_share=0.5, good_energy=0.3, attempts=4, min_gain=0.1
+_GLOBAL_FITS = GlobalSearchOptions(proposals=3000, resolution=64, synergy_share=0.5, good_energy=0.3, attempts=1)
+"""Global search of the trackers that fit surfaces. A doubtful start searches other places instead of once more."""
+_START_FITS = FitSearchOptions(
+    (FitRound(48, 8, 3, coarse=True), FitRound(16, None, 4, coarse=True), FitRound(6, None, 8), FitRound(2, None, 12))
 )
-"""Global search of the trackers that fit surfaces."""
+"""Surface fits of their global search."""
 _LOCAL_FITS = FitSearchOptions(
     (FitRound(48, None, 3), FitRound(16, None, 4), FitRound(6, None, 8), FitRound(2, None, 12))
 )
@@ -147,7 +149,7 @@ class IkConfig:
         "Global search",
         advanced=True,
     )
-    fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    fit_search: FitSearchOptions = option(_START_FITS, "Surface fits of a global search", advanced=True)
     recovery: RecoveryOptions = option(
         replace(_FIT_RECOVERY, routine_proposals=1000),
         "Local re-initialisation",
@@ -214,7 +216,7 @@ class HybridConfig:
         "Global search",
         advanced=True,
     )
-    fit_search: FitSearchOptions = option(FitSearchOptions(), "Surface fits of a global search", advanced=True)
+    fit_search: FitSearchOptions = option(_START_FITS, "Surface fits of a global search", advanced=True)
     doubt_search: FitSearchOptions = option(
         _DOUBT_FITS, "Surface fits of the global search of a doubtful frame", advanced=True
     )
@@ -302,7 +304,7 @@ class Schroeder2014Config:
     fit: SurfaceFitOptions = option(SurfaceFitOptions(icp=PAPER_ICP), "Surface fit of each frame")
     synergies: SynergyOptions = option(SynergyOptions(), "Hand synergies")
     search: GlobalSearchOptions = option(
-        replace(_GLOBAL_FITS, resolution=None, follow_arm=False),
+        replace(_GLOBAL_FITS, resolution=None, follow_arm=False, attempts=4, min_gain=0.1),
         "Global search; not part of the paper",
         advanced=True,
     )
