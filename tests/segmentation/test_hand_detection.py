@@ -37,7 +37,7 @@ def test_a_palm_is_followed_up_to_the_largest_step() -> None:
 
 
 def test_a_palm_at_a_known_place_may_be_smaller() -> None:
-    """The grid of a detection samples other pixels than the one that follows, so both disagree about the smallest."""
+    """The grid that follows samples other pixels than the detection."""
     grid, palm = club(0.0)
     narrow = replace(OPTIONS.palm, least_radius=1.1 * palm.radius)
     assert HandDetector(replace(OPTIONS, palm=narrow), AVERAGE_HAND).detect(grid, grid) == []
