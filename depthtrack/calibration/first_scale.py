@@ -18,7 +18,7 @@ from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording.sequence import Frame
 from depthtrack.segmentation.observation import Observation
 from depthtrack.segmentation.segmenter import Segmenter
-from depthtrack.tracking.guided_segmentation import segment_start
+from depthtrack.tracking.guided_segmentation import around_start, segment_start
 from depthtrack.tracking.registry import create_tracker
 from depthtrack.tracking.stretches import Starts
 from depthtrack.tracking.tracker import Estimate
@@ -124,8 +124,9 @@ def _start(source: CalibrationSource, hand: HandShape, frame: Frame) -> _Start |
     if observation is None:
         return None
     with closing(create_tracker(source.tracker, hand)) as tracker:
-        pose = tracker.start(observation).pose
-    return None if pose is None else _Start(observation, pose)
+        found = tracker.start(observation)
+    around, _ = around_start(frame, observation, found, segmenter, HandModel(hand))
+    return None if found.pose is None or around is None else _Start(around, found.pose)
 
 
 def _fit(source: CalibrationSource, hand: HandShape, start: _Start) -> Estimate:
