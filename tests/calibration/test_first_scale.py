@@ -2,18 +2,25 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from depthtrack.calibration import first_scale
 from depthtrack.calibration.first_scale import FirstHand, around_lowest, first_hand, lowest_of_parabola
 from depthtrack.calibration.options import CalibrationOptions
 from depthtrack.calibration.recorded_views import CalibrationSource
+from depthtrack.hand.pose import POSITION
 from depthtrack.hand.shape import HandShape, Side
 from depthtrack.recording import open_sequence
+from depthtrack.recording.status import Status
+from depthtrack.segmentation.observation import Observation
 from depthtrack.synthesis.generate import Synthesis, Synthesiser, write_recording
+from depthtrack.tracking.guided_segmentation import segment_start
+from depthtrack.tracking.tracker import Estimate
 
 
 @given(
@@ -60,6 +67,36 @@ def test_the_scale_of_a_recorded_hand(tmp_path: Path, scale: float, side: Side, 
     assert two.scale == found.scale
     one, other = ([each.pose for starts in hand.starts.values() for each in starts] for hand in (found, two))
     np.testing.assert_array_equal(np.array(one), np.array(other))
+
+
+def test_a_start_at_another_place_is_observed_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hands of other scales are fitted to what surrounds the start, not to what was observed first."""
+    options = Synthesis("everyday", background="room", frames=1)
+    write_recording(Synthesiser(options), tmp_path / "recording")
+    source = CalibrationSource(open_sequence(tmp_path / "recording"), None, 0, 1, None, CalibrationOptions())
+    truth = source.sequence.ground_truth
+    assert truth is not None
+    assert truth.poses is not None
+    pose, elsewhere = truth.poses[0], np.array([0.2, 0.0, 0.0])
+
+    class Chooser:
+        def start(self, observation: Observation) -> Estimate:
+            return Estimate(pose, 1.0, 1.0, Status.STARTED)
+
+        def close(self) -> None:
+            pass
+
+    def observed(*arguments: Any) -> Observation:
+        found = segment_start(*arguments)
+        assert found is not None
+        return replace(found, centre=found.centre + elsewhere)
+
+    monkeypatch.setattr(first_scale, "create_tracker", lambda *_: Chooser())
+    monkeypatch.setattr(first_scale, "segment_start", observed)
+    found = first_scale._start(source, HandShape(), source.sequence[0])
+    assert found is not None
+    np.testing.assert_array_equal(found.pose, pose)
+    np.testing.assert_allclose(found.observation.centre, pose[POSITION], atol=0.03)
 
 
 def test_without_scales_to_compare_the_hand_is_the_average_one() -> None:
