@@ -93,7 +93,7 @@ def test_a_start_on_the_forearm_tries_other_places() -> None:
         replace(OPTIONS, start_shifts=(), start_bends=(), start_oppositions=()),
         search=lambda other: found(hand, 0.8),
         refine=lambda around, pose: None,
-        judge=lambda pose, place, _: Start(0.3 if pose is hand else 0.45, 0.8 if pose is hand else 0.5, place),
+        judge=lambda pose, place, _: Start(0.3 if pose is hand else 0.45, 0.8 if pose is hand else 0.7, place),
     )
 
     class Elsewhere(Around):
