@@ -29,7 +29,7 @@ class FirstHand(NamedTuple):
     """Hand of average proportions, before it is tracked.
 
     scale: of the hand.
-    starts: estimates in single frames, of a hand of about this scale, that are not in doubt.
+    starts: estimates in single frames, of a hand of about this scale, whose confidence is high enough.
     """
 
     scale: float
@@ -53,7 +53,7 @@ def first_hand(source: CalibrationSource, side: Side = "right") -> FirstHand:
         scale, estimates = best_scale(
             scales, lambda each: list(pool.map(partial(_fit, source, HandShape(side=side, scale=each)), started))
         )
-    frames, least = [each.observation.frame_index for each in started], source.tracker.thresholds.start_confidence
+    frames, least = [each.observation.frame_index for each in started], source.options.first_confidence
     return FirstHand(scale, {n: (e,) for n, e in zip(frames, estimates, strict=True) if e.confidence >= least})
 
 

@@ -78,6 +78,12 @@ class CalibrationOptions:
         "Sizes of the whole hand, of the average one's, that are compared in the first frames of the stretches; empty: "
         "begin with the average",
     )
+    first_confidence: float = option(
+        0.6,
+        "Least confidence of a start in these frames that the track of a stretch begins with",
+        source="`grasp` 19 and `random` 1045 of the cross-model benchmark",
+        most=1,
+    )
     rounds: int = option(3, "Rounds of joint optimisation, at most; the hand is tracked in the first two")
     iterations: int = option(5, "Iterations of the joint optimisation in each round")
     exact_iterations: int = option(3, "Last iterations, which stretch the skin of the sizes found so far")
