@@ -46,6 +46,14 @@ def test_a_palm_at_a_known_place_may_be_smaller() -> None:
         assert (detector.nearest_palm(grid, grid, palm.centre) is not None) == found
 
 
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_options_at_a_known_place_stay_in_their_ranges(share: float) -> None:
+    for options in (OPTIONS.palm, replace(OPTIONS.palm, least_area=1e-4)):
+        near = replace(options, known_share=share).at_known_place
+        assert near.least_area == max(share * options.least_area, 1e-4)
+        assert near.least_radius == share * options.least_radius
+
+
 def test_costs_are_the_sum_of_their_terms() -> None:
     """A weight of zero removes its term; the last position adds its distance."""
     grid, palm = club(0.0)

@@ -6,6 +6,8 @@ from typing import Self
 from depthtrack.options import check_ranges, option
 
 _CHOSEN = "chosen by hand on 425 single frames, 90 of them real: the hand costs least in 423; no script is kept"
+_SMALLEST_AREA = 1e-4
+"""Square metres: smallest area that an option may state."""
 _TUNED = "single frames of the tuning seeds 0 to 5 of the cross-model benchmark"
 
 
@@ -35,7 +37,10 @@ class PalmOptions:
         3.0, "Length of the longest path along a surface to one of its tips", unit="m", least=1e-4
     )
     least_area: float = option(
-        20e-4, "Smallest visible area of a hand: half of a fist seen from its side (40 cm^2)", unit="m^2", least=1e-4
+        20e-4,
+        "Smallest visible area of a hand: half of a fist seen from its side (40 cm^2)",
+        unit="m^2",
+        least=_SMALLEST_AREA,
     )
     least_radius: float = option(
         0.012, "Smallest inscribed radius of a palm: half the thickness of a child's palm", unit="m"
@@ -68,7 +73,8 @@ class PalmOptions:
     def at_known_place(self) -> Self:
         """The options for a palm near a known place of the hand, which may be smaller."""
         share = self.known_share
-        return replace(self, least_area=share * self.least_area, least_radius=share * self.least_radius)
+        area = max(share * self.least_area, _SMALLEST_AREA)
+        return replace(self, least_area=area, least_radius=share * self.least_radius)
 
 
 @dataclass(frozen=True)
