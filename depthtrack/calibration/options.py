@@ -1,8 +1,9 @@
 """Options of calibration. Those without a source were tuned on synthetic recordings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from depthtrack.options import option
+from depthtrack.tracking.configuration import HybridConfig
 from depthtrack.tracking.stretches import StretchOptions
 
 
@@ -68,11 +69,17 @@ class AcceptanceOptions:
     )
 
 
+_SEARCHED_TWICE = HybridConfig(search=replace(HybridConfig().search, attempts=2, min_gain=0.1))
+"""Tracker of a hand to be measured: all depends on its starts, which fit an average hand less well."""
+
+
 @dataclass(frozen=True)
 class CalibrationOptions:
     """Rounds of tracking and joint optimisation, and the acceptance of a result."""
 
-    stretches: StretchOptions = option(StretchOptions(views=40), "Frames that the hand is tracked in")
+    stretches: StretchOptions = option(
+        StretchOptions(views=40, tracker=_SEARCHED_TWICE), "Frames that the hand is tracked in"
+    )
     first_scales: tuple[float, ...] = option(
         (0.72, 0.8, 0.9, 1.0, 1.1, 1.22),
         "Sizes of the whole hand, of the average one's, that are compared in the first frames of the stretches; empty: "
